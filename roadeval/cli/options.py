@@ -56,6 +56,9 @@ class MethodSettings:
     )
     """Score the masks of a folder, or of another log, as one more variant; a file holds their path
     and more, as a threshold of confidences."""
+    only: Annotated[tuple[str, ...], Flag("--only", "NAME")] = ()
+    """Run these variants alone, masks included. Where none of them learns anything, no frame is
+    taken for training."""
     drives: Annotated[Mapping[str, str], Flag("--drive", "DRIVE=FILE.toml", "Input")] = (
         dataclasses.field(default_factory=dict)
     )
@@ -165,7 +168,8 @@ def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
         case typing.Literal:
             return str, None
         case builtins.tuple:
-            return list[str], value_or_name if _bare(get_args(kind)[0]) is int else color
+            readers: Mapping[type, Callable[[str], Any]] = {str: str, int: value_or_name}
+            return list[str], readers.get(_bare(get_args(kind)[0]), color)
         case _:
             return list[str], named if get_args(kind)[1] is str else _maybe_named
 
@@ -181,7 +185,7 @@ def _bare(hint: Any) -> Any:
 
 def value_or_name(text: str) -> int | str:
     """Read a label's value, or the name of its class."""
-    return int(text) if text.isascii() and text.isdecimal() else text
+    return int(text) if re.fullmatch(r"-?[0-9]+", text) else text
 
 
 def color(text: str) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.cli import console
+from roadeval.cli import console, messages
 from roadeval.jobs.progress import Progress
 
 if TYPE_CHECKING:
@@ -58,6 +58,8 @@ class Watch:
     def __call__(self, progress: Progress | FleetProgress) -> None:
         """Show how far a job is."""
         begins = progress.stage != self._stage
+        if isinstance(progress, Progress) and progress.note:
+            messages.note(progress.note)
         if begins:
             self._stage = progress.stage
             self._display.reset(self._task, completed=progress.done)

@@ -54,6 +54,8 @@ def documented(config: RunConfig) -> str:
     import tomlkit
 
     head = [f"preset = {tomlkit.item(config.preset).as_string()}", *_chain(config.pipeline)]
+    if config.only:
+        head += [*_comment("The variants that run."), _assignment("only", config.only)]
     parts = ["\n".join(head), *_stages(config.pipeline, "")]
     for variant in config.extra:
         named = tomlkit.item(variant.preset).as_string()

@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
-from roadeval.config.tables import ConfigError, in_file, override, read_tables
+from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
 from roadeval.config.variants import (
     PRESETS,
     Variant,
@@ -115,6 +115,8 @@ class RunConfig(LogConfig):
     """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings."""
     extra: tuple[Variant, ...] = ()
     """Further variants."""
+    only: tuple[str, ...] = ()
+    """The variants that run, masks of other methods included; all of them by default."""
     drives: tuple[DriveSettings, ...] = ()
     """Settings of some drives alone; later ones override earlier ones."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
@@ -129,10 +131,15 @@ class RunConfig(LogConfig):
 
     def __post_init__(self) -> None:
         LogConfig.__post_init__(self)
-        names = {variant.name for variant in self.variants()}
+        names = {variant.name for variant in variants_of(self.pipeline, self.extra)}
         for name in (*self.topics.masks, *self.masks):
             check_variant_name(name, names)
             names.add(name)
+        for name in self.only:
+            if name not in names:
+                raise ConfigError(
+                    f"`only` {name}: there is no such variant; choose {either(names)}"
+                )
         try:
             RecordRule.parse(self.output.record)
         except RoadevalError as error:
@@ -150,8 +157,9 @@ class RunConfig(LogConfig):
             )
 
     def variants(self) -> tuple[Variant, ...]:
-        """Return every variant that is computed: the two by default, then the extra ones."""
-        return variants_of(self.pipeline, self.extra)
+        """Return the variants that are computed: the two by default, then the extra ones."""
+        every = variants_of(self.pipeline, self.extra)
+        return tuple(each for each in every if not self.only or each.name in self.only)
 
     def pipelines(self) -> dict[str, Pipeline]:
         """Return the pipeline of every variant, by name."""
@@ -201,11 +209,15 @@ class RunConfig(LogConfig):
         """
         pipeline = pipeline_of(self.pipeline, tables)
         check_tables(
-            tables, ("chain", *pipeline.settings, "variants", "masks", "drives", *SECTIONS)
+            tables, ("chain", "only", *pipeline.settings, "variants", "masks", "drives", *SECTIONS)
         )
+        only = tables.get("only", self.only)
+        if not isinstance(only, list | tuple) or not all(isinstance(name, str) for name in only):
+            raise ConfigError("`only` must be a list of variants' names")
         config = replace(
             self,
             pipeline=pipeline,
+            only=tuple(only),
             extra=self._with_variants(tables.get("variants", {})),
             masks=with_masks(self.masks, tables.get("masks", {})),
             **{
@@ -244,8 +256,15 @@ class RunConfig(LogConfig):
         for own, each in config.masks.items():
             if not each.path:
                 raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
-        masks = {own: in_drive(each, path) for own, each in config.masks.items()}
-        return replace(config, masks=masks, truth=in_drive(config.truth, path))
+        only = {*config.only} or {*config.masks, *config.topics.masks}
+        masks = {own: in_drive(each, path) for own, each in config.masks.items() if own in only}
+        topics = {own: topic for own, topic in config.topics.masks.items() if own in only}
+        return replace(
+            config,
+            masks=masks,
+            topics=replace(config.topics, masks=topics),
+            truth=in_drive(config.truth, path),
+        )
 
     def _with_drive(self, drive: DriveSettings) -> RunConfig:
         labels = LabelSettings() if "labels" in drive.tables else self.labels
@@ -276,6 +295,7 @@ class RunConfig(LogConfig):
         """
         return {
             "preset": self.preset,
+            **({"only": list(self.only)} if self.only else {}),
             **self.pipeline.as_dict(),
             "variants": {
                 each.name: {"preset": each.preset, **each.pipeline.as_dict()} for each in self.extra

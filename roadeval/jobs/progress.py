@@ -17,6 +17,8 @@ class Progress:
     done: int
     total: int | None
     stage: str
+    note: str = ""
+    """A sentence that the user should read now, not at the end."""
 
 
 OnProgress = Callable[[Progress], None]

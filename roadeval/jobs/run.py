@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from roadeval import logs
 from roadeval.config import RunConfig, Variant
@@ -27,6 +27,9 @@ from roadeval.training import Model, TrainingSettings, learning
 from roadeval.training.model import ModelError
 from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
+
+SPARSE: Final = 5
+"""Where there are more frames than so many for each label, a note says so."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +116,8 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     again = partial(log.frames, selection)
     variants = config.variants()
     labelled = selection.truth is not None
+    if note := _sparse(selection, len(again())):
+        on_progress(Progress(0, None, "opening", note))
     # Without truth no rate could tell the trainings apart.
     training = config.training if labelled else replace(config.training, seeds=1)
     (model, *others), schedule = _learn(again, variants, training, on_progress, labelled=labelled)
@@ -134,6 +139,16 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
+    )
+
+
+def _sparse(selection: logs.Selection, frames: int) -> str:
+    """Return a note where few of the frames that are read can have truth; else empty."""
+    truths = frames if selection.truth is None else len(selection.truth.pictures)
+    if frames <= SPARSE * truths:
+        return ""
+    return (
+        f"at most {truths} of {frames} frames have road truth: `frames.labelled` reads these alone"
     )
 
 

@@ -66,6 +66,7 @@ def warnings(run: Run) -> tuple[str, ...]:
     unlabelled = f"there is no road truth to score against, only masks to look at: {missing}"
     return (
         *((unlabelled,) if missing else ()),
+        *_sparse(run),
         *run.frames.oddities,
         *_sizes(run),
         *_missing(run),
@@ -74,6 +75,22 @@ def warnings(run: Run) -> tuple[str, ...]:
         *_constant(run),
         *run.model.warnings,
     )
+
+
+def _sparse(run: Run) -> Iterator[str]:
+    """Say what windows are where only labelled frames are read; warn where none was read."""
+    if run.config.frames.labelled:
+        yield (
+            "only frames with truth were read: windows are of frames that follow each other among "
+            "these, and flicker is what changes from one to the next, however far apart they are"
+        )
+    if run.selection.truth is not None and not run.frames.accounting.labelled:
+        stride = run.config.frames.every
+        why = f": `frames.every` {stride} leaves out each one that has" if stride > 1 else ""
+        yield (
+            f"none of the frames that were read has road truth{why}; `frames.labelled` reads only "
+            "frames that have"
+        )
 
 
 def losses(run: Run) -> tuple[str, ...]:
@@ -192,7 +209,7 @@ def _accounting(run: Run) -> FrameAccount:
     seen, roles = run.frames.accounting, Counter(run.board.roles())
     skipped = {
         "outside the range": seen.in_log - seen.in_range,
-        "not read (stride or limit)": seen.in_range - seen.read,
+        _unread(run.config): seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
         "failed in a stage": len(run.failures.reasons),
         "trained on": roles[Role.TRAINING],
@@ -209,6 +226,10 @@ def _accounting(run: Run) -> FrameAccount:
         evaluated=roles[Role.EVALUATED],
         skipped={reason: number for reason, number in skipped.items() if number},
     )
+
+
+def _unread(config: RunConfig) -> str:
+    return f"not read ({'no truth, ' if config.frames.labelled else ''}stride or limit)"
 
 
 def _gap(config: RunConfig) -> str:

@@ -51,9 +51,12 @@ IMAGES: Final = frozenset(
     {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm"}
 )
 """Endings of image files, in lower case."""
-_LABEL_SUFFIX: Final = re.compile(
-    r"[_.-]?(labelids|labels?|masks?|gt|truth|road|seg|segmentation|annotations?|L)$"
+_SUFFIX: Final = re.compile(
+    r"_(leftImg8bit|gt(Fine|Coarse)_\w+|(drivable|train)_id)$"
+    r"|[_.-]?(labelids|labels?|masks?|gt|truth|road|seg|segmentation|annotations?|L)$"
 )
+"""What data sets put after the name that an image and its label share: Cityscapes, BDD100K, ..."""
+_KITTI: Final = re.compile(r"^(uu|umm?)_(road|lane)_(?=\d)")
 _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
 
 
@@ -213,17 +216,27 @@ def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
     return in_order, [times[file] for file in in_order]
 
 
-def by_name(images: Sequence[Path], masks: Sequence[Path]) -> Mapping[Path, Path]:
-    """Find for each image the mask of its name, or of its name with a label's ending."""
-    exact = {mask.stem: mask for mask in masks}
-    loose = {bare(mask): mask for mask in masks}
-    found = {image: exact.get(image.stem) or loose.get(image.stem) for image in images}
-    return {image: mask for image, mask in found.items() if mask is not None}
+def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
+    """Find for each label the image of its name, as it is or as `bare`."""
+    exact, loose = ({name(image): image for image in images} for name in (_stem, bare))
+    found = {
+        label: exact.get(label.stem) or exact.get(bare(label)) or loose.get(bare(label))
+        for label in labels
+    }
+    return {label: image for label, image in found.items() if image is not None}
+
+
+def _stem(file: Path) -> str:
+    return file.stem
 
 
 def bare(file: Path) -> str:
-    """Return a file's name without its ending, and without a label's, as ``_mask``."""
-    return _LABEL_SUFFIX.sub("", file.stem)
+    """Return a file's name without its ending, and without what marks an image or a label.
+
+    >>> bare(Path("um_road_000012.png")), bare(Path("a_000019_gtFine_labelIds.png"))
+    ('um_000012', 'a_000019')
+    """
+    return _SUFFIX.sub("", _KITTI.sub(r"\1_", file.stem))
 
 
 def time_in(name: str) -> int | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
@@ -190,7 +190,7 @@ class FrameStream:
         Counts of the frames so far.
     """
 
-    def __init__(self, selection: Selection, in_range: int, numbers: range) -> None:
+    def __init__(self, selection: Selection, in_range: int, numbers: Sequence[int]) -> None:
         """Begin a stream of the frames of these numbers, from a range of so many."""
         images = selection.camera.images
         self._pictures: PictureSequence = images

@@ -26,6 +26,7 @@ from roadeval.logs.topics.description import TopicInfo, describe_topic, survey
 from roadeval.logs.topics.reader import topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.named import with_keys
+from roadeval.logs.truth.pairing import frames_of
 from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
 from roadeval.runtime.text import visible
 
@@ -70,6 +71,7 @@ class Log:
         self._limits = Limits(config.frames.max_pixels, config.frames.keep_corrupt)
         self._lost_files = damage
         self._beside: list[Log] = []
+        self._with_truth: tuple[LabelSource, list[int]] | None = None
         self._containers = [
             container
             for file in files
@@ -178,6 +180,8 @@ class Log:
     def _masks(self, name: str, settings: MaskSettings, found: Selection) -> LabelSource:
         """Settle masks that lie beside the log; errors begin with their variant's name."""
         try:
+            if (log := log_and_topic(settings.path)[0]) == settings.path:
+                raise LogError(f"{log}: a log; name a topic of it, as {log}:/topic")
             masks = self._beside_log(settings, found)
             if found.truth is not None and masks.where == found.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
@@ -229,8 +233,22 @@ class Log:
                 f"{self.path.name}: no frame in this range; the images lie from {begin:.3f} to "
                 f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
             )
-        numbers = range(first, last, asked.every)
-        return FrameStream(selection, last - first, numbers[: asked.max_frames])
+        numbers: Sequence[int] = range(first, last)
+        if asked.labelled:
+            numbers = [each for each in self._labelled(selection) if first <= each < last]
+            if not numbers:
+                why = selection.no_truth or "no frame of the range has road truth"
+                raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
+        return FrameStream(selection, last - first, numbers[:: asked.every][: asked.max_frames])
+
+    def _labelled(self, selection: Selection) -> list[int]:
+        """Return the numbers of the frames that have truth; they are looked for once."""
+        truth = selection.truth
+        if truth is None:
+            return []
+        if self._with_truth is None or self._with_truth[0] is not truth:
+            self._with_truth = truth, sorted(frames_of(truth.pairing))
+        return self._with_truth[1]
 
     def close(self) -> None:
         """Close the log's files, and those of logs beside it."""

@@ -156,9 +156,9 @@ class LabelPlace:
     """Road truth that lies beside the log, and how it belongs to the log's frames."""
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
-    """A folder of label images or NPY files, one a frame; files of an annotation tool (COCO, CVAT,
-    LabelMe, YOLO, Label Studio, OpenLABEL); or ``LOG.mcap:/topic``, a topic of another log.
-    ``{drive}`` stands for the name of the drive's file, without its ending."""
+    """A folder of label images, files of an annotation tool (COCO, CVAT, LabelMe, YOLO, Label
+    Studio, OpenLABEL), or LOG.mcap:/topic. Images may be NPY files; there is one a frame. In the
+    path ``{drive}`` is the name of the drive's file, without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
     """How labels and frames belong together: by ``number``, the last one in the name of a label's
     file; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
@@ -168,7 +168,7 @@ class LabelPlace:
     """The number of the first frame's label."""
     images: Annotated[str | None, Flag("--truth-images", "FOLDER")] = None
     """The folder of images that the log was made of, in their order: labels belong to the image of
-    the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here."""
+    the same name, endings such as ``_mask`` aside. It may hold ``{drive}``, too."""
 
     def __post_init__(self) -> None:
         if self.images is not None and (self.pair is not None or self.first):
@@ -201,6 +201,9 @@ class FrameSettings:
     """End time, exclusive."""
     every: Annotated[int, Count, Flag("--every", "N")] = 1
     """Read every N-th frame."""
+    labelled: Annotated[bool, Flag("--labelled")] = False
+    """Read only frames that have truth. Windows are of consecutive ones of these, and flicker is
+    from one to the next, however far apart they are."""
     max_frames: Annotated[int | None, Count, Flag("--max-frames", "N")] = None
     """Stop after N frames read."""
     scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0

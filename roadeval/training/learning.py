@@ -85,10 +85,16 @@ def from_log(
             "patch guesses may make it worse: leave `training.adapt` out, or insist with "
             'training.source = "patch"'
         )
-    if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):
+    learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
+    if not learning:
         made_for = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
         nothing = Model({name: {} for name in pipelines}, made_for, "none", frozenset(), 0)
         return (nothing,), Schedule(frozenset())
+    if not settings.frames:
+        raise TrainingError(
+            f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
+            "or run what learns nothing with `only`"
+        )
     choose = _spread_out if settings.placement == "spread" else _from_the_first
     chosen = choose(candidates, settings, on_frame, by_truth=by_truth)
     held, count = chosen.held, len(chosen.held.frames)
@@ -102,7 +108,7 @@ def from_log(
         )
     warnings += _repeated(held.frames)
     if labelled and not by_truth:
-        warnings.append(f"no frame of the range has road truth: {BY_PATCH}")
+        warnings.append(f"no frame that is read has road truth: {BY_PATCH}")
     schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first)
     if base is None:
         schedule = replace(schedule, sizes=frozenset(len(f.payload) for f in held.frames))
@@ -385,6 +391,6 @@ def _hold(
 def _none_left(trained: int, gap: int, total: int) -> TrainingError:
     return TrainingError(
         f"the range has {total} labelled frames, and training would take {trained} of them and "
-        f"{gap} more as a gap: none is left to evaluate; lower `training.frames` or "
-        "`training.gap`, or give `training.model`"
+        f"{gap} more as a gap: none is left to evaluate; set `training.frames` to "
+        f"{max(total // 2 - gap, 1)}, give `training.model`, or run what learns nothing with `only`"
     )

@@ -27,7 +27,7 @@ class TrainingSettings:
     source: Literal["auto", "truth", "patch"] = "auto"
     """``auto``: the log's truth where it has one, else the reference patch; ``truth`` or ``patch``
     insists."""
-    frames: Annotated[int, Interval(ge=1, le=1000), Flag("--train-frames", "N")] = 10
+    frames: Annotated[int, Interval(ge=0, le=1000), Flag("--train-frames", "N")] = 10
     """Labelled frames to train on, which are never evaluated. All frames count for ``patch``. They
     are held decoded, which bounds the number of large ones below the one allowed here."""
     placement: Annotated[Literal["first", "spread"], Flag("--train-on", "WHERE")] = "first"

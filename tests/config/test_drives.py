@@ -108,7 +108,7 @@ def test_masks_are_those_of_the_drive():
         ({"path": "a", "thresold": 1}, "there is no such setting; choose first, images"),
         ({"path": "a", "threshold": 2}, "must be at most 1"),
         ({"path": "a", "threshold": 0.5, "labels": {"road": [3]}}, "threshold is for confidence"),
-        ({"path": "a", "images": "b", "first": 1}, "with images masks are paired by name"),
+        ({"path": "a", "images": "b", "first": 1}, "with images labels are paired by name"),
     ],
 )
 def test_bad_masks_are_named(table, message):

@@ -140,7 +140,7 @@ def test_the_summary_says_where_masks_lie_and_how_they_are_read(outcome, places)
     stated = outcome.summary["masks"]
     assert stated["confidence"]["meaning"] == "a confidence map: road is 0.5 or more"
     assert stated["other"]["pairing"] == "26 messages, paired by header stamps"
-    assert stated["named"]["pairing"] == "26 files, paired by name"
+    assert stated["named"]["pairing"] == "26 labels, paired by name"
     assert stated["number"]["path"] == str(places / "number")
 
 
@@ -246,7 +246,7 @@ def refused(places, **table) -> str:
     ("shift", "message"),
     [
         (1, "its numbers are 1 to 26, and the frames' 0 to 25"),
-        (500, "no mask belongs to a frame by number: theirs are 500 to 525"),
+        (500, "none of them belongs to a frame by number: theirs are 500 to 525"),
     ],
 )
 def test_masks_that_belong_to_no_frame_or_to_the_next_are_refused(places, tmp_path, shift, message):
@@ -258,7 +258,7 @@ def test_masks_that_belong_to_no_frame_or_to_the_next_are_refused(places, tmp_pa
 def test_masks_of_another_time_are_refused(places, tmp_path):
     with LogWriter(tmp_path / "other.mcap") as log:
         log.mask("/seg", 10**18, np.eye(4, dtype=np.uint8))
-    assert "no mask belongs to a frame" in refused(places, path=f"{tmp_path}/other.mcap:/seg")
+    assert "none of them belongs to a frame" in refused(places, path=f"{tmp_path}/other.mcap:/seg")
 
 
 def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, tmp_path):
@@ -285,7 +285,10 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
         ({"path": "nowhere"}, "no such folder"),
         ({"path": "other.mcap"}, "name a topic of it, as"),
         ({"path": "other.mcap:/no"}, "topic /no: is not in the log; its image topics are: /seg"),
-        ({"path": "other.mcap:/seg", "images": "images"}, "images are for a folder of masks"),
+        (
+            {"path": "other.mcap:/seg", "images": "images"},
+            "is for labels with names: those of a log have none",
+        ),
     ],
 )
 def test_masks_that_cannot_be_used_are_one_line(places, table, message):

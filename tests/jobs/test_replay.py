@@ -228,7 +228,7 @@ def test_a_range_without_truth_is_replayed_by_the_patch(drive, tmp_path):
     outcome = run(drive, tmp_path, start="2.0", end="2.1")
     assert outcome.summary["training"]["source"] == "patch"
     assert outcome.summary["frames"]["evaluated"] == 0
-    assert any("no frame of the range has road truth" in text for text in outcome.warnings)
+    assert any("no frame that is read has road truth" in text for text in outcome.warnings)
 
 
 def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):

@@ -152,7 +152,7 @@ def test_where_the_truth_labels_nothing_in_the_range_the_first_frames_train():
     model, schedule = learn(frames, frames=2)
     assert model.source == "patch"
     assert roles(frames, schedule) == "ttuuu"
-    assert "no frame of the range has road truth: the model learnt from" in model.warnings[0]
+    assert "no frame that is read has road truth: the model learnt from" in model.warnings[0]
 
 
 def test_who_insists_on_truth_is_not_given_the_patch():
@@ -175,7 +175,7 @@ def test_training_frames_are_bounded_in_memory(monkeypatch):
 
 @pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
 def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
-    with pytest.raises(TrainingError, match=r"none is left to evaluate; lower `training\.frames`"):
+    with pytest.raises(TrainingError, match=r"none is left to evaluate; set `training\.frames`"):
         learn(log(4), frames=frames, gap=gap)
 
 

@@ -23,7 +23,7 @@ Drives = Annotated[
 
 
 @takes(
-    *("preset", "config", "variants", "nets", "masks", "drives"),
+    *("preset", "config", "variants", "nets", "masks", "only", "drives"),
     *("training", "truth", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )

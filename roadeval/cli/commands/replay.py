@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @takes(
-    *("output", "preset", "config", "variants", "nets", "masks"),
+    *("output", "preset", "config", "variants", "nets", "masks", "only"),
     *("training", "truth", "topics", "labels", "frames", "run"),
 )
 def replay(

@@ -274,9 +274,7 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
         If no class is named that means road, or one that does not occur.
     """
     classes = origin.classes
-    known = ", ".join(
-        f"{each} ({origin.occurring[each]})" for each in classes if each != UNLABELLED
-    )
+    known = _counted(origin, [each for each in classes if each != UNLABELLED])
     if not labels.road:
         raise LogError(
             f"{name} has the classes {known}: name those that mean road with `labels.road`, and "
@@ -290,8 +288,15 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
         ignored.append(UNLABELLED)
     words = _words(map(str, labels.road), ignored)
     if rest := [each for each in classes if classes[each] not in meaning]:
-        words += f"; {_listed(rest)} and the rest are non-road"
+        words += f"; non-road is all else, {_counted(origin, rest)}"
     return ClassMap(meaning, NON_ROAD, False, words)
+
+
+def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
+    """Name the most usual of some classes, each with the number of labels in which it occurs."""
+    every = sorted(classes, key=lambda name: -origin.occurring[name])
+    more = f", and {len(every) - limit} more" if len(every) > limit else ""
+    return ", ".join(f"{name} ({origin.occurring[name]})" for name in every[:limit]) + more
 
 
 def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSettings:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.files import IMAGES, bare, listed, ordered, time_in
+from roadeval.logs.files import IMAGES, bare, images_of, listed, ordered, time_in
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.settings import LabelPlace
 from roadeval.runtime.text import visible
@@ -128,7 +128,7 @@ def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits)
         If a name has no key, or two labels have the same.
     """
     labels = origin.labels
-    named = None if settings.images is None else _places(Path(settings.images))
+    named = None if settings.images is None else _images(Path(settings.images))
     by, keys = _keys([label.path for label in labels], settings, named)
     found = sorted((label for label in labels if label.path in keys), key=lambda x: keys[x.path])
     for one, other in pairwise(label.path for label in found):
@@ -141,12 +141,12 @@ def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits)
 
 
 def _keys(
-    files: Sequence[Path], settings: LabelPlace, named: Mapping[str, int] | None
+    files: Sequence[Path], settings: LabelPlace, named: Sequence[Path] | None
 ) -> tuple[str, dict[Path, int]]:
     """Return what the keys are, and that of each file that has one."""
     if named is not None:
-        places = {file: named.get(file.stem, named.get(bare(file))) for file in files}
-        return "name", {file: place for file, place in places.items() if place is not None}
+        places = {image: place for place, image in enumerate(named)}
+        return "name", {file: places[image] for file, image in images_of(files, named).items()}
     times = {file: time for file in files if (time := time_in(bare(file))) is not None}
     are_times = len(times) == len(files) and all(len(bare(file)) > SHORT for file in files)
     if settings.pair == "number" or (settings.pair is None and not are_times):
@@ -164,10 +164,9 @@ def _number(file: Path) -> int:
     return int(found[1])
 
 
-def _places(folder: Path) -> dict[str, int]:
-    """Return the place of each image of a folder by its name, without its ending."""
+def _images(folder: Path) -> list[Path]:
+    """Return the images of a folder in the order in which `pack` logs them."""
     images, _ = ordered(listed(folder, IMAGES))
-    names = [image.stem for image in images]
-    if len(set(names)) < len(names):
+    if len({image.stem for image in images}) < len(images):
         raise LogError(f"{folder}: two of its images have the same name")
-    return {name: place for place, name in enumerate(names)}
+    return images

@@ -10,7 +10,7 @@ from typing import Final
 
 from roadeval.images import ImageError, Limits, format_of, size_of, to_png
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import IMAGES, by_name, listed, ordered
+from roadeval.logs.files import IMAGES, images_of, listed, ordered
 from roadeval.logs.settings import NS
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.files import check_input
@@ -90,9 +90,15 @@ def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
     files, labels = listed(images, IMAGES), listed(masks, IMAGES) if masks else []
-    by_image = by_name(files, labels)
-    if labels and not by_image:
-        raise LogError(f"{masks}: no mask has the name of an image in {images}")
+    belong = images_of(labels, files)
+    if labels and not belong:
+        some = ", ".join(each.name for each in labels[:NAMED])
+        raise LogError(f"{masks}: no mask has the name of an image in {images} ({some}, ...)")
+    by_image = {image: label for label, image in belong.items()}
+    if len(by_image) < len(belong):
+        extra = next(label for label in belong if by_image[belong[label]] != label)
+        other = by_image[belong[extra]]
+        raise LogError(f"{masks}: {extra.name} and {other.name} belong to the same image")
     stamps, words = _stamps(files, rate_hz)
     with LogWriter(output) as log:
         for file, stamp in stamps.items():

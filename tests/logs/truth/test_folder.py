@@ -8,7 +8,8 @@ import pytest
 from roadeval.images import Limits
 from roadeval.logs import LogError, MaskSettings
 from roadeval.logs.messages.pictures import CompressedPicture
-from roadeval.logs.truth.folder import labels_in, npy_picture
+from roadeval.logs.truth.beside import labels_in
+from roadeval.logs.truth.folder import npy_picture
 from roadeval.logs.truth.meaning import Confidence
 from roadeval.logs.truth.named import NamedLabels, with_keys
 from roadeval.logs.truth.source import log_and_topic
@@ -25,7 +26,9 @@ def folder(tmp_path, *names):
 
 
 def opened(path: Path, **settings) -> NamedLabels:
-    return with_keys(labels_in(path), str(path), MaskSettings(str(path), **settings), Limits())
+    return with_keys(
+        labels_in(path, None), str(path), MaskSettings(str(path), **settings), Limits()
+    )
 
 
 def keys(path, **settings):
@@ -105,9 +108,10 @@ def test_the_digest_tells_content_and_frame_not_the_place(tmp_path):
         ("a.mcap:/net", ("a.mcap", "/net")),
         ("d/a.mcap:net", ("d/a.mcap", "net")),
         ("bag:/net/road", ("bag", "/net/road")),
-        ("a:b/masks", None),
-        ("C:/masks", None),
-        ("masks", None),
+        ("a:b/masks", (None, None)),
+        ("C:/masks", (None, None)),
+        ("masks", (None, None)),
+        ("d/a.mcap", ("d/a.mcap", None)),
     ],
 )
 def test_a_topic_of_a_log_is_told_from_a_folder(path, expected):
