@@ -287,7 +287,7 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
         ({"path": "other.mcap:/no"}, "topic /no: is not in the log; its image topics are: /seg"),
         (
             {"path": "other.mcap:/seg", "images": "images"},
-            "is for labels with names: those of a log have none",
+            "is for labels with names: those of",
         ),
     ],
 )
