@@ -39,6 +39,7 @@ COMMANDS = {
     "fail": "compare out.rrd --fail-if post.bright.BACC>0%",
     "inspect": "inspect out.rrd --list --worst 1",
     "info": "info drive.mcap --json",
+    "labels": "replay drive.mcap --truth polygons --road-label road --record none --reports drawn",
     "worst": "worst out.rrd",
     "help": "--help",
 }
@@ -103,6 +104,17 @@ def write_drive(path: Path) -> None:
         writer.finish()
 
 
+def write_polygons(folder: Path) -> None:
+    """The road of `frame` as Cityscapes has it; its last one is damaged."""
+    folder.mkdir()
+    sky = {"label": "sky", "polygon": [[0, 0], [64, 0], [64, 16], [0, 16]]}
+    road = {"label": "road", "polygon": [[20, 16], [44, 16], [44, 48], [20, 48]]}
+    text = json.dumps({"imgWidth": 64, "imgHeight": 48, "objects": [sky, road]})
+    for number in range(FRAMES):
+        cut = text[:-9] if number == FRAMES - 1 else text
+        (folder / f"street_{number:06d}_gtFine_polygons.json").write_text(cut)
+
+
 @pytest.fixture(scope="module")
 def workshop(tmp_path_factory) -> Workshop:
     folder = tmp_path_factory.mktemp("workshop")
@@ -113,6 +125,7 @@ def workshop(tmp_path_factory) -> Workshop:
         assert place.parent.is_dir(), f"{path} has no folder to lie in"
         place.write_text(text)
     write_drive(folder / "drive.mcap")
+    write_polygons(folder / "polygons")
     process = subprocess.run(
         [sys.executable, "-P", "-c", RUN, json.dumps(COMMANDS)],
         cwd=folder,
@@ -151,6 +164,7 @@ def test_the_page_adds_one_of_each():
         "roadeval/evaluation/metrics",
         "roadeval/evaluation/regions",
         "roadeval/logs/messages/encodings",
+        "roadeval/logs/truth/formats",
         "roadeval/report/charts",
         "roadeval/jobs",
         "roadeval/cli/commands",
@@ -275,6 +289,18 @@ def test_the_encoding_is_read(recording):
     image, truth = frame(FRAMES - 1)
     assert recording.image(FRAMES - 1).shape == image.shape
     np.testing.assert_array_equal(recording.truth(FRAMES - 1), truth == 255)
+
+
+def test_the_label_format_gives_the_same_truth(workshop):
+    code, _, err = workshop.runs["labels"]
+    assert code == 3
+    assert (
+        f"lost: frame {FRAMES - 1}: polygons/street_000021_gtFine_polygons.json: cannot be" in err
+    )
+    whole = workshop.table("frames").query("variant == 'filtered'")
+    drawn = pd.read_csv(workshop.folder / "drawn" / "frames.csv").query("variant == 'filtered'")
+    there = whole[whole["frame"] < FRAMES - 1].reset_index(drop=True)
+    pd.testing.assert_frame_equal(drawn.reset_index(drop=True), there)
 
 
 def test_the_figure_is_in_the_report(report):
