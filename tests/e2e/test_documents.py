@@ -1,5 +1,6 @@
 """What README.md and the pages of the site say, done as a reader would, with small drives."""
 
+import json
 import os
 import re
 import shlex
@@ -44,15 +45,37 @@ def encoded(pixels: np.ndarray) -> bytes:
     return cv2.imencode(".png", pixels)[1].tobytes()
 
 
+def write_bare_drive(path: Path) -> None:
+    """Write a drive without labels, and its labels as COCO has them."""
+    road, car = (4, 29, 12, 12, 35, 12, 44, 29), (20, 20, 28, 20, 28, 26, 20, 26)
+    found = [
+        {"image_id": number, "category_id": kind, "segmentation": [ring]}
+        for number in range(FRAMES)
+        for kind, ring in ((1, road), (2, car))
+    ]
+    height, width = scene(0)[1].shape
+    images = [
+        {"id": number, "file_name": f"frame_{number:04}.jpg", "width": width, "height": height}
+        for number in range(FRAMES)
+    ]
+    names = [{"id": 1, "name": "road"}, {"id": 2, "name": "car"}]
+    coco = {"images": images, "annotations": found, "categories": names}
+    path.with_name("coco.json").write_text(json.dumps(coco))
+    with LogWriter(path) as log:
+        for number in range(FRAMES):
+            log.image("/front/image", stamp(number), encoded(scene(number)[0][..., ::-1]), "png")
+
+
 def write_images(folder: Path) -> None:
-    """Write the pictures of a drive, and two methods' masks of them, a file a frame."""
-    for name in ("images", "masks", "confidences"):
+    """Write the pictures of a drive, their labels, and two methods' masks, a file a frame."""
+    for name in ("images", "labels", "masks", "confidences"):
         (folder / name).mkdir()
     for number in range(FRAMES):
         image, road = scene(number)
         moved = np.roll(road, number % 5, axis=1) * np.uint8(255)
         soft = cv2.blur(moved, (9, 9))
-        for name, pixels in (("images", image[..., ::-1]), ("masks", moved), ("confidences", soft)):
+        files = {"images": image[..., ::-1], "labels": road * np.uint8(255), "masks": moved}
+        for name, pixels in (files | {"confidences": soft}).items():
             (folder / name / f"{number:04}.png").write_bytes(encoded(pixels))
 
 
@@ -70,6 +93,7 @@ def world(tmp_path_factory) -> Path:
     (folder / "tuesday").mkdir()
     shutil.copy(folder / "street.mcap", folder / "tuesday")
     write_images(folder)
+    write_bare_drive(folder / "bare.mcap")
     red_network(folder / "road.onnx")
     reports = folder / "reports" / "drive"
     roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
@@ -85,14 +109,19 @@ def copy_of_the_demo(folder: Path) -> None:
 
 
 def results_of_the_demo(folder: Path) -> None:
-    """Do what the first of README.md's two commands does, and draw the masks of its third."""
+    """Do what the first of README.md's two commands does, and make what its others read."""
     outputs = {"save": folder / "out.rrd", "reports": folder / "reports" / "demo"}
     count = roadeval.replay(DEMO, **outputs).summary["frames"]["read"]
     (folder / "masks").mkdir()
-    truths = roadeval.Recording(folder / "out.rrd")
-    for number in range(count):
-        moved = np.roll(truths.truth(number) == 1, 12, axis=1) * np.uint8(255)
-        (folder / "masks" / f"{number:04}.png").write_bytes(encoded(moved))
+    (folder / "labels").mkdir()
+    demo = roadeval.Recording(folder / "out.rrd")
+    with LogWriter(folder / "drive.mcap") as bare:
+        for number in range(count):
+            bare.image("/camera", stamp(number), encoded(demo.image(number)[..., ::-1]), "png")
+            road = demo.truth(number) == 1
+            for name, mask in (("labels", road), ("masks", np.roll(road, 12, axis=1))):
+                file = folder / name / f"{number:04}.png"
+                file.write_bytes(encoded(mask * np.uint8(255)))
 
 
 @pytest.fixture

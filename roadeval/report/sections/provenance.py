@@ -31,6 +31,8 @@ def section(findings: Findings) -> Iterator[Block]:
             yield Text("The same log, configuration and versions give the same numbers.", "note")
     for topic in facts.drive.topics:
         yield Text(topic, "note")
+    for name, labels in facts.masks.items():
+        yield Text(f"{name}: {labels['path']}, SHA-256: {labels['sha256']}", "note")
     # The digest of the input says less than the log's checksum and the settings around it.
     known = {n: value for n, value in findings.properties.items() if n != "input" and value != ""}
     if known:
