@@ -171,7 +171,7 @@ def view(drive: DriveResult, frame: int | None, picture: Path | None = None) -> 
     RoadevalError
         If there is no recording or no such frame in it, or the viewer cannot work here.
     """
-    from roadeval.recording.screen import viewer
+    from roadeval.recording import viewer
 
     recording = drive.recording
     if recording is None:

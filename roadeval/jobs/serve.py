@@ -19,7 +19,7 @@ from roadeval.jobs.replayed import CancelledReplayError, Replayer, recording_of
 from roadeval.jobs.report import PICTURED, findings_of
 from roadeval.jobs.report_frames import FramePicker, browsed
 from roadeval.jobs.result import DriveResult, Result
-from roadeval.recording.screen.viewer import WindowViewer
+from roadeval.recording.viewer import WindowViewer
 from roadeval.report.blocks import Document, Heading, LinkList, Strip
 from roadeval.report.document import page_document
 from roadeval.report.findings import Commands

@@ -9,9 +9,8 @@ from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.recording.layout import DamagedError, Layout, RecordingError, RecordRule
-    from roadeval.recording.read.recording import Recording
-    from roadeval.recording.write.encoding import EncodedFrame
-    from roadeval.recording.write.recorder import NullRecorder, Recorder, recorder_for
+    from roadeval.recording.recorder import EncodedFrame, NullRecorder, Recorder, recorder_for
+    from roadeval.recording.recording import Recording
 
 __all__ = [
     "DamagedError",

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 import roadeval
-from roadeval.recording.screen import viewer
+from roadeval.recording import viewer
 from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here, write
 

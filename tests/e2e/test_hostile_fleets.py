@@ -16,7 +16,7 @@ from pyarrow import parquet
 
 import roadeval
 from roadeval.jobs.serve import serving
-from roadeval.recording.screen import viewer
+from roadeval.recording import viewer
 from roadeval.results.facts import digest_of
 from roadeval.runtime.files import claimed
 from tests.e2e.commands import here

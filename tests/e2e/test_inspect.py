@@ -11,7 +11,7 @@ from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
 from roadeval.jobs import inspect as inspecting
 from roadeval.jobs.result import DriveResult
-from roadeval.recording.screen import viewer
+from roadeval.recording import viewer
 from tests.e2e.commands import CLASSES, here, replay, roadeval
 from tests.fixtures.make import make
 
@@ -62,7 +62,7 @@ def test_the_viewer_is_drawn_without_a_screen_at_the_worst_frame(demo, tmp_path)
 def told(monkeypatch, tmp_path, capsys):
     """Ask for a picture by a viewer that draws nothing; returns what is said of it."""
     monkeypatch.setattr(
-        "roadeval.recording.screen.viewer.screenshot", lambda recording, picture, frame: frame
+        "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
     )
 
     def told(recording, *words):
@@ -96,9 +96,7 @@ def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
     rule, sparse, tmp_path, monkeypatch
 ):
     shown = []
-    monkeypatch.setattr(
-        "roadeval.recording.screen.viewer.show", lambda path, frame: shown.append(frame)
-    )
+    monkeypatch.setattr("roadeval.recording.viewer.show", lambda path, frame: shown.append(frame))
     if rule == "worst":
         drive = make("drives/street.mcap", tmp_path)
         sparse = replay(tmp_path, drive, *CLASSES, "--record", "worst:3")
@@ -137,7 +135,7 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
     words, sparse, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setattr(
-        "roadeval.recording.screen.viewer.screenshot", lambda recording, picture, frame: frame
+        "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
     )
     bad = worst(sparse)
     words = words if len(words) == 2 else (*words, str(bad))

@@ -16,8 +16,8 @@ MEASURE = f"""
 {PEAK}
 import json, os, sys
 from roadeval import replay
-from roadeval.recording.write import recorder
-from roadeval.recording.write.rows import WaitLimits
+from roadeval.recording import recorder
+from roadeval.recording.rows import WaitLimits
 
 # Rows wait in memory for more frames the longer the recording, up to a limit at 1,024 frames and
 # more. Here that limit is reached before the first measurement.

@@ -33,7 +33,12 @@ INSTRUMENTED: Final = (
         "roadeval.recording.codecs",
         "roadeval.recording.png",
     ),
-    *("roadeval.recording.layout", "roadeval.recording.read", "roadeval.results"),
+    *(
+        "roadeval.recording.layout",
+        "roadeval.recording.recording",
+        "roadeval.recording.rrd_file",
+        "roadeval.results",
+    ),
     *("roadeval.training.model", "roadeval.config", "mcap", "mcap_ros1", "mcap_ros2"),
     *("mcap_protobuf", "zipfile", "tomllib"),
 )

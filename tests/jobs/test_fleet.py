@@ -233,7 +233,7 @@ def test_the_worst_drives_recording_alone_is_kept_whatever_was_left(lost, logs, 
 def test_a_nearly_full_disk_ends_the_run_and_the_same_command_goes_on(logs, tmp_path, monkeypatch):
     with monkeypatch.context() as nearly_full:
         nearly_full.setattr(
-            "roadeval.recording.write.recorder.shutil.disk_usage",
+            "roadeval.recording.recorder.shutil.disk_usage",
             lambda folder: SimpleNamespace(total=1 << 40, free=1 << 20),
         )
         said = r"the disk is full \(64 MiB must stay free\); what is done is kept"

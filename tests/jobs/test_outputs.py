@@ -168,7 +168,7 @@ def attempted(drive, made, monkeypatch):
     monkeypatch.setattr("roadeval.jobs.report.collect", computed)
     monkeypatch.setattr("roadeval.logs.pack", computed)
     monkeypatch.setattr("roadeval.jobs.demo.put", computed)
-    monkeypatch.setattr("roadeval.recording.screen.viewer.screenshot", computed)
+    monkeypatch.setattr("roadeval.recording.viewer.screenshot", computed)
     return lambda command, place: COMMANDS[command](drive, made, place)
 
 

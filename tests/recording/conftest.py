@@ -2,7 +2,7 @@
 
 import pytest
 
-from roadeval.recording.read import rrd_file
+from roadeval.recording import rrd_file
 from tests.recording.making import record, some_frames
 
 

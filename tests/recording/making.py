@@ -30,7 +30,7 @@ from roadeval.data import (
 )
 from roadeval.evaluation.metrics import METRICS
 from roadeval.recording import Layout, Recorder, Recording
-from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.rrd_file import RrdFile
 from roadeval.results.schema import TABLES
 from tests.results.making import facts_of, lines
 

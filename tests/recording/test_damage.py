@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from roadeval.errors import RoadevalError
-from roadeval.recording import DamagedError, Recording, RecordingError
+from roadeval.recording import DamagedError, Recording, RecordingError, rrd_file
 from roadeval.recording import layout as at
-from roadeval.recording.read import rrd_file
-from roadeval.recording.read.rrd_file import RrdFile, _places
+from roadeval.recording.rrd_file import RrdFile, _places
 
 MUTATIONS = 120
 HEADER = 16

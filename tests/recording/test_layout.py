@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.data import RESERVED
 from roadeval.recording import Layout, RecordingError, RecordRule
-from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import VARIANT, layout
 
 

@@ -16,11 +16,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
-from roadeval.recording.read.rrd_file import RrdFile
-from roadeval.recording.screen import blueprint, static
-from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
-from roadeval.recording.write.rows import CHUNK_BYTES, PendingRows
+from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError, views
+from roadeval.recording.recorder import LEAST_FREE, UNWRITTEN
+from roadeval.recording.rows import CHUNK_BYTES, PendingRows
+from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import (
     RESULTS,
     SUMMARY,
@@ -58,8 +57,7 @@ def test_an_interrupt_before_the_first_frame_leaves_nothing(place, tmp_path, mon
     def stop(*_):
         raise KeyboardInterrupt
 
-    part = blueprint if place == "arrange" else static
-    monkeypatch.setattr(part, place, stop)
+    monkeypatch.setattr(views, place, stop)
     with pytest.raises(KeyboardInterrupt), Recorder(tmp_path / "out.rrd", layout()):
         pass
     assert not list(tmp_path.iterdir())
@@ -255,7 +253,7 @@ TOO_LARGE = """
 import resource, signal, sys
 from pathlib import Path
 from roadeval.recording import RecordingError
-from roadeval.recording.write import recorder
+from roadeval.recording import recorder
 from tests.recording.making import record, some_frames
 
 recorder.PATIENCE_S = 1.0

@@ -12,8 +12,8 @@ import rerun as rr
 
 from roadeval.data import Health, Role
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
-from roadeval.recording.read.recording import Page, around
-from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.recording import Page, around
+from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import (
     HEIGHT,
     RESULTS,
@@ -222,7 +222,7 @@ def test_a_torn_file_is_told_with_the_way_to_mend_it(recording, tmp_path):
 
 @pytest.mark.parametrize("read_ahead", [8 << 20, 0])
 def test_every_frame_comes_back_in_any_order(drive, recording, read_ahead, monkeypatch):
-    monkeypatch.setattr("roadeval.recording.read.recording.READ_AHEAD", read_ahead)
+    monkeypatch.setattr("roadeval.recording.recording.READ_AHEAD", read_ahead)
     again = Recording(recording.path)
     for each in (*drive[9:], *reversed(drive)):
         np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
@@ -259,7 +259,7 @@ def pages_of(sizes):
 
 
 def test_no_more_of_an_entity_is_held_than_is_read_ahead(monkeypatch):
-    monkeypatch.setattr("roadeval.recording.read.recording.READ_AHEAD", 500)
+    monkeypatch.setattr("roadeval.recording.recording.READ_AHEAD", 500)
     pages, most = pages_of([100] * 60)
     there, payloads = around(30, pages)
     assert len(there) == 60
@@ -282,7 +282,7 @@ def test_the_frames_after_one_are_kept_first_then_the_nearest_before(
     frame, sizes, kept, monkeypatch
 ):
     one = pa.array([[0] * 10], pa.list_(pa.uint8())).nbytes
-    monkeypatch.setattr("roadeval.recording.read.recording.READ_AHEAD", 4 * one)
+    monkeypatch.setattr("roadeval.recording.recording.READ_AHEAD", 4 * one)
     assert list(around(frame, pages_of(sizes)[0])[1]) == kept
 
 

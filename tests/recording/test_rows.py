@@ -2,7 +2,7 @@
 
 import pytest
 
-from roadeval.recording.write.rows import (
+from roadeval.recording.rows import (
     CHUNK_BYTES,
     IMAGES_AND_TEXT,
     NUMBERS,

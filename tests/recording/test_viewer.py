@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from roadeval.recording import viewer
 from roadeval.recording.layout import RecordingError
-from roadeval.recording.screen import viewer
-from roadeval.recording.screen.viewer import WindowViewer
+from roadeval.recording.viewer import WindowViewer
 
 
 @pytest.fixture

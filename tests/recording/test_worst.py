@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from roadeval.recording import EncodedFrame, Recorder, Recording, RecordingError, RecordRule
-from roadeval.recording.write.worst import WorstFrames
+from roadeval.recording.recorder import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
 from tests.results.making import lines
 

@@ -6,27 +6,207 @@ import atexit
 import ctypes
 import errno
 import hashlib
+import heapq
+import math
 import os
 import shutil
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, Self
 
 import rerun as rr
 
-from roadeval.data import FrameResult, LayerKind
+from roadeval.data import (
+    BASELINE,
+    ERRORS,
+    FINAL_STAGE,
+    FrameResult,
+    Health,
+    LayerKind,
+)
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import codecs_of
+from roadeval.recording import rows as columns
+from roadeval.recording import views
+from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
-from roadeval.recording.read.rrd_file import MessageSums, indexed_chunks
-from roadeval.recording.screen import blueprint, static
-from roadeval.recording.write import rows as columns
-from roadeval.recording.write.encoding import EncodedFrame, encode_frame, worst_error
-from roadeval.recording.write.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
-from roadeval.recording.write.worst import WorstFrames
+from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
+from roadeval.recording.rrd_file import MessageSums, indexed_chunks
 from roadeval.runtime.files import NewFile
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedFrame:
+    """A frame ready to be written. Mappings are by entity path, ``tables`` by name."""
+
+    number: int
+    stamp_ns: int
+    payloads: Mapping[str, bytes]
+    """Image files."""
+    scalars: Mapping[str, float] = field(default_factory=dict)
+    counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    states: Mapping[str, str] = field(default_factory=dict)
+    """Every state, empty where there is none."""
+    notes: tuple[tuple[str, str], ...] = ()
+    """Sentences, each with its level."""
+    tables: Mapping[str, str] = field(default_factory=dict)
+    """Lines of CSV."""
+    worst_error: float = -1.0
+    """See `worst_error`."""
+
+
+def encode_frame(
+    result: FrameResult,
+    lines: Mapping[str, str],
+    layout: Layout,
+    codecs: Mapping[str, Codec],
+    kinds: Collection[LayerKind],
+) -> EncodedFrame:
+    """Encode a frame, with its lines of the tables by name.
+
+    Of its images only layers of some ``kinds`` are encoded, and without any kind no image at all.
+    """
+    level = "WARN" if set(result.health.values()) - {Health.OK} else "INFO"
+    lanes = {at.state_path(v.name): result.health.get(v.name, "") for v in layout.variants}
+    counts = {
+        at.scalar_path("counts", tally.variant, tally.stage): tally.counts
+        for tally in result.tallies
+    }
+    return EncodedFrame(
+        number=result.frame.number,
+        stamp_ns=result.frame.stamp_ns,
+        payloads=dict(_payloads(result, codecs, kinds)) if kinds else {},
+        scalars=dict(_scalars(result, layout.rates)),
+        counts={path: (c.tp, c.tn, c.fp, c.fn, c.n) for path, c in counts.items()},
+        states={at.ROLE: result.role.value, **lanes},
+        notes=tuple((note, level) for note in result.notes),
+        tables=lines,
+        worst_error=worst_error(result),
+    )
+
+
+def _payloads(
+    result: FrameResult, codecs: Mapping[str, Codec], kinds: Collection[LayerKind]
+) -> Iterator[tuple[str, bytes]]:
+    frame = result.frame
+    if frame.media_type in ("image/jpeg", "image/png"):
+        yield at.CAMERA, bytes(frame.payload)
+    else:
+        yield at.CAMERA, codecs[at.CAMERA].encode(frame.image)
+    for path, mask in ((at.TRUTH_PATH, frame.truth), (at.TRUE_SHADOW, frame.shadow_truth)):
+        if mask is not None:
+            yield path, codecs[path].encode(mask)
+    for variant in result.variants:
+        for layer in variant.layers():
+            if layer.spec.kind in kinds:
+                path = at.layer_path(variant.variant, layer.spec.name)
+                yield path, codecs[path].encode(layer.content)
+    for name, layer in result.errors.items():
+        path = at.layer_path(name, ERRORS.name)
+        yield path, codecs[path].encode(layer.array)
+
+
+def _scalars(result: FrameResult, rates: Collection[str]) -> Iterator[tuple[str, float]]:
+    for tally in result.tallies:
+        for rate, value in tally.rates.items():
+            if rate in rates and not math.isnan(value):
+                yield at.scalar_path("metrics", tally.variant, tally.stage, rate), value
+    for variant in result.variants:
+        for stage in variant.stages:
+            where = variant.variant, stage.stage
+            yield at.scalar_path("timing", *where), stage.seconds * 1e3
+            for name, value in stage.output.facts.items():
+                yield at.scalar_path("facts", *where, name), value
+
+
+def worst_error(result: FrameResult) -> float:
+    """Return the greatest ERR of any variant's final mask; -1 for a frame not evaluated."""
+    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
+    return max((t.rates["ERR"] for t in finals), default=-1.0)
+
+
+class WorstFrames:
+    """The images of the frames with the highest ERR, one file a frame, in a folder of its own.
+
+    The folder is made for the first frame, and holds at most ``most`` of them.
+    """
+
+    def __init__(self, folder: Path, most: int) -> None:
+        self._folder: Final = folder
+        self._most: Final = most
+        self._heap: list[tuple[float, int]] = []
+        """ERR and minus the number of each frame, the least first."""
+        self._sizes: Final[dict[int, tuple[EncodedFrame, dict[str, int]]]] = {}
+        """By frame number: the frame without images, texts and numbers, and its images' sizes."""
+
+    @property
+    def least(self) -> float:
+        """The least ERR that can still be among the worst; for any thread."""
+        heap = self._heap
+        return heap[0][0] if len(heap) == self._most else 0.0
+
+    def offer(self, encoded: EncodedFrame) -> None:
+        """Keep a frame's images if they are among the worst; of equals the earlier ones.
+
+        Raises
+        ------
+        RecordingError
+            If they cannot be written.
+        """
+        number = encoded.number
+        with self._explained():
+            self._folder.mkdir(exist_ok=True)
+            self._file(number).write_bytes(b"".join(encoded.payloads.values()))
+        sizes = {path: len(payload) for path, payload in encoded.payloads.items()}
+        self._sizes[number] = EncodedFrame(number, encoded.stamp_ns, {}), sizes
+        heapq.heappush(self._heap, (encoded.worst_error, -number))
+        if len(self._heap) > self._most:
+            dropped = -heapq.heappop(self._heap)[1]
+            del self._sizes[dropped]
+            with self._explained():
+                self._file(dropped).unlink()
+
+    def take(self) -> Iterator[EncodedFrame]:
+        """Yield the frames in order, with their images alone, and forget each.
+
+        After an interrupt it can be called again.
+
+        Raises
+        ------
+        RecordingError
+            If they cannot be read.
+        """
+        # Not in place: a worker thread may look at the heap.
+        self._heap = sorted(self._heap, key=itemgetter(1))
+        while self._heap:
+            encoded = self._read(-self._heap[-1][1])
+            self._heap.pop()
+            yield encoded
+
+    def _read(self, number: int) -> EncodedFrame:
+        bare, sizes = self._sizes[number]
+        with self._explained(), self._file(number).open("rb") as file:
+            return replace(bare, payloads={path: file.read(size) for path, size in sizes.items()})
+
+    def clear(self) -> None:
+        """Remove the folder, as far as that is possible."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _file(self, number: int) -> Path:
+        return self._folder / str(number)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise RecordingError(
+                f"{self._folder}: the images put aside cannot be written or read ({error}); "
+                "is the disk full?"
+            ) from error
+
 
 ALL: Final = RecordRule()
 UNWRITTEN: Final = 4 << 20
@@ -99,10 +279,10 @@ class Recorder:
         # properties of the run are left out.
         identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
         stream = rr.RecordingStream(at.APPLICATION, recording_id=identity, send_properties=False)
-        stream.save(self.partial, default_blueprint=blueprint.arrange(self._layout))
+        stream.save(self.partial, default_blueprint=views.arrange(self._layout))
         stream.send_recording_name(self._layout.drive)
         self._stream = stream
-        self._log_static(static.before_the_first_frame(self._layout, self._codecs))
+        self._log_static(views.before_the_first_frame(self._layout, self._codecs))
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         try:
@@ -151,7 +331,7 @@ class Recorder:
         """
         if not self._begun:
             self._begun = True
-            self._log_static(static.timing_lines(encoded.scalars))
+            self._log_static(views.timing_lines(encoded.scalars))
         put_aside = encoded.payloads and self._rule.kind is RuleKind.WORST
         self._add_images(replace(encoded, payloads={}) if put_aside else encoded)
         self._add_texts(encoded)
@@ -213,7 +393,7 @@ class Recorder:
         RecordingError
             If the file lacks what was written to it, as on a full disk.
         """
-        self._log_static(static.after_the_last_frame(self._layout, results))
+        self._log_static(views.after_the_last_frame(self._layout, results))
         self.flush()
         self._log_static([(at.SUMS, [rr.TextDocument(self._sums.document())])])
         self._flush_stream()

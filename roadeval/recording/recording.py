@@ -17,7 +17,7 @@ import pyarrow as pa
 from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.read.rrd_file import RrdFile, flat, whole
+from roadeval.recording.rrd_file import RrdFile, flat, whole
 from roadeval.results.facts import Facts, another_format
 from roadeval.results.tables import TableFacts, read_rows, read_table
 from roadeval.runtime.documents import check_texts, read_json
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from roadeval.recording.codecs import Codec
+
 
 _CAMERA: Final = "EncodedImage:blob"
 

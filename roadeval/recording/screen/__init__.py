@@ -1,1 +1,0 @@
-"""The viewer: its arrangement, texts and colours, and how it is opened."""
