@@ -28,7 +28,7 @@ from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
-    from roadeval.report.sections.browse import BrowsedFrames
+    from roadeval.report.sections.frames import BrowsedFrames
 
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
@@ -183,12 +183,12 @@ def write(
 def _page(compared: Compared, inspect: Inspect | None) -> bytes:
     from roadeval.jobs.page_comparison import browsed
     from roadeval.report.page.render import page
-    from roadeval.report.sections import browse
+    from roadeval.report.sections.frames import browser
 
     made = _document(compared, inspect)
 
     def rendered(frames: BrowsedFrames) -> bytes:
-        return page(replace(made, blocks=[*made.blocks, *browse.section(frames)]))
+        return page(replace(made, blocks=[*made.blocks, *browser(frames)]))
 
     compared_at = compared.comparison, compared.sides, compared.recordings
     frames = browsed(*compared_at, inspect, lambda frames: len(rendered(frames)))

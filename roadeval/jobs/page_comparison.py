@@ -22,7 +22,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.rates import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
-from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
+from roadeval.report.sections.frames import BrowsedFrames, FrameFacts, strip
 from roadeval.results.rows import as_arrays, window_rows
 
 Inspect = Callable[[Path, int], str]

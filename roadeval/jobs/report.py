@@ -12,7 +12,7 @@ from roadeval.jobs.report_findings import WORST_OF_FLEET, collect, collect_fleet
 from roadeval.jobs.report_frames import browsed, strips_of
 from roadeval.jobs.result import Result
 from roadeval.report.blocks import Document
-from roadeval.report.document import document, page_document, with_frames
+from roadeval.report.document import document, page_document
 from roadeval.report.findings import Commands, Findings, FleetFindings
 from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
@@ -116,7 +116,6 @@ def page_of(
         return page_document(findings, None)
     drive, inspect = result.drive, commands.inspect if commands else None
     frames = browsed(drive, inspect)
-    without = page_document(findings, frames)
-    taken = len(page(without)) if pictures is None else 0
+    taken = len(page(page_document(findings, frames))) if pictures is None else 0
     strips, left_out = strips_of(drive, inspect, pictures, taken)
-    return with_frames(without, replace(frames, strips=strips, left_out=left_out))
+    return page_document(findings, replace(frames, strips=strips, left_out=left_out))

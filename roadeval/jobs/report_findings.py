@@ -215,7 +215,7 @@ def collect_fleet(
     """
     return FleetFindings(
         name=fleet.name,
-        folder=str(fleet.path),
+        source=str(fleet.path),
         facts=fleet.facts,
         drives=fleet.drives,
         names=fleet.names,

@@ -28,7 +28,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
-from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
+from roadeval.report.sections.frames import SMALL, BrowsedFrames, FrameFacts, strip
 from roadeval.results.sentences import notes
 
 WORST: Final = 6

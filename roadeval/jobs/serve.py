@@ -24,7 +24,7 @@ from roadeval.report.blocks import Document, Heading, LinkList, Strip
 from roadeval.report.document import page_document
 from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page, part
-from roadeval.report.sections.browse import LARGE
+from roadeval.report.sections.frames import LARGE
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import Paths, listed, own_names
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told

@@ -35,7 +35,7 @@ from roadeval.report.blocks import markdown as written
 from roadeval.report.chart import Chart
 from roadeval.report.charts import differences
 from roadeval.report.charts.differences import MEAN, ForestRow
-from roadeval.report.sections.strata import Part, strata_table
+from roadeval.report.sections.drives import Part, strata_table
 from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
 

@@ -2,103 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final
 
 from roadeval.data.words import number
-from roadeval.report.blocks import Block, Document, FrameBrowser
+from roadeval.report.blocks import Block, Document
 from roadeval.report.findings import Findings, FleetFindings
-from roadeval.report.sections import (
-    browse,
-    drives,
-    filter_effect,
-    frames,
-    masks,
-    over_drive,
-    provenance,
-    regions,
-    stages,
-    strata,
-    summary,
-    thresholds,
-    worst,
-)
-from roadeval.report.sections.browse import BrowsedFrames
+from roadeval.report.sections import drive, drives, frames, provenance, summary
+from roadeval.report.sections.frames import BrowsedFrames
 
-SCORED: Final = (over_drive, filter_effect, regions, stages, thresholds)
+Section = Callable[[Any], Iterable[Block]]
+SCORED: Final = (
+    *(drive.over_drive, drive.filter_effect, drive.regions, drive.stages, drive.thresholds),
+)
 """The sections of a drive with truth; without it there is one on its masks."""
 
 
 def document(findings: Findings | FleetFindings) -> Document:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFindings):
-        parts = (summary.section, drives.plots, strata.section, drives.missing)
-        return _of_drives(findings, (*parts, worst.section, provenance.of_drives))
-    scored = (*SCORED, frames) if findings.totals else (masks,)
-    return _of_a_drive(findings, _blocks(findings, (summary, *scored, provenance)))
+        parts: tuple[Section, ...] = (drives.plots, drives.strata, drives.missing, drives.worst)
+        return _of(findings, *parts, provenance.of_drives)
+    scored = (*SCORED, frames.worst_frames) if findings.totals else (drive.masks,)
+    return _of(findings, *scored, provenance.section)
 
 
 def page_document(findings: Findings | FleetFindings, browsed: BrowsedFrames | None) -> Document:
     """Return the report as a page: with a browser of frames, or a table of all drives."""
     if isinstance(findings, FleetFindings):
-        parts = (summary.section, drives.table, worst.section, drives.plots, strata.section)
-        return _of_drives(findings, (*parts, drives.missing, provenance.of_drives))
-    scored = SCORED if findings.totals else (masks,)
-    frames = browse.section(browsed) if browsed else ()
-    blocks = [*_blocks(findings, (summary,)), *frames, *_blocks(findings, (*scored, provenance))]
-    return _of_a_drive(findings, blocks)
+        parts: tuple[Section, ...] = (drives.table, drives.worst, drives.plots, drives.strata)
+        return _of(findings, *parts, drives.missing, provenance.of_drives)
+    scored = SCORED if findings.totals else (drive.masks,)
+    frame_browser = frames.browser(browsed) if browsed else ()
+    return _of(findings, lambda _: frame_browser, *scored, provenance.section)
 
 
-def with_frames(page: Document, browsed: BrowsedFrames) -> Document:
-    """Return a page of one drive with another browser of frames; nothing is drawn again."""
-    own = iter(block for block in browse.section(browsed) if isinstance(block, FrameBrowser))
-    blocks = [next(own) if isinstance(each, FrameBrowser) else each for each in page.blocks]
-    return replace(page, blocks=blocks)
-
-
-def _blocks(findings: Findings, sections: Sequence[Any]) -> list[Block]:
-    return [block for each in sections for block in each.section(findings)]
-
-
-def _of_a_drive(findings: Findings, blocks: Sequence[Block]) -> Document:
+def _of(findings: Findings | FleetFindings, *sections: Section) -> Document:
+    of_fleet = isinstance(findings, FleetFindings)
     return Document(
-        kicker="roadeval report",
-        title=findings.drive,
-        subtitle=", ".join(_subtitle(findings)),
-        footer=f"{findings.drive}, {findings.source}",
-        blocks=blocks,
-        keywords=["road recognition", "evaluation", findings.drive],
-    )
-
-
-def _subtitle(findings: Findings) -> Iterator[str]:
-    facts = findings.facts
-    yield f"{facts.frames.in_log or facts.frames.evaluated} frames"
-    if facts.drive.width:
-        yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
-    if facts.drive.rate_hz:
-        yield f"{facts.drive.rate_hz:.4g} Hz"
-    if preset := facts.run.get("preset") or findings.properties.get("preset"):
-        yield f"preset {preset}"
-    if version := facts.versions.get("roadeval") or findings.properties.get("version"):
-        yield f"roadeval {version}"
-
-
-def _of_drives(findings: FleetFindings, sections: Sequence[Any]) -> Document:
-    facts = findings.facts
-    preset = facts.run.get("preset")
-    words = (
-        f"{number(len(facts.drives))} drives",
-        f"{number(facts.frames)} frames evaluated",
-        *([f"preset {preset}"] if preset else []),
-        f"roadeval {facts.version}",
-    )
-    return Document(
-        kicker="roadeval report of a fleet",
+        kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,
-        subtitle=", ".join(words),
-        footer=f"{findings.name}, {findings.folder}",
-        blocks=[block for section in sections for block in section(findings)],
-        keywords=["road recognition", "evaluation", "fleet", findings.name],
+        subtitle=", ".join(_subtitle(findings)),
+        footer=f"{findings.name}, {findings.source}",
+        blocks=[block for each in (summary.section, *sections) for block in each(findings)],
+        keywords=[
+            *("road recognition", "evaluation", *(["fleet"] if of_fleet else []), findings.name)
+        ],
     )
+
+
+def _subtitle(findings: Findings | FleetFindings) -> Iterator[str]:
+    preset = findings.facts.run.get("preset")
+    if isinstance(findings, FleetFindings):
+        version = findings.facts.version
+        yield f"{number(len(findings.facts.drives))} drives"
+        yield f"{number(findings.facts.frames)} frames evaluated"
+    else:
+        facts, own = findings.facts, findings.properties
+        preset, version = preset or own.get("preset"), facts.versions.get("roadeval", "")
+        version = version or own.get("version", "")
+        yield f"{facts.frames.in_log or facts.frames.evaluated} frames"
+        if facts.drive.width:
+            yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
+        if facts.drive.rate_hz:
+            yield f"{facts.drive.rate_hz:.4g} Hz"
+    if preset:
+        yield f"preset {preset}"
+    if version:
+        yield f"roadeval {version}"

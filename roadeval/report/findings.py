@@ -129,7 +129,7 @@ class Findings:
     """Without truth: by variant and frame the share of the image called road."""
 
     @property
-    def drive(self) -> str:
+    def name(self) -> str:
         """The drive's name."""
         return self.facts.drive.name
 
@@ -169,8 +169,8 @@ class FleetFindings:
     """Everything that a report of many drives shows."""
 
     name: str
-    folder: str
-    """Of the fleet."""
+    source: str
+    """The fleet's folder."""
     facts: FleetFacts
     drives: Mapping[str, Row]
     """Rows of ``drives`` by the drives' identity."""

@@ -382,10 +382,12 @@ def check_format(content: Any, form: Mapping[str, Any], where: object) -> None:
     if number != form["version"] or "digest" not in content:
         versions = content.get("versions", {"roadeval": content.get("version")})
         made_by = versions.get("roadeval") if isinstance(versions, dict) else None
-        raise ResultsError(f"{where}: {another_format(made_by, later=number > form['version'])}")
+        remedy = "use a new folder" if form == FLEET_FORMAT else "replay the log again"
+        told = another_format(made_by, later=number > form["version"], remedy=remedy)
+        raise ResultsError(f"{where}: {told}")
 
 
-def another_format(version: object, *, later: bool) -> str:
+def another_format(version: object, *, later: bool, remedy: str = "replay the log again") -> str:
     """Return a sentence on results of another format, with the version that wrote them if known."""
     if later:
         made = (
@@ -393,7 +395,7 @@ def another_format(version: object, *, later: bool) -> str:
         )
         return f"made by {made}: update roadeval"
     made = f"roadeval {visible(str(version))}" if version else "an earlier version of roadeval"
-    return f"made by {made}, whose format is no longer read: replay again, to another place"
+    return f"made by {made}, whose format is no longer read: {remedy}"
 
 
 def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:

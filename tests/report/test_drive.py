@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
-from roadeval.report.sections.browse import BrowsedFrames
+from roadeval.report.sections.frames import BrowsedFrames
 from roadeval.results.facts import DriveFacts, FrameAccount
 from tests.report.making import VARIANTS, a_pair, some_findings
 from tests.report.sections.test_thresholds import findings as thresholded

@@ -1,19 +1,23 @@
-"""Drive by drive: plots of the differences, tables of drives, and what is missing of them."""
+"""The sections of many drives: differences, parts by tag and light, worst frames, missing ones."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import DASH, number, percent, points
+from roadeval.data.words import DASH, interval, number, percent, points
 from roadeval.evaluation.score import BASES, TESTED
-from roadeval.report.blocks import Block, Cell, Figure, Heading, LongTable, Table, Text
+from roadeval.evaluation.stats import Difference
+from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, LongTable, Table, Text
 from roadeval.report.charts.differences import MEAN, ForestRow, caption, forest
-from roadeval.report.findings import FleetFindings, Row
-from roadeval.results.facts import OverDrives
-from roadeval.results.schema import FAILED, LIGHT, UNSCORED
+from roadeval.report.findings import FleetFindings, Row, WorstPicture
+from roadeval.results.facts import OverDrives, StratumFacts
+from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
+from roadeval.results.sentences import MARK, stands
+from roadeval.runtime.text import elided
 
 NAMED: Final = 12
 """Drives in the table of the worst, and in that of losses; reasons that are listed."""
@@ -221,3 +225,162 @@ def _losses(findings: FleetFindings, rows: list[Row]) -> Table:
         more = f" (and {len(rest)} more)" if rest else ""
         lost.append([findings.names[row["drive"]], f"{first}{more}"])
     return Table(["drive", "lost"], lost, text_columns=(0, 1), small=True)
+
+
+STRATA: Final = 30
+"""Parts of a fleet that a table has, at most."""
+_LIGHT: Final = {column.name for column in LIGHT}
+
+
+def strata(findings: FleetFindings) -> Iterator[Block]:
+    """Yield a table of parts for each difference that has a plot."""
+    tables = []
+    for effect, title in plotted(findings):
+        mask = (effect.base, effect.variant)
+        own = [each for each in findings.facts.strata if (each.base, each.variant) == mask]
+        if own:
+            tables.append((title, [Part(e.by.removeprefix(TAG), _value(e), e) for e in own]))
+    if not tables:
+        return
+    yield Heading("By tag and by light")
+    for title, rows in tables:
+        yield Heading(title, 2)
+        yield from strata_table(rows)
+    yield Text(
+        "Light is measured from the images: luminance and contrast from 0 to 1; shadow: the share "
+        "of the lower half that is dark beside its lit part; sun: above 0 where shadows are bluer "
+        "than what is lit. Each is divided into thirds of the drives.",
+        "note",
+    )
+
+
+def _value(each: StratumFacts) -> str:
+    """Return what the drives of a part share: a tag's value, or a third and its range."""
+    if each.by not in _LIGHT:
+        return each.value
+    least, most = ("?" if end is None else f"{end:.2f}" for end in (each.least, each.most))
+    return f"{each.value} ({least} to {most})"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a fleet in a table: by what it is divided, the value there, and the difference."""
+
+    by: str
+    value: str
+    difference: Difference
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether the difference stands after correction."""
+        return stands(self.difference.p_holm, self.difference.confidence)
+
+
+def strata_table(rows: Sequence[Part]) -> Iterator[Block]:
+    """Yield a table of parts, those with the most drives of each division, and what marks mean."""
+    ranked = sorted(range(len(rows)), key=lambda place: (-rows[place].difference.units, place))
+    shown = [rows[place] for place in sorted(ranked[:STRATA])]
+    first = [place == 0 or shown[place - 1].by != row.by for place, row in enumerate(shown)]
+    yield Table(
+        ["by", "value", "drives", "mean", "interval", "worse", "better"],
+        [_part_cells(row, first=begins) for row, begins in zip(shown, first, strict=True)],
+        text_columns=(0, 1),
+        breaks=[place for place, begins in enumerate(first) if begins and place],
+        small=True,
+    )
+    yield Text(_legend(rows, len(rows) - len(shown)), "note")
+
+
+def _part_cells(row: Part, *, first: bool) -> list[Cell | str]:
+    over, mark = row.difference, f" {MARK}" if row.is_marked else ""
+    return [
+        row.by if first else "",
+        row.value,
+        number(over.units),
+        Cell(points(over.mean), bold=row.is_marked),
+        interval(over.low, over.high) + mark,
+        number(over.worse or 0),
+        number(over.better or 0),
+    ]
+
+
+def _legend(rows: Sequence[Part], left_out: int) -> str:
+    counts = {row.difference.comparisons for row in rows if row.difference.comparisons}
+    legend = "Percentage points, means over drives."
+    if counts:
+        legend += (
+            f" {MARK} stands after Holm's correction for the {max(counts)} parts that were "
+            "tested together."
+        )
+    elif all(row.difference.low is None for row in rows):
+        legend += " No part has enough drives, or groups of them, for an interval."
+    if left_out:
+        legend += f" {left_out} smaller parts are left out."
+    return legend
+
+
+ACROSS = 4
+LACKING = 12
+"""Frames without a picture that are named."""
+LONGEST = 20
+"""Letters of a drive's name below a picture."""
+
+
+def worst(findings: FleetFindings) -> Iterator[Block]:
+    """Yield the worst frames."""
+    if not findings.worst:
+        return
+    yield Heading("The worst frames over all drives")
+    pictures = [
+        (_worst_caption(findings, frame), frame.picture)
+        for frame in findings.worst
+        if frame.picture is not None
+    ]
+    if pictures:
+        yield ImageGrid(pictures, ACROSS)
+    yield Text(_worst_legend(findings, len(pictures)), "note")
+    if findings.inspect is not None:
+        yield commands_table(findings, findings.inspect)
+
+
+def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Table:
+    """Tabulate the worst frames with the command that opens each in the viewer."""
+    pages = findings.pages()
+    return Table(
+        ["", "drive", "frame", "ERR, %", "in the viewer"],
+        [
+            [
+                str(frame.rank),
+                Cell(findings.names[frame.drive], leads=pages[frame.drive]),
+                Cell(
+                    str(frame.frame),
+                    leads=f"{pages[frame.drive]}#frame-{frame.frame}",
+                ),
+                Cell(percent(frame.rates["ERR"]), bold=True),
+                Cell(inspect(frame.rank), opens=f"worst/{frame.rank}"),
+            ]
+            for frame in findings.worst
+        ],
+        text_columns=(0, 1, 4),
+        small=True,
+    )
+
+
+def _worst_caption(findings: FleetFindings, frame: WorstPicture) -> str:
+    name = elided(findings.names[frame.drive], LONGEST)
+    return f"{frame.rank}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
+
+
+def _worst_legend(findings: FleetFindings, shown: int) -> str:
+    missing = len(findings.worst) - shown
+    legend = (
+        "By ERR of the first variant's final mask; of a drive at most three, a second apart. "
+        "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
+        "grey: ignored."
+    )
+    if missing:
+        lacking = [frame for frame in findings.worst if frame.picture is None]
+        named = [f"{findings.names[each.drive]} frame {each.frame}" for each in lacking[:LACKING]]
+        more = f" and {missing - LACKING} more" if missing > LACKING else ""
+        legend += f" Pictures of {missing} are not in the folder: {', '.join(named)}{more}."
+    return legend

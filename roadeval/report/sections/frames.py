@@ -1,25 +1,33 @@
-"""The frames to look at: the worst, and those that the filter helped and harmed most."""
+"""Frames to look at: in a report the worst and the most changed ones, on a page all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
-from roadeval.data.words import listing, percent, points, timestamp
+from roadeval.data import BASELINE
+from roadeval.data.words import defined, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import FILTER
 from roadeval.report.blocks import (
     Block,
     Command,
+    FrameBrowser,
+    FrameRow,
     Heading,
     ImageGrid,
     KeepTogether,
+    Picture,
+    PictureRow,
+    Strip,
     Table,
     Text,
     TwoColumns,
 )
+from roadeval.report.chart import Chart
 from roadeval.report.findings import Findings, NotableFrame
-from roadeval.report.images import jpeg
+from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.sections.common import rate_cells, variant_cell
 
 LARGE: Final = 420
@@ -35,7 +43,7 @@ NO_COMMAND: Final = (
 )
 
 
-def section(findings: Findings) -> Iterator[Block]:
+def worst_frames(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, then those that the filter changed most."""
     first = next(iter(findings.finals))
     if not findings.worst:
@@ -105,3 +113,183 @@ def sentences_about(frame: NotableFrame) -> Iterator[str]:
         of = "the shadow filter" if culprit == FILTER else culprit
         yield f"ERR of {frame.variant}: {', '.join(terms)} pp. Most of it comes from {of}."
     yield from frame.notes
+
+
+LARGE_ON_PAGE: Final = 640
+SMALL_ON_PAGE: Final = 300
+"""Pixels across the pictures of outcomes and of layers."""
+ROWS: Final = 2000
+"""Frames in the table, at most; of a longer drive those with the highest error rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFacts:
+    """A frame in the table."""
+
+    frame: int
+    stamp_ns: int
+    """Which."""
+    rates: Mapping[str, Mapping[str, float]]
+    """Of each variant's final mask, as short tables show them; none without truth."""
+    conditions: Sequence[str] = ()
+    """What is true of it, in words."""
+    notes: Sequence[str] = ()
+    """Sentences about it."""
+
+
+@dataclass(frozen=True, slots=True)
+class BrowsedFrames:
+    """What the browser is made of."""
+
+    frames: Sequence[FrameFacts]
+    """The frames of the drive, in order."""
+    variants: Sequence[str]
+    """Those that were scored."""
+    pictured: frozenset[int]
+    """Frames whose pictures can be had."""
+    strips: Sequence[Strip]
+    """Frames with their pictures."""
+    charts: Sequence[Chart]
+    """Rates along the drive."""
+    inspect: Callable[[int], str] | None
+    """Return the command that opens a frame; None where there is none."""
+    masks: Sequence[str] = ()
+    """Names of the pictures of final masks, which are compared where there is no truth."""
+    left_out: Sequence[str] = ()
+    """Variants whose layers had no room."""
+
+
+def browser(browsed: BrowsedFrames) -> Iterator[Block]:
+    """Yield the browser of frames; nothing where there is no frame to show."""
+    if not browsed.frames:
+        return
+    shown = _shown(browsed)
+    conditions = list(dict.fromkeys(each for facts in shown for each in facts.conditions))
+    order = {each: place for place, each in enumerate(conditions)}
+    yield Heading("Frames")
+    yield FrameBrowser(
+        rates=[*SHORT] if browsed.variants else [],
+        variants=browsed.variants,
+        rows=[_row(facts, browsed, order) for facts in shown],
+        conditions=conditions,
+        strips=browsed.strips,
+        charts=browsed.charts,
+        first=_first(browsed),
+        compared=_compared(browsed),
+        command=browsed.inspect(0).replace(" --frame 0", " --frame {}") if browsed.inspect else "",
+        note=_note(browsed, len(shown)),
+    )
+
+
+def _shown(browsed: BrowsedFrames) -> list[FrameFacts]:
+    """Return the frames of the table: all, or of a long drive the worst and the pictured."""
+    if len(browsed.frames) <= ROWS:
+        return [*browsed.frames]
+    wanted = {strip.frame for strip in browsed.strips}
+    ranked = sorted(browsed.frames, key=lambda facts: -_error(facts))
+    wanted |= {facts.frame for facts in ranked[:ROWS]}
+    return [facts for facts in browsed.frames if facts.frame in wanted]
+
+
+def _error(facts: FrameFacts) -> float:
+    first = next(iter(facts.rates.values()), {})
+    error = first.get("ERR", -1.0)
+    return error if defined(error) else -1.0
+
+
+def _row(facts: FrameFacts, browsed: BrowsedFrames, order: Mapping[str, int]) -> FrameRow:
+    return FrameRow(
+        facts.frame,
+        f"{(facts.stamp_ns - browsed.frames[0].stamp_ns) / 1e9:.2f}",
+        [
+            percent(facts.rates.get(variant, {}).get(rate))
+            for rate in (SHORT if browsed.variants else ())
+            for variant in browsed.variants
+        ],
+        [order[each] for each in facts.conditions],
+        " ".join(facts.notes),
+        facts.frame in browsed.pictured,
+    )
+
+
+def _first(browsed: BrowsedFrames) -> int | None:
+    there = [facts for facts in browsed.frames if facts.frame in browsed.pictured]
+    if browsed.strips:
+        held = {strip.frame for strip in browsed.strips}
+        there = [facts for facts in there if facts.frame in held]
+    return max(there, key=_error).frame if there else None
+
+
+def _compared(browsed: BrowsedFrames) -> tuple[str, str]:
+    """Return the two pictures that tell most: the errors of two variants, or else their masks."""
+    errors = [f"{name}: errors" for name in browsed.variants if name != BASELINE]
+    first, *others = errors or [*browsed.masks] or ["camera"]
+    return first, next(iter(others), "camera")
+
+
+def _note(browsed: BrowsedFrames, shown: int) -> str:
+    told = []
+    if shown < len(browsed.frames):
+        told.append(
+            f"The {number(shown)} of {number(len(browsed.frames))} frames with the highest ERR; "
+            "frames.csv has them all."
+        )
+    if browsed.variants:
+        told.append("Percent.")
+    if len(browsed.strips) < len(browsed.frames) and browsed.strips:
+        told.append(
+            f"{len(browsed.strips)} of {number(len(browsed.frames))} frames have their pictures on "
+            "this page."
+        )
+    if browsed.left_out:
+        told.append(f"To keep it small, the layers of {listing(browsed.left_out)} are left out.")
+    return " ".join(told)
+
+
+# --- Strips ---------------------------------------------------------------------------------------
+
+
+def strip(
+    frame: NotableFrame, variants: Sequence[str], command: str = "", layers: int = SMALL_ON_PAGE
+) -> Strip:
+    """Return a frame with its pictures.
+
+    Parameters
+    ----------
+    frame
+        The frame; its pictures are encoded here.
+    variants
+        All that were scored, for their colours.
+    command
+        Opens it in the viewer.
+    layers
+        Pixels across the pictures of layers, at most.
+    """
+    return Strip(
+        frame.frame,
+        [*sentences_about(frame)],
+        rates_of(frame, variants) if frame.rates else None,
+        list(_rows(frame, layers)),
+        command,
+    )
+
+
+def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
+    yield PictureRow("", [_picture(image, image.title, LARGE_ON_PAGE) for image in frame.images])
+    for row in frame.layers:
+        variant = row[0].title.partition(":")[0] if row else ""
+        names = [
+            image.title if p == 0 else f"{variant}: {image.title}" for p, image in enumerate(row)
+        ]
+        # Without truth the last mask is what is looked at.
+        last = row[-1] if row and not frame.rates else None
+        pictures = [
+            _picture(image, name, LARGE_ON_PAGE if image is last else layers)
+            for name, image in zip(names, row, strict=True)
+        ]
+        yield PictureRow(variant, pictures)
+
+
+def _picture(image: LayerImage, name: str, width: int) -> Picture:
+    title = image.spec.title if image.spec else image.title
+    return Picture(name, title, jpeg(image, width))

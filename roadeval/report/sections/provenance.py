@@ -56,7 +56,7 @@ def of_drives(findings: FleetFindings) -> Iterator[Block]:
         dealt = ", ".join(f"fold {fold}: {number(n)}" for fold, n in sorted(folds.items()))
         yield Text(f"Drives by the fold whose model scored them, which never saw them: {dealt}.")
     yield Text(
-        f"run.toml in {findings.folder} has the whole configuration, drives.parquet each log's "
+        f"run.toml in {findings.source} has the whole configuration, drives.parquet each log's "
         "SHA-256. The same logs, configuration and version give the same numbers.",
         "note",
     )

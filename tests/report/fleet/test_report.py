@@ -10,7 +10,7 @@ from roadeval.jobs.report_findings import collect_fleet
 from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf
-from roadeval.report.sections import drives, provenance, strata, summary, worst
+from roadeval.report.sections import drives, provenance, summary
 from roadeval.results.fleet import FleetFolder
 from tests.report.making import column, links_within, plain_rows, reader, text, the
 from tests.results.fleet import making
@@ -76,18 +76,18 @@ def test_two_plots_and_the_worst_drives(findings):
 
 
 def test_parts_by_tag_and_by_light(findings):
-    filters, blind = tables(strata.section, findings)
+    filters, blind = tables(drives.strata, findings)
     assert [row[0] for row in plain_rows(filters) if row[0]] == [
         *("place", "weather", "luminance", "contrast", "shadow", "sun")
     ]
     assert len(filters.rows) == len(blind.rows) == 17
-    notes = [b.text for b in blocks(strata.section, findings) if isinstance(b, Text)]
+    notes = [b.text for b in blocks(drives.strata, findings) if isinstance(b, Text)]
     assert "No part has enough drives" in notes[0]
 
 
 def test_a_part_that_stands_is_marked_with_the_number_of_comparisons(tmp_path):
     fleet = fleet_of(tmp_path / "f", 60, frames=0, broken=False, grouped=False)
-    told = blocks(strata.section, collect_fleet(FleetFolder(fleet)))
+    told = blocks(drives.strata, collect_fleet(FleetFolder(fleet)))
     _, blind = (block for block in told if isinstance(block, Table))
     assert all(cell.endswith(" *") for cell in column(blind, "interval"))
     assert "for the 17 parts" in next(b.text for b in told if isinstance(b, Text))
@@ -115,14 +115,14 @@ def test_reasons_of_many_drives_are_counted(tmp_path):
 
 
 def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, findings, tmp_path):
-    grid = the(ImageGrid, [b for b in blocks(worst.section, findings) if isinstance(b, ImageGrid)])
+    grid = the(ImageGrid, [b for b in blocks(drives.worst, findings) if isinstance(b, ImageGrid)])
     assert len(grid.pictures) == 12
     first = findings.worst[0]
     assert grid.pictures[0][0].startswith(f"1. {findings.names[first.drive]}, frame {first.frame}")
     copy = shutil.copytree(folder, tmp_path / "copy")
     picture = copy / "pictures" / first.drive / f"{first.frame}.jpg"
     picture.write_bytes(picture.read_bytes()[:50])
-    told = blocks(worst.section, collect_fleet(FleetFolder(copy)))
+    told = blocks(drives.worst, collect_fleet(FleetFolder(copy)))
     assert len(told[1].pictures) == 11
     name = f"{findings.names[first.drive]} frame {first.frame}"
     assert f"Pictures of 1 are not in the folder: {name}." in told[-1].text

@@ -6,7 +6,7 @@ import numpy as np
 from roadeval.data import ERRORS
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections.browse import strip
+from roadeval.report.sections.frames import strip
 from tests.report.making import plain_rows, rates
 
 IMAGE, MASK = np.zeros((4, 6, 3), np.uint8), np.zeros((4, 6), np.uint8)

@@ -7,12 +7,12 @@ import pytest
 
 from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Heading, Table, Text
-from roadeval.report.sections.filter_effect import frames_changed, pixels_changed, section
+from roadeval.report.sections.drive import filter_effect, frames_changed, pixels_changed
 from tests.report.making import a_difference, a_pair, plain_rows, some_findings
 
 
 def texts(findings):
-    return [block.text for block in section(findings) if isinstance(block, Text)]
+    return [block.text for block in filter_effect(findings) if isinstance(block, Text)]
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_frames_are_lowered_raised_or_left_as_they_are():
 def test_the_table_has_both_rates_their_difference_and_how_sure_it_is():
     table, *_ = (
         block
-        for block in section(some_findings(paired=[a_pair([-0.1], [-1])]))
+        for block in filter_effect(some_findings(paired=[a_pair([-0.1], [-1])]))
         if isinstance(block, Table)
     )
     assert table.columns[1:3] == ["filtered", "unfiltered"]
@@ -65,7 +65,7 @@ def test_where_err_is_undefined_nothing_is_said_about_frames():
 
 def test_against_the_baseline_better_is_a_lower_error():
     pair = a_pair([-0.1, -0.2, 0.3], [0, 0, 0], control="blind")
-    table, *_ = (b for b in section(some_findings(paired=[pair])) if isinstance(b, Table))
+    table, *_ = (b for b in filter_effect(some_findings(paired=[pair])) if isinstance(b, Table))
     assert table.columns[-2:] == ["frames better", "frames worse"]
     assert plain_rows(table)[0][-2:] == ["2", "1"]
 
@@ -73,7 +73,7 @@ def test_against_the_baseline_better_is_a_lower_error():
 def test_flicker_stands_beside_the_truths_own():
     each = {"boundary_F": 0.5, "width": 5, "flicker": 0.05, "truth_flicker": 0.02, "pairs": 1199}
     unknown = each | {"flicker": None, "truth_flicker": None}
-    blocks = list(section(some_findings(beyond={"filtered": each, "unfiltered": unknown})))
+    blocks = list(filter_effect(some_findings(beyond={"filtered": each, "unfiltered": unknown})))
     (table,) = (block for block in blocks if isinstance(block, Table))
     assert plain_rows(table) == [["filtered", "5.00", "2.00", "+3.00", "1,199"]]
     assert "From one frame to the next" in [b.text for b in blocks if isinstance(b, Heading)]
@@ -82,7 +82,7 @@ def test_flicker_stands_beside_the_truths_own():
 def test_an_unknown_number_of_effective_frames_is_a_dash():
     pair = a_pair([-0.1], [-1])
     pair.differences["ERR"] = replace(pair.differences["ERR"], effective=None)
-    table, *_ = (b for b in section(some_findings(paired=[pair])) if isinstance(b, Table))
+    table, *_ = (b for b in filter_effect(some_findings(paired=[pair])) if isinstance(b, Table))
     assert plain_rows(table)[0][-1] == DASH
 
 

@@ -7,7 +7,7 @@ from roadeval.data.words import MINUS
 from roadeval.report.blocks import Command, ImageGrid, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections.frames import NO_COMMAND, section
+from roadeval.report.sections.frames import NO_COMMAND, worst_frames
 from tests.report.making import column, plain_rows, rates, some_findings, the
 
 
@@ -21,7 +21,7 @@ def a_frame(number, **changes):
 
 
 def shown(findings):
-    return [block.blocks for block in section(findings) if isinstance(block, KeepTogether)]
+    return [block.blocks for block in worst_frames(findings) if isinstance(block, KeepTogether)]
 
 
 def said(blocks):
@@ -87,6 +87,6 @@ def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is
 
 
 def test_where_no_frame_is_the_worst_that_is_told():
-    assert the(Text, section(some_findings())).text == (
+    assert the(Text, worst_frames(some_findings())).text == (
         "ERR of filtered is undefined on every frame, so no frame is the worst."
     )

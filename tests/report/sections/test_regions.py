@@ -1,7 +1,7 @@
 """Where the errors are: every region that was counted, with its own numbers."""
 
 from roadeval.report.blocks import Figure, Table, Text
-from roadeval.report.sections.regions import section
+from roadeval.report.sections.drive import regions
 from tests.report.making import VARIANTS, plain_rows, some_findings
 
 
@@ -19,7 +19,7 @@ def table_of(*regions, variants=VARIANTS):
 
 
 def tables(findings):
-    return [block for block in section(findings) if isinstance(block, Table)]
+    return [block for block in regions(findings) if isinstance(block, Table)]
 
 
 def test_each_column_has_its_own_numbers():
@@ -39,13 +39,13 @@ def test_a_region_that_no_one_knows_is_shown_by_its_name():
     findings = some_findings(regions=table_of("boundary", "interior", "wet_asphalt"))
     (table,) = tables(findings)
     assert [row[0] for row in table.rows][-1] == "wet asphalt"
-    (figure,) = (block for block in section(findings) if isinstance(block, Figure))
+    (figure,) = (block for block in regions(findings) if isinstance(block, Figure))
     assert figure.charts[0].names[-1] == "wet asphalt"
 
 
 def test_row_bands_are_named_by_their_rows_below_a_rule():
     regions = ("shadow", "boundary", "interior", "band_0", "band_1", "band_2")
-    (table,) = tables(some_findings(regions=table_of(*regions)))
+    (table,) = tables(some_findings(regions=table_of(*names)))
     assert [row[0] for row in table.rows][3:] == [
         "image rows 0–6, the top",  # noqa: RUF001
         "image rows 7–13",  # noqa: RUF001
@@ -68,12 +68,12 @@ def test_many_variants_have_a_table_a_number():
 def test_the_width_of_the_edge_is_told_where_it_is_known():
     run = {"evaluation": {"boundary_width": 7}}
     findings = some_findings(regions=table_of("boundary", "interior"), run=run)
-    (note,) = (block.text for block in section(findings) if isinstance(block, Text))
+    (note,) = (block.text for block in regions(findings) if isinstance(block, Text))
     assert "within 7 pixels of the border" in note
 
 
 def test_shadow_is_explained_where_it_is_a_region():
-    for regions, told in ((("shadow", "boundary"), True), (("boundary", "interior"), False)):
-        blocks = section(some_findings(regions=table_of(*regions)))
+    for names, told in ((("shadow", "boundary"), True), (("boundary", "interior"), False)):
+        blocks = regions(some_findings(regions=table_of(*names)))
         (note,) = (block.text for block in blocks if isinstance(block, Text))
         assert ("took for shadow" in note) == told
