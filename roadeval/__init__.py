@@ -22,15 +22,12 @@ from roadeval.runtime.imports import on_demand
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
-    from roadeval.config import RunConfig, configure, load_config
+    from roadeval.config import RunConfig, config_toml, configure, load_config
     from roadeval.errors import RoadevalError
     from roadeval.jobs.compare import compare
-    from roadeval.jobs.config import config_toml
-    from roadeval.jobs.demo import demo
     from roadeval.jobs.fleet import FleetOutcome, FleetProgress, replay_fleet
     from roadeval.jobs.frame import run_frame
-    from roadeval.jobs.info import info
-    from roadeval.jobs.pack import pack
+    from roadeval.jobs.log_files import demo, info, pack
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.replay import Outcome, replay
     from roadeval.jobs.report import write_report

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.config.document import documented, run_toml
+    from roadeval.config.document import config_toml, run_toml
     from roadeval.config.run import (
         OF_A_LOG,
         DriveSettings,
@@ -38,8 +38,8 @@ __all__ = [
     "RunConfig",
     "Variant",
     "check_variant_name",
+    "config_toml",
     "configure",
-    "documented",
     "in_file",
     "load_config",
     "log_config",

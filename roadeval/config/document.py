@@ -34,7 +34,7 @@ def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay
         f"# The configuration of a {command} of {visible(drive)} by roadeval {version}.\n"
         f"# To repeat the run, give this file to roadeval {command} as its configuration."
     )
-    lines = [each for each in documented(config).splitlines() if each and each[0] != "#"]
+    lines = [each for each in config_toml(config).splitlines() if each and each[0] != "#"]
     text = "\n".join(f"\n{each}" if each[0] == "[" else each for each in lines)
     return visible_lines(f"{head}\n{text}\n")
 
@@ -46,12 +46,27 @@ def _without_none(value: Any) -> Any:
     return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def documented(config: RunConfig) -> str:
-    """Write a configuration as TOML that can be edited, each setting with its meaning and range.
+def config_toml(config: RunConfig | None = None) -> str:
+    """Return a configuration as TOML: every setting with its meaning, range and value.
 
     A setting without a value is a comment.
+
+    Parameters
+    ----------
+    config
+        The configuration; the defaults of ``roadeval replay`` otherwise. The text can be edited
+        and given to `roadeval.load_config`.
+
+    Examples
+    --------
+    >>> import roadeval
+    >>> text = roadeval.config_toml(roadeval.configure({"preset": "gated"}))
+    >>> text.startswith('preset = "gated"')
+    True
     """
     import tomlkit
+
+    config = config or RunConfig()
 
     head = [f"preset = {tomlkit.item(config.preset).as_string()}", *_chain(config.pipeline)]
     if config.only:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.fleet.entry import DriveEntry
+    from roadeval.fleet.entry import DriveEntry, FleetError, shown
     from roadeval.fleet.remote import staged, stamp
     from roadeval.fleet.sources import find_drives
-    from roadeval.fleet.urls import FleetError, shown
 
 __all__ = ["DriveEntry", "FleetError", "find_drives", "shown", "staged", "stamp"]
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final
 
-from roadeval.fleet.urls import FleetError
+from roadeval.fleet.entry import FleetError
 
 ATTEMPTS: Final = 2
 """Attempts at a drive whose worker dies; on a cluster the scheduler's settings decide."""

@@ -9,8 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet.entry import DriveEntry
-from roadeval.fleet.urls import FleetError
+from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.logs import files_of, identity_of
 
 

@@ -27,12 +27,15 @@ from threading import Thread
 from typing import Any, Final, TypeVar
 from urllib.parse import unquote, urlsplit, urlunsplit
 
-from roadeval.fleet.entry import HEAD, in_order, is_heading, is_log
-from roadeval.fleet.urls import (
+from roadeval.fleet.entry import (
     BUCKETS,
+    HEAD,
     FleetError,
     bucket_and_key,
     file_of,
+    in_order,
+    is_heading,
+    is_log,
     is_url,
     last_part,
     scheme_of,

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
+from roadeval.data import BASELINE, ERRORS, Rows
+from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import comparison
+from roadeval.evaluation import comparison, score
 from roadeval.evaluation.comparison import (
     Comparison,
     Condition,
@@ -19,16 +23,26 @@ from roadeval.evaluation.comparison import (
     judge,
     one_drive,
 )
-from roadeval.jobs.result import Result
+from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.settings import NOTEWORTHY
+from roadeval.jobs.report_frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
+from roadeval.jobs.result import DriveResult, Result
+from roadeval.report.blocks import Strip
+from roadeval.report.chart import Chart, Look, looks, looks_of_results
+from roadeval.report.charts.rates import over_frames, over_windows
+from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.report.sections.frames import BrowsedFrames, FrameFacts, browser, strip
 from roadeval.results.comparison import as_dict, judged, warnings
 from roadeval.results.facts import json_text, plain
+from roadeval.results.rows import as_arrays, window_rows
 from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
-    from roadeval.report.sections.frames import BrowsedFrames
+
 
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
@@ -42,7 +56,7 @@ class Compared:
     judgements: tuple[Judgement, ...]
     sides: tuple[Side, ...]
     """The results with the one drive that is compared; none where several are."""
-    recordings: Mapping[str, Path]
+    recordings: Mapping[str, DriveResult]
     """By the results' labels; a folder has none."""
 
     @property
@@ -104,7 +118,9 @@ def compare(
     )
     found = replace(found, notes=(*(Note(Kind.END_MISSING, name) for name in cut), *found.notes))
     alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
-    recordings = {side.label: each.recording for side, each in labelled if each.recording}
+    recordings = {
+        side.label: each.drive for side, each in labelled if each.drive and each.drive.recording
+    }
     return Compared(found, judge(found, conditions, settings), tuple(alone or ()), recordings)
 
 
@@ -181,32 +197,28 @@ def write(
 
 
 def _page(compared: Compared, inspect: Inspect | None) -> bytes:
-    from roadeval.jobs.page_comparison import browsed
     from roadeval.report.page.render import page
-    from roadeval.report.sections.frames import browser
 
     made = _document(compared, inspect)
 
     def rendered(frames: BrowsedFrames) -> bytes:
         return page(replace(made, blocks=[*made.blocks, *browser(frames)]))
 
-    compared_at = compared.comparison, compared.sides, compared.recordings
-    frames = browsed(*compared_at, inspect, lambda frames: len(rendered(frames)))
+    frames = browsed(compared, inspect, lambda frames: len(rendered(frames)))
     return page(made) if frames is None else rendered(frames)
 
 
 def _document(compared: Compared, inspect: Inspect | None) -> Document:
-    from roadeval.jobs.page_comparison import over_drive
     from roadeval.report.comparison import document
 
     def command(result: str, frame: int) -> str:
-        path = compared.recordings.get(result)
-        return inspect(path, frame) if inspect and path else ""
+        drive = compared.recordings.get(result)
+        return inspect(drive.path, frame) if inspect and drive else ""
 
     return document(
         compared.comparison,
         compared.judgements,
-        over_drive(compared.comparison, compared.sides),
+        over_drive(compared),
         command if inspect and compared.recordings else None,
     )
 
@@ -214,3 +226,147 @@ def _document(compared: Compared, inspect: Inspect | None) -> Document:
 def as_json(compared: Compared) -> str:
     """Write a comparison as JSON; undefined numbers become null."""
     return json_text(plain(compared.content))
+
+
+# --- One drive ------------------------------------------------------------------------------------
+
+ROWS: Final = 60
+"""Points of the figure over the drive, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedMask:
+    """A final mask that is compared."""
+
+    name: str
+    """What the page calls it."""
+    result: str
+    variant: str
+    own: str
+    """What the result itself calls the variant."""
+
+
+def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], Rows] | None:
+    """Return the final masks that all results have, and their rows in the order of the frames.
+
+    Each mask's rows have its name as variant; of a variant they are those of the frames on which
+    all results have its mask. Where the variants of one result are compared, each is a result.
+    None where there is none.
+    """
+    finals = {side.label: score.finals(side.rows(side.parts[0], "frames")) for side in sides}
+    alone = all(rows.distinct("variant") == [label] for label, rows in finals.items())
+    masks, parts = [], []
+    for variant in dict.fromkeys(v for rows in finals.values() for v in rows.distinct("variant")):
+        own = [side for side in sides if variant in finals[side.label].distinct("variant")]
+        if not alone and (variant == BASELINE or len(own) < len(sides)):
+            continue
+        found = [finals[side.label].of_variant(variant) for side in own]
+        common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
+        for side, rows in zip(own, found, strict=True) if common else ():
+            name = side.label if alone else f"{side.label}: {variant}"
+            kept = rows.take(np.isin(rows["frame"], common))
+            masks.append(ComparedMask(name, side.label, variant, side.own_name(variant)))
+            columns = (np.full(len(kept), text) for text in (name, "final"))
+            parts.append(kept.replace(**dict(zip(("variant", "stage"), columns, strict=True))))
+    if not parts:
+        return None
+    rows = joined(parts)
+    return masks, rows.take(np.argsort(rows["frame"], kind="stable"))
+
+
+def _looks_of(masks: Sequence[ComparedMask]) -> dict[str, Look]:
+    """Return how masks are drawn: a hue a variant, a dash a result."""
+    return looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
+
+
+def over_drive(compared: Compared) -> list[Chart]:
+    """Return ERR over the one drive that is compared, and the baseline's; none of several."""
+    if (found := compared_masks(compared.sides)) is None:
+        return []
+    masks, rows = found
+    base = compared.sides[0]
+    blind = score.finals(base.rows(base.parts[0], "frames").of_variant(BASELINE))
+    rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
+    size = compared.comparison.settings.window
+    size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
+    windows = as_arrays("windows", window_rows(score.windows(rows, size)))
+    return over_windows(windows, [TESTED], _looks_of(masks) | looks([BASELINE]))
+
+
+def browsed(
+    compared: Compared, inspect: Inspect | None, taken: Callable[[BrowsedFrames], int]
+) -> BrowsedFrames | None:
+    """Collect the frames that all results have of a variant, all their masks side by side.
+
+    None where no variant is in all of them, or several drives are compared.
+
+    Parameters
+    ----------
+    compared
+        The comparison.
+    inspect
+        Returns the command that opens a frame.
+    taken
+        Returns the bytes of a page with these frames and none of their pictures: of those as many
+        are there as keep it below `roadeval.jobs.report_frames.BYTES`.
+    """
+    if (found := compared_masks(compared.sides)) is None:
+        return None
+    masks, rows = found
+    facts = {each.frame: each for each in _facts(rows, masks)}
+    opened = compared.recordings
+    newest = opened.get(masks[-1].result)
+    command = (lambda frame: inspect(newest.path, frame)) if inspect and newest else None
+    without = BrowsedFrames(
+        frames=[*facts.values()],
+        variants=[mask.name for mask in masks],
+        pictured=frozenset(),
+        strips=[],
+        charts=over_frames(rows, [*SHORT], _looks_of(masks)),
+        inspect=command,
+    )
+    masks = [mask for mask in masks if mask.result in opened]
+    numbers = [each.frame for each in compared.comparison.moved]
+    numbers += [each.frame for each in compared.comparison.disagreements]
+    pictured = [
+        facts[frame]
+        for frame in dict.fromkeys(numbers)
+        if opened and frame in facts and all(frame in each.pictured for each in opened.values())
+    ]
+    made = (_strip(each, masks, opened, command) for each in pictured[:PICTURED])
+    strips = sorted(fitting(made, BYTES - taken(without)), key=lambda each: each.frame)
+    return replace(without, strips=strips, pictured=frozenset(each.frame for each in strips))
+
+
+def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameFacts]:
+    """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
+    base, new = masks[0].name, masks[1].name
+    for frame, stamp, rates in rates_by_frame(rows, [*SHORT]):
+        conditions = []
+        if base in rates and new in rates:
+            change = rates[new]["ERR"] - rates[base]["ERR"]
+            if abs(change) >= NOTEWORTHY:
+                conditions = [f"{new} {'worse' if change > 0 else 'better'}"]
+        yield FrameFacts(frame, stamp, rates, conditions)
+
+
+def _strip(
+    facts: FrameFacts,
+    masks: Sequence[ComparedMask],
+    opened: Mapping[str, DriveResult],
+    command: Callable[[int], str] | None,
+) -> Strip:
+    """Return a frame with its pictures."""
+    *_, last = (mask.name for mask in masks if mask.name in facts.rates)
+    first, frame = opened[masks[0].result].recording, facts.frame
+    assert first is not None
+    errors = (
+        (
+            m.name,
+            opened[m.result].layer(m.own, ERRORS.name, frame) if m.name in facts.rates else None,
+        )
+        for m in masks
+    )
+    images = [*outcomes(first, frame, errors)]
+    found = NotableFrame(frame, facts.stamp_ns, last, facts.rates, images=images)
+    return strip(found, [*facts.rates], command(facts.frame) if command else "")

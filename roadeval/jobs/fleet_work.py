@@ -19,9 +19,8 @@ from roadeval import logs
 from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
 from roadeval.data import Frame
 from roadeval.errors import RoadevalError
-from roadeval.fleet.entry import DriveEntry, in_order
+from roadeval.fleet.entry import DriveEntry, FleetError, in_order
 from roadeval.fleet.remote import staged, stamp
-from roadeval.fleet.urls import FleetError
 from roadeval.jobs.fleet_frames import FrameGatherer
 from roadeval.jobs.identity import asked, content_of, software
 from roadeval.jobs.replay import replay

@@ -11,8 +11,8 @@ from typing import Final
 
 from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
+from roadeval.fleet.entry import is_url, shown
 from roadeval.fleet.remote import staged
-from roadeval.fleet.urls import is_url, shown
 from roadeval.jobs.fleet_work import model_path
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.replay import replay

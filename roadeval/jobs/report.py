@@ -1,26 +1,46 @@
-"""The report of a result, as a PDF or as a page."""
+"""The report of a result, as a PDF or as a page, and what it shows."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
 from roadeval.errors import RoadevalError
+from roadeval.evaluation import score
+from roadeval.evaluation.score import TESTED
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.report_findings import WORST_OF_FLEET, collect, collect_fleet
-from roadeval.jobs.report_frames import browsed, strips_of
-from roadeval.jobs.result import Result
-from roadeval.report.blocks import Document
+from roadeval.jobs.report_frames import FramePicker, browsed, evenly, strips_of
+from roadeval.jobs.result import DriveResult, Result
+from roadeval.report.blocks import Document, ImageFile
 from roadeval.report.document import document, page_document
-from roadeval.report.findings import Commands, Findings, FleetFindings
+from roadeval.report.findings import (
+    Commands,
+    ErrorHeatmap,
+    Findings,
+    FleetFindings,
+    PairedComparison,
+    Row,
+    WorstPicture,
+)
 from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.results.facts import Facts
+from roadeval.results.fleet import FleetFolder
+from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
+from roadeval.results.schema import ALL
 from roadeval.runtime.files import leads_outside
 
 PAGES: Final = (".html", ".htm")
 """Endings of files that are written as a page."""
-PICTURED: Final = 60
+WORST_OF_FLEET: Final = 12
+"""Worst frames that are shown."""
+PICTURED_OF_FLEET: Final = 60
 """Worst frames of a fleet that a page shows."""
 
 
@@ -111,7 +131,7 @@ def page_of(
 
     Of a drive by default as many as `roadeval.jobs.report_frames.strips_of` says.
     """
-    findings = findings_of(result, commands, pictures or PICTURED)
+    findings = findings_of(result, commands, pictures or PICTURED_OF_FLEET)
     if result.drive is None:
         return page_document(findings, None)
     drive, inspect = result.drive, commands.inspect if commands else None
@@ -119,3 +139,243 @@ def page_of(
     taken = len(page(page_document(findings, frames))) if pictures is None else 0
     strips, left_out = strips_of(drive, inspect, pictures, taken)
     return page_document(findings, replace(frames, strips=strips, left_out=left_out))
+
+
+SAMPLED: Final = 100
+"""Frames whose masks are read for the maps, at most; tables know every frame."""
+WINDOWS: Final = 30
+"""Rows of the table over the drive, at most."""
+EXAMPLES: Final = 4
+THUMBNAILS: Final = 8
+"""Frames in figure 2 and on the first page."""
+
+
+def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
+    """Collect everything that the report of a result shows."""
+    rows, facts = result.rows, result.facts
+    pictured = _pictured(result)
+    changes, heat, sampled = _mask_sums(result, pictured)
+    windows, window_size = _windows(result)
+    paired = list(_paired(result, changes))
+    picker = FramePicker(result)
+    return Findings(
+        source=str(result.path),
+        complete=result.complete,
+        commands=commands,
+        viewable=commands is not None and result.viewable is not None,
+        pictured=len(pictured),
+        facts=facts,
+        properties=result.properties,
+        windows=windows,
+        window_size=window_size,
+        paired=paired,
+        regions=score.by_region(result.table("regions")) if len(rows) else {},
+        overlap={
+            variant: {stage: score.overlap(total) for stage, total in stages.items()}
+            for variant, stages in facts.totals.items()
+        },
+        changes=_stage_changes(changes),
+        error_parts=picker.error_parts(),
+        heatmaps=[_heatmap(name, heat.of_variant(name)) for name in heat.distinct("variant")],
+        oracles=[*score.perfect_stages(result.table("oracles"), rows)],
+        levels=result.table("probabilities"),
+        sampled=sampled,
+        examples=picker.examples(_examples(facts, result.pictured, pictured)),
+        thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
+        worst=picker.worst(),
+        helped=picker.moved(paired, harmed=False),
+        harmed=picker.moved(paired, harmed=True),
+        coverage=_coverage(result, pictured),
+    )
+
+
+def _examples(facts: Facts, there: Collection[int], pictured: Sequence[int]) -> Sequence[int]:
+    """Return the frames of the figure that the run drew, or where they have no pictures others."""
+    drawn = facts.examples
+    return drawn if drawn and set(drawn) <= set(there) else evenly(pictured, EXAMPLES)
+
+
+def _pictured(result: DriveResult) -> list[int]:
+    """Return the evaluated frames that have pictures, or without truth all that have."""
+    evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
+    return [number for number in result.pictured if number in evaluated]
+
+
+# --- Tables ---------------------------------------------------------------------------------------
+
+
+def _windows(result: DriveResult) -> tuple[Rows, int]:
+    """Return the drive's windows and their size; longer ones where the drive is long."""
+    size, windows = result.facts.evaluation.window, result.table("windows")
+    count = -(-len(result.rows.distinct("frame")) // size)
+    if not count or (count <= WINDOWS and len(windows)):
+        return windows, size
+    size *= -(-count // WINDOWS)
+    return as_arrays("windows", window_rows(score.windows(result.rows, size))), size
+
+
+def _paired(result: DriveResult, changes: Rows) -> Iterator[PairedComparison]:
+    """Compare filtered against unfiltered, then every variant with the baseline."""
+    for each in result.facts.effects:
+        if each.final and each.base in (BASELINE, UNFILTERED if each.variant == FILTERED else ""):
+            between = (changes["from_variant"] == each.base) & (changes["N"] > 0)
+            own = changes.take(between & (changes["to_variant"] == each.variant))
+            columns = (own[name].tolist() for name in ("repaired", "spoiled", "N"))
+            pixels = next(zip(*columns, strict=True), None)
+            paired = score.pairs(result.rows, each.variant, each.base)
+            yield PairedComparison(each.variant, each.base, each.rates, paired, pixels)
+
+
+def _stage_changes(changes: Rows) -> dict[tuple[str, str], tuple[float, float]]:
+    """Return what stages changed, as shares of labelled pixels."""
+    known = (changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)
+    own = changes.take(known)
+    masks = zip(own["to_variant"].tolist(), own["to_stage"].tolist(), strict=True)
+    shares = ((own[name] / own["N"]).tolist() for name in ("repaired", "spoiled"))
+    return dict(zip(masks, zip(*shares, strict=True), strict=True))
+
+
+# --- Masks ----------------------------------------------------------------------------------------
+
+
+def _mask_sums(result: DriveResult, numbers: Sequence[int]) -> tuple[Rows, Rows, int]:
+    """Return the tables ``changes`` and ``heat``, and the number of frames that they sum up.
+
+    A run that was killed did not get to write them: they are made of the masks of evenly spread
+    frames then.
+    """
+    changes, heat = result.table("changes"), result.table("heat")
+    if len(changes) or len(heat):
+        return changes, heat, len(result.rows.distinct("frame"))
+    sample = _sample(result, numbers)
+    changes = as_arrays("changes", change_rows(sample.changes))
+    return changes, as_arrays("heat", heat_rows(sample.heat)), sample.frames
+
+
+def _sample(result: DriveResult, numbers: Sequence[int]) -> score.Maps:
+    """Sum up the masks of evenly spread frames."""
+    sums, recording = score.Maps(), result.recording
+    if recording is None or not len(result.rows):
+        return sums
+    for number in evenly(numbers, SAMPLED):
+        truth = recording.truth(number)
+        masks = {
+            (variant.name, stage): mask
+            for variant in recording.variants
+            for stage in variant.stages
+            if (mask := result.layer(variant.name, stage, number)) is not None
+        }
+        finals = {variant: mask for (variant, _), mask in masks.items()}
+        errors = {name: score.error_map(mask, truth) for name, mask in finals.items()}
+        packed = TruthBits.of(truth)
+        stacked = packed.bits_of(map(Packed.of, masks.values()))
+        sums.add(errors, score.changes(list(masks), stacked, packed))
+    return sums
+
+
+def _heatmap(variant: str, cells: Rows) -> ErrorHeatmap:
+    """Spread the cells of a variant's heat map; NaN where none was labelled."""
+    rows, columns = (cells[edge] // cells["side"][0] for edge in ("top", "left"))
+    shares = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
+    for share, outcome in zip(shares, ("FP", "FN"), strict=True):
+        share[rows, columns] = cells[outcome] / cells["labelled"]
+    return ErrorHeatmap(variant, shares[0], shares[1])
+
+
+def _coverage(result: DriveResult, numbers: Sequence[int]) -> dict[str, dict[int, float]]:
+    """Return without truth how much of the image each final mask covers."""
+    if result.recording is None or len(result.rows):
+        return {}
+    return {
+        variant.name: {
+            number: np.nan if mask is None else float(np.mean(mask == 1))
+            for number in evenly(numbers, SAMPLED)
+            for mask in [result.layer(variant.name, variant.stages[-1], number)]
+        }
+        for variant in result.recording.variants
+    }
+
+
+# --- Many drives ----------------------------------------------------------------------------------
+
+_EFFECTS: Final = [
+    *("drive", "base", "variant", "stage", "final", "metric"),
+    *("mean", "low", "high", "p", "frames"),
+]
+
+
+def collect_fleet(
+    fleet: FleetFolder, inspect: Callable[[int], str] | None = None, worst: int = WORST_OF_FLEET
+) -> FleetFindings:
+    """Collect what the report of a fleet is made of.
+
+    Parameters
+    ----------
+    fleet
+        The fleet.
+    inspect
+        Returns the command that opens one of the worst frames, by its rank.
+    worst
+        How many of these are shown, at most.
+
+    Raises
+    ------
+    ResultsError
+        If a table cannot be read.
+    """
+    return FleetFindings(
+        name=fleet.name,
+        source=str(fleet.path),
+        facts=fleet.facts,
+        drives=fleet.drives,
+        names=fleet.names,
+        effects=_effects(fleet),
+        scores=_scores(fleet),
+        worst=list(_worst(fleet, worst)),
+        inspect=inspect,
+    )
+
+
+def _effects(fleet: FleetFolder) -> dict[tuple[str, str], list[Row]]:
+    from pyarrow import compute
+
+    table = fleet.table("effects", _EFFECTS)
+    wanted = compute.and_(table["final"], compute.equal(table["metric"], TESTED))
+    found: defaultdict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in table.filter(wanted).to_pylist():
+        if row["mean"] is not None:
+            found[row["base"], row["variant"]].append(row)
+    return dict(found)
+
+
+def _scores(fleet: FleetFolder) -> list[Row]:
+    from pyarrow import compute
+
+    rates = fleet.facts.rates
+    if not rates:
+        return []
+    columns = ["drive", "variant", "final", "region", "frames", "ERR", "FPR", "FNR", "boundary_f"]
+    table = fleet.table("scores", columns)
+    wanted = compute.and_(table["final"], compute.equal(table["region"], ALL))
+    wanted = compute.and_(wanted, compute.equal(table["variant"], rates[0]["variant"]))
+    rows: list[Row] = table.filter(wanted).to_pylist()
+    return rows
+
+
+def _worst(fleet: FleetFolder, count: int) -> Iterator[WorstPicture]:
+    for rank, row in enumerate(fleet.table("worst").to_pylist()[:count], 1):
+        rates = {name: row[name] for name in ("ERR", "FPR", "FNR")}
+        yield WorstPicture(rank, row["drive"], row["frame"], rates, _picture(fleet.path, row))
+
+
+def _picture(folder: Path, row: dict[str, Any]) -> ImageFile | None:
+    """Read a picture of the folder; one from elsewhere, or of another kind, is none."""
+    path = folder / (row["picture"] or "")
+    if not path.resolve().is_relative_to(folder.resolve()):
+        return None
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    whole = content.startswith(b"\xff\xd8\xff") and content.rstrip(b"\0").endswith(b"\xff\xd9")
+    return ImageFile(content) if whole else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -23,13 +23,15 @@ from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.result import DriveResult
-from roadeval.recording import Recording
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
 from roadeval.report.sections.frames import SMALL, BrowsedFrames, FrameFacts, strip
 from roadeval.results.sentences import notes
+
+if TYPE_CHECKING:
+    from roadeval.recording import Recording
 
 WORST: Final = 6
 MOVED: Final = 3

@@ -16,7 +16,7 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs.inspect import WorstFrame, worst_frames
 from roadeval.jobs.progress import OnProgress
 from roadeval.jobs.replayed import CancelledReplayError, Replayer, recording_of
-from roadeval.jobs.report import PICTURED, findings_of
+from roadeval.jobs.report import PICTURED_OF_FLEET, findings_of
 from roadeval.jobs.report_frames import FramePicker, browsed
 from roadeval.jobs.result import DriveResult, Result
 from roadeval.recording.viewer import WindowViewer
@@ -168,7 +168,7 @@ class _Served:
         inspect = self._commands.inspect if self._commands else None
         drive = self._result.drive
         with self._lock:
-            findings = findings_of(self._result, self._commands, PICTURED)
+            findings = findings_of(self._result, self._commands, PICTURED_OF_FLEET)
             return page_document(findings, browsed(drive, inspect) if drive else None)
 
     @cached_property
@@ -289,7 +289,7 @@ class _ServedFleet(_Served):
     def _worst(self) -> Mapping[int, WorstFrame]:
         if not self._fleet.table("worst", ["rank"]).num_rows:
             return {}
-        return {each.rank: each for each in worst_frames(self._result, PICTURED)}
+        return {each.rank: each for each in worst_frames(self._result, PICTURED_OF_FLEET)}
 
     def _served(self, drive: str) -> _ServedDrive:
         """Return a drive as it lies in the folder now: its recording, or else its tables."""

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import is_plain
 from roadeval.evaluation.comparison import Condition
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.exports import flat_metrics, junit_xml
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -33,7 +32,13 @@ from roadeval.results.facts import (
     json_text,
     plain,
 )
-from roadeval.results.over_drives import DriveJudgement, judge_drives, summarise
+from roadeval.results.over_drives import (
+    DriveJudgement,
+    flat_metrics,
+    judge_drives,
+    junit_xml,
+    summarise,
+)
 from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFile, read_parquet
 from roadeval.runtime.documents import read_bounded, read_json

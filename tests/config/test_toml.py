@@ -11,8 +11,8 @@ from roadeval.config import (
     PRESETS,
     ConfigError,
     RunConfig,
+    config_toml,
     configure,
-    documented,
     load_config,
     network_variant,
     run_toml,
@@ -92,7 +92,7 @@ def test_every_option_is_tried_here():
 
 
 @pytest.mark.parametrize("setting", OTHER)
-@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), documented])
+@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
 def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tmp_path):
     config = configure(tables(setting))
     assert config != RunConfig()
@@ -100,7 +100,7 @@ def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tm
     assert load_config(tmp_path / "run.toml") == config
 
 
-@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), documented])
+@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
 def test_a_network_reads_back_from_the_file_of_a_run(write, tmp_path):
     (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = ["road", 3]\n')
     config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
@@ -111,7 +111,7 @@ def test_a_network_reads_back_from_the_file_of_a_run(write, tmp_path):
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_reads_back_from_its_file(preset, tmp_path):
     config = configure({"preset": preset})
-    for text in (run_toml(config, "d", "1"), documented(config)):
+    for text in (run_toml(config, "d", "1"), config_toml(config)):
         (tmp_path / "run.toml").write_text(text)
         assert load_config(tmp_path / "run.toml") == config
 
@@ -127,7 +127,7 @@ def test_the_file_of_a_run_holds_every_setting_that_has_a_value():
 
 
 def test_every_setting_is_documented_with_its_range():
-    text = documented(configure({"variants": {"gated": {"preset": "gated"}}}))
+    text = config_toml(configure({"variants": {"gated": {"preset": "gated"}}}))
     lines = text.splitlines()
     undocumented = [
         line

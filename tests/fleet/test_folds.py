@@ -2,8 +2,8 @@
 
 import pytest
 
+from roadeval.fleet.entry import FleetError
 from roadeval.fleet.folds import deal
-from roadeval.fleet.urls import FleetError
 
 DRIVES = {f"drive{k}": f"day{k // 3}" for k in range(30)}
 

@@ -4,7 +4,7 @@ import pytest
 
 from roadeval.config import RunConfig
 from roadeval.errors import RoadevalError
-from roadeval.fleet.manifest import read_manifest
+from roadeval.fleet.sources import read_manifest
 
 TOML = """\
 [[drives]]

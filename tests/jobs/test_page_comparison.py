@@ -2,7 +2,7 @@
 
 from roadeval.evaluation.comparison import Side, compare
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.jobs.page_comparison import browsed
+from roadeval.jobs.compare import Compared, browsed
 from tests.evaluation.making import a_part
 
 
@@ -13,7 +13,8 @@ def a_side(label, masks):
 def page_of(base, new):
     """What the page tells of the frames of two results without pictures."""
     sides = [a_side("base", base), a_side("new", new)]
-    return browsed(compare(sides, EvaluationSettings()), sides, {}, None, lambda _: 0)
+    compared = Compared(compare(sides, EvaluationSettings()), (), tuple(sides), {})
+    return browsed(compared, None, lambda _: 0)
 
 
 def test_frames_that_both_results_have_stand_in_order_with_both_rates():

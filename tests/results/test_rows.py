@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.results.exports import junit_xml
+from roadeval.results.over_drives import junit_xml
 from roadeval.results.rows import drive_row, probability_rows
 from tests.results.making import facts_of
 

@@ -20,7 +20,7 @@ def config(*, given: Given) -> int:
     --config.
     """
     settings = arguments.configuration(given)
-    from roadeval.jobs.config import config_toml
+    from roadeval.config import config_toml
 
     console.emit(config_toml(settings).rstrip())
     return ExitCode.DONE

@@ -26,7 +26,7 @@ def demo(
 
     100 frames, 640x480, 10 Hz; truth of the road and of shadow.
     """
-    from roadeval.jobs.demo import demo as write
+    from roadeval.jobs.log_files import demo as write
 
     log = write(output)
     if not quiet:

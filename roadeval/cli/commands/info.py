@@ -17,7 +17,7 @@ def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) 
     """
     config = arguments.of_a_log(given)
     from roadeval.cli.screens import info as screen
-    from roadeval.jobs.info import info as describe
+    from roadeval.jobs.log_files import info as describe
 
     found = describe(drive, config)
     if json:

@@ -48,7 +48,7 @@ def pack(
 
     Foxglove and Rerun open it too: JPEGs as they are, masks as PNG, Foxglove's protobuf schemas.
     """
-    from roadeval.jobs.pack import pack as run
+    from roadeval.jobs.log_files import pack as run
 
     packed = run(images, output, truth=truth, rate_hz=rate)
     for warning in packed.warnings:

@@ -10,7 +10,7 @@ from typing import Any
 
 from roadeval.config import load_config
 from roadeval.errors import RoadevalError
-from roadeval.jobs.report_findings import collect
+from roadeval.jobs.report import collect
 from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
 from tests.compatibility.make import RECORDING, RESULTS, unpack, versions

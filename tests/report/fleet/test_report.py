@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.jobs.report import write_report
-from roadeval.jobs.report_findings import collect_fleet
+from roadeval.jobs.report import collect_fleet, write_report
 from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf

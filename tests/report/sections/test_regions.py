@@ -44,7 +44,7 @@ def test_a_region_that_no_one_knows_is_shown_by_its_name():
 
 
 def test_row_bands_are_named_by_their_rows_below_a_rule():
-    regions = ("shadow", "boundary", "interior", "band_0", "band_1", "band_2")
+    names = ("shadow", "boundary", "interior", "band_0", "band_1", "band_2")
     (table,) = tables(some_findings(regions=table_of(*names)))
     assert [row[0] for row in table.rows][3:] == [
         "image rows 0–6, the top",  # noqa: RUF001

@@ -6,8 +6,7 @@ import pytest
 
 from roadeval import Result
 from roadeval.evaluation.comparison import Condition, ConditionError
-from roadeval.results.exports import junit_xml
-from roadeval.results.over_drives import check_conditions, judge_drives
+from roadeval.results.over_drives import check_conditions, judge_drives, junit_xml
 from tests.results.fleet.making import fleet_of
 
 

@@ -1,0 +1,111 @@
+"""Logs as files: described, packed from images or a video, and the demo that ships."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from roadeval import logs
+from roadeval.errors import RoadevalError
+from roadeval.jobs.outputs import holding
+from roadeval.runtime.files import AnyPath, put
+
+
+def info(drive: str | Path, config: logs.LogConfig | None = None) -> logs.LogDescription:
+    """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
+
+    Raises
+    ------
+    RoadevalError
+        If it is no log, or cannot be read.
+    """
+    return logs.describe(drive, config)
+
+
+def pack(
+    images: AnyPath,
+    output: AnyPath,
+    *,
+    truth: AnyPath | None = None,
+    rate_hz: float | None = None,
+) -> logs.PackResult:
+    """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
+
+    Parameters
+    ----------
+    images
+        A folder, taken in natural order (``2.png`` before ``10.png``), or a video file.
+    output
+        The log to write.
+    truth
+        A folder of label images, for a folder of images; paired by name.
+    rate_hz
+        Images a second; by default the times in the names, a video's own, or 10.
+
+    Raises
+    ------
+    RoadevalError
+        If there is nothing to pack, a file is unreadable, or no mask belongs to an image.
+
+    Examples
+    --------
+    >>> import roadeval
+    >>> from pathlib import Path
+    >>> from PIL import Image
+    >>> Path("images").mkdir()
+    >>> Image.new("RGB", (64, 48)).save("images/1718445600.png")
+    >>> roadeval.pack("images", "packed.mcap").stamps
+    "the times in the files' names"
+    """
+    with holding(output, inputs=(images, truth)):
+        packed = logs.pack(images, output, masks=truth, rate_hz=rate_hz)
+    problem = logs.describe(packed.path).problem if truth is not None else ""
+    if not problem:
+        return packed
+    warning = f"packed, but replay needs more settings: {problem}"
+    return replace(packed, warnings=(*packed.warnings, warning))
+
+
+_PACKAGE: Final = Path(__file__).parents[1]
+_PLACES: Final = (_PACKAGE / "demo.mcap", _PACKAGE.parent / "recordings" / "demo.mcap")
+"""Where the drive is: in an installation, and in a checkout (see ``setup.py``)."""
+
+
+def demo(output: AnyPath) -> Path:
+    """Write the demo drive, which ships with roadeval, to a file.
+
+    100 frames of 640x480 pixels at 10 Hz of a synthetic road, with the truth of road and shadow.
+
+    Parameters
+    ----------
+    output
+        The log to write.
+
+    Returns
+    -------
+    Path
+        The log.
+
+    Raises
+    ------
+    RoadevalError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> import roadeval
+    >>> log = roadeval.demo("road.mcap")
+    >>> [topic.name for topic in roadeval.info(log).topics]
+    ['/camera/image', '/truth/road', '/truth/shadow']
+    """
+    path = Path(output)
+    source = next((each for each in _PLACES if each.is_file()), None)
+    if source is None:
+        raise RoadevalError("this installation lacks the demo drive; install roadeval again")
+    with holding(path):
+        try:
+            put(path, source.read_bytes())
+        except OSError as error:
+            raise RoadevalError(f"{path}: cannot be written: {error.strerror}") from error
+    return path
