@@ -167,7 +167,7 @@ def attempted(drive, made, monkeypatch):
     monkeypatch.setattr(Log, "select", computed)
     monkeypatch.setattr("roadeval.jobs.report.collect", computed)
     monkeypatch.setattr("roadeval.logs.pack", computed)
-    monkeypatch.setattr("roadeval.jobs.demo.put", computed)
+    monkeypatch.setattr("roadeval.jobs.log_files.put", computed)
     monkeypatch.setattr("roadeval.recording.viewer.screenshot", computed)
     return lambda command, place: COMMANDS[command](drive, made, place)
 

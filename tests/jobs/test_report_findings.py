@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from roadeval.evaluation.score import Effect
-from roadeval.jobs import report_findings
+from roadeval.jobs import report
 from tests.evaluation.making import a_table, rows_of
 from tests.report.making import some_findings
 
@@ -16,7 +16,7 @@ def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
     table = a_table({("filtered", "post"): [10] * frames})
     facts = some_findings().facts
     result = SimpleNamespace(facts=facts, rows=rows_of(table), table=lambda _name: [])
-    windows, found = report_findings._windows(result)
+    windows, found = report._windows(result)
     assert found == size
     assert len(windows) == rows
     assert windows["frames"].sum() == frames
@@ -29,7 +29,7 @@ def test_what_a_stage_changed_is_a_share_of_the_labelled_pixels():
     changes = pd.DataFrame(
         [row | stages | {"N": 4}, row | stages | {"N": 0}, row | stages | {"N": 5} | other]
     )
-    found = report_findings._stage_changes(rows_of(changes))
+    found = report._stage_changes(rows_of(changes))
     assert found == {("filtered", "post"): (0.25, 0)}
 
 
@@ -41,7 +41,7 @@ def test_pixels_that_changed_between_variants_are_known_where_some_are_labelled(
         effect = Effect("unfiltered", "post", "filtered", "post", final=True, rates={})
         rows = rows_of(a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]}))
         result = SimpleNamespace(facts=SimpleNamespace(effects=[effect]), rows=rows)
-        (pair,) = report_findings._paired(result, changes)
+        (pair,) = report._paired(result, changes)
         return pair.pixels
 
     assert pixels(9) == (3, 2, 9)

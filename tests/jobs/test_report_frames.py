@@ -5,7 +5,7 @@ import re
 import pytest
 
 import roadeval
-from roadeval.jobs import compare, page_comparison, report_frames
+from roadeval.jobs import compare, report_frames
 from roadeval.jobs.report import page_of
 from roadeval.jobs.report_frames import FEWEST, bytes_of, strips_of
 from roadeval.jobs.result import DriveResult, Result
@@ -76,6 +76,6 @@ def test_a_comparisons_page_has_as_many_pictures_as_keep_it_small(recording, mon
     count = path.read_text().count('class="strip"')
     assert count > 0
     assert re.search(rf"{count} of \d+ frames have their pictures", path.read_text())
-    monkeypatch.setattr(page_comparison, "BYTES", whole - 3000)
+    monkeypatch.setattr(compare, "BYTES", whole - 3000)
     assert compare.write(compared, path).stat().st_size < whole
     assert path.read_text().count('class="strip"') == count - 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomlkit
 
-from roadeval.config import PRESETS, configure, documented, load_config, run_toml
+from roadeval.config import PRESETS, config_toml, configure, load_config, run_toml
 from tests.config.test_toml import OTHER, tables
 from tests.fuzz.harness import Harness, scratch
 
@@ -14,14 +14,14 @@ def check(data: bytes) -> None:
     path = scratch() / "run.toml"
     path.write_bytes(data)
     config = load_config(path)
-    for text in (run_toml(config, "drive.mcap", "1.2.3"), documented(config)):
+    for text in (run_toml(config, "drive.mcap", "1.2.3"), config_toml(config)):
         path.write_text(text, encoding="utf-8")
         assert load_config(path) == config, text
 
 
 def seeds() -> list[bytes]:
-    """Return documented presets, and a file for every setting."""
-    texts = [documented(configure({"preset": preset})) for preset in PRESETS]
+    """Return config_toml presets, and a file for every setting."""
+    texts = [config_toml(configure({"preset": preset})) for preset in PRESETS]
     return [text.encode() for text in (*texts, *(tomlkit.dumps(tables(name)) for name in OTHER))]
 
 

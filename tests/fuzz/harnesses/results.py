@@ -31,7 +31,7 @@ def check(data: bytes) -> None:
 def read(result: DriveResult) -> None:
     """Read all that a result holds: what a report needs, its configuration, its pictures."""
     readers: list[Callable[[], Any]] = [
-        lambda: result.regions,
+        lambda: result.table("regions"),
         lambda: collect(result),
         lambda: result.configuration and load_config(result.configuration),
     ]
