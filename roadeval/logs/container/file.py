@@ -308,7 +308,7 @@ class Container:
 
 def _unlisted(records: Bytes, index: Mapping[int, Entries]) -> int:
     """Count the records of a chunk that are no definitions and that no message index lists."""
-    places = np.unique(np.concatenate([entries[:, 1] for entries in index.values()]))
+    places = np.sort(np.concatenate([entries[:, 1] for entries in index.values()]))
     if not isinstance(records, memoryview) or places[-1] > len(records) - HEAD.size:
         return 0
     lengths = np.frombuffer(records, np.uint8)[places[:, None] + np.arange(1, HEAD.size)].view(

@@ -11,8 +11,10 @@ import re
 import struct
 from array import array
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
+from functools import partial
 from itertools import chain
 from math import inf
 from typing import Any, Final, NamedTuple
@@ -101,7 +103,7 @@ class Scan:
         """For each chunk, its messages by channel; None where its message indexes are damaged."""
         self.seen: dict[int, Mapping[int, Entries]] = {}
         """The same of the chunks that were looked into."""
-        self.loose: dict[int, array[int]] = {}
+        self.loose: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         """Log times and offsets, in turn, of the messages outside chunks, by channel."""
         self.schemas = dict(self.summary.schemas)
         self.channels = dict(self.summary.channels)
@@ -122,7 +124,7 @@ class Scan:
         self._source, self._reader, self._stamp_of = source, reader, stamp_of
         self._stop = None if self.summary.problem else self.summary.start
         self._records_left = RECORDS
-        self._unsure: dict[int, array[int]] = {}
+        self._unsure: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         """Messages as in ``loose``, but behind damage: they may be those of a damaged chunk."""
         self._is_unsure = False
         self._finder = RecordFinder(source, reader, self.summary, self.channels)
@@ -146,7 +148,7 @@ class Scan:
         checked = self.chunks and all(chunk.crc for chunk in self.chunks)
         for channel_id, values in self._unsure.items():
             if self._reader.keep_corrupt or not checked:
-                self.loose.setdefault(channel_id, array("Q")).extend(values)
+                self.loose[channel_id].extend(values)
         size = len(self._source)
         if self.data_end is None and not any(gap.lossy and gap.end == size for gap in self.gaps):
             self._gap(size, size, "the file was never finished; what came after is not in it")
@@ -229,7 +231,7 @@ class Scan:
         if opcode == MESSAGE:
             channel_id, log_time = content
             messages = self._unsure if self._is_unsure else self.loose
-            messages.setdefault(channel_id, array("Q")).extend((log_time, record.offset))
+            messages[channel_id].extend((log_time, record.offset))
         elif opcode in DEFINITIONS:
             self._take_definition(record.offset, content)
         else:
@@ -288,7 +290,7 @@ class Scan:
         """Walk through the records of a chunk; learn its channels and where its messages lie."""
         chunk = self.chunks[number]
         records = self._reader.read(chunk)
-        found: dict[int, array[int]] = {}
+        found: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         end, problem = 0, ""
         usual = chunk.data_size // BYTES_PER_RECORD
         allowed = usual + self._records_left // 2
@@ -301,7 +303,7 @@ class Scan:
             if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
                 head = records[body : body + MESSAGE_HEAD.size]
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-                found.setdefault(channel_id, array("Q")).extend((log_time, offset))
+                found[channel_id].extend((log_time, offset))
             elif opcode in DEFINITIONS:
                 with suppress(BadRecord):  # its messages will show that it is missing
                     self.define(parse(opcode, records[body:after]))
@@ -371,10 +373,11 @@ class RecordFinder:
         """
         if offset > self._size - HEAD.size:
             return self._tail(offset)
-        opcode, length = HEAD.unpack(self._source[offset : offset + HEAD.size])
+        head = self._source[offset : offset + HEAD.size + MESSAGE_HEAD.size]
+        opcode, length = HEAD.unpack_from(head)
         body = offset + HEAD.size
         record = Record(opcode, offset, body, body + length)
-        if opcode == MAGIC[0] and self._source[offset : offset + len(MAGIC)] == MAGIC:
+        if head.startswith(MAGIC):
             return Record(BORDER, offset, offset, offset + len(MAGIC))
         if opcode == CHUNK or offset in self._known:
             return self._chunk(record, chained=chained).record
@@ -384,7 +387,7 @@ class RecordFinder:
             raise BadRecord("a record that goes on beyond the end of the file")
         if self._borders and record.end > self._border(offset):
             raise BadRecord("a record that goes on into the next chunk")
-        content = self._message(record) if opcode == MESSAGE else self._content(record)
+        content = self._message(record, head) if opcode == MESSAGE else self._content(record)
         return Record(opcode, offset, body, record.end, content)
 
     def _tail(self, offset: int) -> Record:
@@ -421,14 +424,13 @@ class RecordFinder:
             raise BadRecord("a record that should not be here")
         return parse(opcode, self._source[body:end])
 
-    def _message(self, record: Record) -> tuple[int, int]:
+    def _message(self, record: Record, head: bytes) -> tuple[int, int]:
         """Read the channel and the log time of a message outside chunks."""
         if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
             raise BadRecord("a message of a length that cannot be")
         if self._known and self._is_index_here(record.offset):
             raise BadRecord("a message where a message index should be")
-        head = self._source[record.body : record.body + MESSAGE_HEAD.size]
-        channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
+        channel_id, _, log_time, _ = MESSAGE_HEAD.unpack_from(head, HEAD.size)
         return channel_id, log_time
 
     def _is_index_here(self, offset: int) -> bool:
