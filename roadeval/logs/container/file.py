@@ -23,7 +23,6 @@ from roadeval.logs.container.records import (
     IN_MEMORY,
     PRIVATE,
     Bytes,
-    ChunkReader,
     Entries,
     FileBytes,
     Message,
@@ -106,12 +105,11 @@ class Container:
     ) -> None:
         self.path = path
         self._wanted, self._stamp_of = wanted, stamp_of
-        self.source, self.reader = source, ChunkReader(source, keep_corrupt=keep_corrupt)
-        self.scan = Scan(source, self.reader, stamp_of)
+        self.source, self.scan = source, Scan(source, stamp_of, keep_corrupt=keep_corrupt)
         if self.scan.next_log is not None:
-            self.source = source = source.part(0, self.scan.next_log)
-            self.reader = ChunkReader(source, keep_corrupt=keep_corrupt)
-            self.scan = Scan(source, self.reader, stamp_of)
+            self.source = source.part(0, self.scan.next_log)
+            self.scan = Scan(self.source, stamp_of, keep_corrupt=keep_corrupt)
+        self.reader = self.scan.reader
         self.chunks, self.summary = self.scan.chunks, self.scan.summary
         self.schemas, self.channels = self.scan.schemas, self.scan.channels
         self.data_is_right: bool | None = None
@@ -131,7 +129,7 @@ class Container:
         self._checked |= self.looked_into
         read = {channel_id for channel_id, log in self.logs.items() if log.wanted}
         order = sorted(self.channels, key=lambda channel_id: (channel_id not in read, channel_id))
-        self.channels_left_out = order[CHANNELS:]
+        self.channels_left_out = frozenset(order[CHANNELS:])
         """Numbers of the channels that are not read, because there are too many."""
         for channel_id in self.channels_left_out:
             del self.channels[channel_id]

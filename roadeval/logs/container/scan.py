@@ -51,7 +51,7 @@ from roadeval.logs.container.records import (
     record_at,
     walk,
 )
-from roadeval.logs.container.summary import SUMMARY_RECORDS, Summary, read_summary
+from roadeval.logs.container.summary import Summary, read_summary
 from roadeval.logs.errors import BadRecord
 
 END: Final = -1
@@ -72,8 +72,6 @@ _LAST_RECORD: Final = re.compile(
 )
 _NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that are never found inside a chunk, unlike messages and their descriptions."""
-_AFTER_DATA: Final = {*SUMMARY_RECORDS, Opcode.FOOTER, MAGIC[0]}
-"""The first bytes that can follow the end of the data."""
 RECORDS: Final = 1 << 18
 """Records that chunks may hold beyond one for every few of their bytes: a bomb holds millions."""
 BYTES_PER_RECORD: Final = 4
@@ -95,7 +93,8 @@ class Gap(NamedTuple):
 class Scan:
     """What there is in a file."""
 
-    def __init__(self, source: FileBytes, reader: ChunkReader, stamp_of: StampOf) -> None:
+    def __init__(self, source: FileBytes, stamp_of: StampOf, *, keep_corrupt: bool) -> None:
+        self.reader = ChunkReader(source, keep_corrupt=keep_corrupt)
         self.summary = read_summary(source)
         self.chunks: list[Chunk] = []
         """In the order of the file."""
@@ -121,13 +120,13 @@ class Scan:
         """Log time of the last message saved from a chunk that is cut off."""
         self.next_log: int | None = None
         """Where another log begins in the same file."""
-        self._source, self._reader, self._stamp_of = source, reader, stamp_of
+        self._source, self._stamp_of = source, stamp_of
         self._stop = None if self.summary.problem else self.summary.start
         self._records_left = RECORDS
         self._unsure: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         """Messages as in ``loose``, but behind damage: they may be those of a damaged chunk."""
         self._is_unsure = False
-        self._finder = RecordFinder(source, reader, self.summary, self.channels)
+        self._finder = RecordFinder(source, self.reader, self.summary, self.channels)
         self._walk()
 
     def _walk(self) -> None:
@@ -147,7 +146,7 @@ class Scan:
             record = following
         checked = self.chunks and all(chunk.crc for chunk in self.chunks)
         for channel_id, values in self._unsure.items():
-            if self._reader.keep_corrupt or not checked:
+            if self.reader.keep_corrupt or not checked:
                 self.loose[channel_id].extend(values)
         size = len(self._source)
         if self.data_end is None and not any(gap.lossy and gap.end == size for gap in self.gaps):
@@ -202,7 +201,7 @@ class Scan:
             crc = crc_of(self._source.part(record.body, record.end - 4))
             return crc.to_bytes(4, "little") == self._source[record.end - 4 : record.end]
         if record.opcode == CHUNK:
-            return self._reader.is_sound(record.content)
+            return self.reader.is_sound(record.content)
         return record.opcode == BORDER
 
     def _is_whole(self, record: Record) -> bool:
@@ -218,11 +217,11 @@ class Scan:
         if chunk.cut and end == chunk.data_end:
             return chunk.record
         left = chunk._replace(data_size=max(end - chunk.data_offset, 0), cut=False)
-        if end != chunk.data_end and self._reader.is_sound(left):
+        if end != chunk.data_end and self.reader.is_sound(left):
             return left._replace(repaired=True, proven=True).record
         left = left._replace(data_size=min(chunk.data_size, left.data_size))
         with suppress(BadRecord):
-            self._reader.read(left)
+            self.reader.read(left)
         return left.record
 
     def _take(self, record: Record) -> None:
@@ -289,7 +288,7 @@ class Scan:
     def look(self, number: int) -> Mapping[int, Entries]:
         """Walk through the records of a chunk; learn its channels and where its messages lie."""
         chunk = self.chunks[number]
-        records = self._reader.read(chunk)
+        records = self.reader.read(chunk)
         found: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         end, problem = 0, ""
         usual = chunk.data_size // BYTES_PER_RECORD
@@ -312,7 +311,7 @@ class Scan:
         if end != len(records) and not chunk.cut:
             problem = problem or "a chunk whose records do not add up"
         if problem:
-            self._reader.kept.setdefault(chunk.offset, problem)
+            self.reader.kept.setdefault(chunk.offset, problem)
         if chunk.cut:
             self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
         self.seen[number] = {channel_id: entries_of(found[channel_id]) for channel_id in found}
@@ -363,14 +362,8 @@ class RecordFinder:
             self._borders.append(summary.start)
         self._tries_left = DOUBTED + 4 * len(source)
 
-    def record(self, offset: int, *, chained: bool = True) -> Record:
-        """Read the record that begins here.
-
-        Parameters
-        ----------
-        chained
-            Whether lengths that contradict each other may be judged by what follows them.
-        """
+    def record(self, offset: int) -> Record:
+        """Read the record that begins here."""
         if offset > self._size - HEAD.size:
             return self._tail(offset)
         head = self._source[offset : offset + HEAD.size + MESSAGE_HEAD.size]
@@ -380,9 +373,9 @@ class RecordFinder:
         if head.startswith(MAGIC):
             return Record(BORDER, offset, offset, offset + len(MAGIC))
         if opcode == CHUNK or offset in self._known:
-            return self._chunk(record, chained=chained).record
-        if opcode == ATTACHMENT:
-            return self._attachment(record, chained=chained)
+            return self._chunk(record).record
+        if opcode == ATTACHMENT and not self._is_attachment(record):
+            raise BadRecord("an attachment whose lengths contradict each other")
         if record.end > self._size:
             raise BadRecord("a record that goes on beyond the end of the file")
         if self._borders and record.end > self._border(offset):
@@ -405,23 +398,13 @@ class RecordFinder:
 
     def _content(self, record: Record) -> Any:
         """Read what a record says that is no chunk, no attachment and no message."""
-        opcode, offset, body, end, _ = record
-        if opcode >= PRIVATE and not self._is_likely_message(record):
+        opcode, _, body, end, _ = record
+        if opcode == ATTACHMENT or (opcode >= PRIVATE and not self._is_likely_message(record)):
             return None
         if end - body > LARGEST:
             raise BadRecord("a record of a length that cannot be")
         if opcode == MESSAGE_INDEX:
             return parse_message_index(self._source[body:end])
-        # What begins or ends a part of the file has its place.
-        before = self._source[max(offset - len(MAGIC), 0) : offset]
-        elsewhere = self._summary.checked and end != self._summary.start
-        after = self._source[end : end + len(MAGIC)]
-        if (
-            (opcode == Opcode.HEADER and before != MAGIC and offset > len(MAGIC))
-            or (opcode == Opcode.FOOTER and (elsewhere or after != MAGIC))
-            or (opcode == Opcode.DATA_END and (elsewhere or not {*after[:1]} <= _AFTER_DATA))
-        ):
-            raise BadRecord("a record that should not be here")
         return parse(opcode, self._source[body:end])
 
     def _message(self, record: Record, head: bytes) -> tuple[int, int]:
@@ -445,24 +428,16 @@ class RecordFinder:
         channel_id = int.from_bytes(self._source[record.body : record.body + 2], "little")
         return not self._channels or channel_id in self._channels
 
-    def _attachment(self, record: Record, *, chained: bool) -> Record:
-        """Find where an attachment ends: by its own length, that of its data, or the summary."""
-        at, own = record.body + 16, inf
+    def _is_attachment(self, record: Record) -> bool:
+        """Whether an attachment's own length and that of its data agree."""
+        at, end = record.body + 16, inf
         with suppress(struct.error):
             for _ in range(2):
                 at += 4 + struct.unpack("<I", self._source[at : at + 4])[0]
-            own = at + 8 + struct.unpack("<Q", self._source[at : at + 8])[0] + 4
-        border = min(self._border(record.offset), self._size)
-        if own <= record.end <= border:
-            return record
-        for end in (self._summary.attachments.get(record.offset, 0), own, record.end):
-            if chained and record.body < end <= border:
-                with suppress(BadRecord):
-                    self.record(int(end), chained=False)
-                    return record._replace(end=int(end))
-        raise BadRecord("an attachment whose lengths contradict each other")
+            end = at + 8 + struct.unpack("<Q", self._source[at : at + 8])[0] + 4
+        return end <= record.end
 
-    def _chunk(self, record: Record, *, chained: bool) -> Chunk:
+    def _chunk(self, record: Record) -> Chunk:
         """Read a chunk's head, which gives its length twice, and the summary a third time."""
         offset, heads = record.offset, list[Chunk]()
         if offset in self._proven:
@@ -474,26 +449,19 @@ class RecordFinder:
             if agrees and listed and own.listing == listed.listing:
                 return own._replace(proven=True)
             heads = [own, own._replace(data_size=record.end - own.data_offset)]
-        tried = heads
-        if offset in self._known:
-            crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
-            tried = [self._known[offset]._replace(crc=crc or None), *heads]
+        crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
+        known = [listed._replace(crc=crc or None)] if listed and self._summary.checked else []
         sized = (self._reader.sized(chunk) for chunk in heads if chunk.crc)
-        for chunk in chain(tried, sized):
+        for chunk in chain(known, heads, sized):
             # Zeros would be an empty chunk.
             if chunk.data_size >= 0 and (chunk.size or agrees) and self._reader.is_sound(chunk):
                 repaired = not agrees or chunk != heads[0]
                 self._proven[offset] = chunk._replace(repaired=repaired, proven=True)
                 return self._proven[offset]
-        ends = [chunk.data_end for chunk in heads]
         if agrees and record.end <= min(self._border(offset), self._size):
             return heads[0]
-        if ends and min(ends) > self._size >= heads[0].data_offset:
+        if heads and min(each.data_end for each in heads) > self._size >= heads[0].data_offset:
             return heads[0]._replace(data_size=self._size - heads[0].data_offset, cut=True)
-        for chunk in tried if chained else []:
-            with suppress(BadRecord):
-                self.record(chunk.data_end, chained=False)
-                return chunk._replace(repaired=True)
         raise BadRecord("a chunk whose lengths contradict each other")
 
     def hidden_chunk(self, offset: int) -> Record | None:
@@ -561,7 +529,7 @@ class RecordFinder:
         if opcode == MESSAGE and not self._is_likely_message(record):
             return False
         with suppress(BadRecord):
-            return bool(self.record(record.end, chained=False))
+            return bool(self.record(record.end))
         return False
 
     def _is_another_log(self, offset: int) -> bool:

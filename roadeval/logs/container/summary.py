@@ -52,8 +52,6 @@ class Summary:
     """The chunks' heads but for their checksums, by offset."""
     index_ends: dict[int, int] = field(default_factory=dict)
     """Where the message indexes of a chunk end, by the chunk's offset."""
-    attachments: dict[int, int] = field(default_factory=dict)
-    """Where attachments begin and end."""
     statistics: Statistics | None = None
 
     def fill(self, records: memoryview) -> None:
@@ -69,8 +67,6 @@ class Summary:
                     self.schemas[record.id] = record
                 elif opcode == Opcode.CHANNEL:
                     self.channels[record.id] = record
-                elif opcode == Opcode.ATTACHMENT_INDEX:
-                    self.attachments[record.offset] = record.offset + record.length
                 elif opcode == Opcode.STATISTICS:
                     self.statistics = record
             elif opcode < PRIVATE:
