@@ -314,26 +314,22 @@ class ChunkReader:
     def is_sound(self, chunk: Chunk) -> bool:
         """Whether the content of a chunk is what its head says.
 
-        Without a checksum it must consist of whole records. Compressed data must end with the
-        chunk. Of a file that claims one wrong chunk after the other only so many are looked at.
+        Without a checksum it must consist of whole records. Of a file that claims one wrong chunk
+        after the other only so many are looked at.
         """
         if self._doubts_left < 0 or chunk.data_end > len(self._source):
             return False
         with suppress(BadRecord):
-            records = self._whole(chunk, exact=True)
+            records = self._whole(chunk)
             if chunk.crc or max((each.end for each in walk(records)), default=0) == chunk.size:
                 self._keep(chunk.offset, records)
                 return True
         self._doubts_left -= chunk.data_size
         return False
 
-    def sized(self, chunk: Chunk) -> Chunk:
-        """Return a chunk with the size of what its data is uncompressed to."""
-        return chunk._replace(size=len(self.remains(chunk)))
-
-    def _whole(self, chunk: Chunk, *, exact: bool = False) -> Bytes:
+    def _whole(self, chunk: Chunk) -> Bytes:
         doubts_left = self._doubts_left
-        records = self._uncompressed(chunk, whole=True, exact=exact)
+        records = self._uncompressed(chunk, whole=True)
         if len(records) != chunk.size:
             raise BadRecord(f"a chunk of {len(records)} bytes that claims to hold {chunk.size}")
         if chunk.crc is None:
@@ -343,13 +339,13 @@ class ChunkReader:
         self._doubts_left = doubts_left
         return records
 
-    def _uncompressed(self, chunk: Chunk, *, whole: bool, exact: bool = False) -> Bytes:
+    def _uncompressed(self, chunk: Chunk, *, whole: bool) -> Bytes:
         if chunk.compression == "" and whole and chunk.data_size > IN_MEMORY:
             return self._source.part(chunk.data_offset, chunk.data_end)
         small = whole and chunk.size <= IN_MEMORY
         file = BytesIO() if small else SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115
         try:
-            for block in blocks(self._source, chunk, exact=exact):
+            for block in blocks(self._source, chunk):
                 self._doubts_left -= len(block)
                 file.write(block)
                 if whole and file.tell() > chunk.size:
@@ -374,7 +370,7 @@ def crc_of(records: Bytes) -> int:
     return crc
 
 
-def blocks(source: FileBytes, chunk: Chunk, *, exact: bool = False) -> Iterator[bytes]:
+def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
     """Uncompress a chunk into blocks of a bounded size, whatever they were compressed from."""
     import zstandard
 
@@ -395,7 +391,7 @@ def blocks(source: FileBytes, chunk: Chunk, *, exact: bool = False) -> Iterator[
             if left < 0:
                 raise BadRecord(f"a chunk of more than {LARGEST_CHUNK >> 20} MiB")
             yield block
-        if exact and data.left:
+        if data.left:
             raise BadRecord("a chunk that claims more bytes than its data has")
     except (zstandard.ZstdError, RuntimeError) as error:
         raise BadRecord(f"a chunk that {chunk.compression} cannot uncompress") from error

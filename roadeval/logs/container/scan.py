@@ -364,14 +364,15 @@ class RecordFinder:
 
     def record(self, offset: int) -> Record:
         """Read the record that begins here."""
-        if offset > self._size - HEAD.size:
-            return self._tail(offset)
         head = self._source[offset : offset + HEAD.size + MESSAGE_HEAD.size]
+        if head.startswith(MAGIC) or not head:
+            end = offset + len(head[: len(MAGIC)])
+            return Record(BORDER if head else END, offset, offset, end)
+        if len(head) < HEAD.size:
+            raise BadRecord("the file is cut off")
         opcode, length = HEAD.unpack_from(head)
         body = offset + HEAD.size
         record = Record(opcode, offset, body, body + length)
-        if head.startswith(MAGIC):
-            return Record(BORDER, offset, offset, offset + len(MAGIC))
         if opcode == CHUNK or offset in self._known:
             return self._chunk(record).record
         if opcode == ATTACHMENT and not self._is_attachment(record):
@@ -383,23 +384,19 @@ class RecordFinder:
         content = self._message(record, head) if opcode == MESSAGE else self._content(record)
         return Record(opcode, offset, body, record.end, content)
 
-    def _tail(self, offset: int) -> Record:
-        """Read what is shorter than any record: the last eight bytes, or none."""
-        if offset == self._size:
-            return Record(END, offset, offset, offset)
-        if self._source[offset : self._size] == MAGIC:
-            return Record(BORDER, offset, offset, self._size)
-        raise BadRecord("the file is cut off")
-
     def _border(self, offset: int) -> float:
         """Where the next chunk or the summary begins, by the summary."""
         index = bisect_right(self._borders, offset)
         return self._borders[index] if index < len(self._borders) else inf
 
     def _content(self, record: Record) -> Any:
-        """Read what a record says that is no chunk, no attachment and no message."""
+        """Read what a record says that is no chunk and no message."""
         opcode, _, body, end, _ = record
-        if opcode == ATTACHMENT or (opcode >= PRIVATE and not self._is_likely_message(record)):
+        if opcode >= PRIVATE:  # or a message whose kind is damaged
+            channel_id = int.from_bytes(self._source[body : body + 2], "little")
+            if not (MESSAGE_HEAD.size <= end - body <= LARGEST and self._is_known(channel_id)):
+                return None
+        if opcode == ATTACHMENT:
             return None
         if end - body > LARGEST:
             raise BadRecord("a record of a length that cannot be")
@@ -421,11 +418,7 @@ class RecordFinder:
         chunk = self._borders[bisect_right(self._borders, offset) - 1]
         return offset < self._summary.index_ends.get(chunk, 0)
 
-    def _is_likely_message(self, record: Record) -> bool:
-        """Whether this is a message of a known channel."""
-        if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
-            return False
-        channel_id = int.from_bytes(self._source[record.body : record.body + 2], "little")
+    def _is_known(self, channel_id: int) -> bool:
         return not self._channels or channel_id in self._channels
 
     def _is_attachment(self, record: Record) -> bool:
@@ -451,7 +444,7 @@ class RecordFinder:
             heads = [own, own._replace(data_size=record.end - own.data_offset)]
         crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
         known = [listed._replace(crc=crc or None)] if listed and self._summary.checked else []
-        sized = (self._reader.sized(chunk) for chunk in heads if chunk.crc)
+        sized = (each._replace(size=len(self._reader.remains(each))) for each in heads if each.crc)
         for chunk in chain(known, heads, sized):
             # Zeros would be an empty chunk.
             if chunk.data_size >= 0 and (chunk.size or agrees) and self._reader.is_sound(chunk):
@@ -491,7 +484,9 @@ class RecordFinder:
             if self._source[offset : offset + len(MAGIC)] == MAGIC:
                 if ATTACHMENT in kinds:
                     log_end = max(log_end, self._end_of_log(offset))
-                elif self._is_another_log(offset):
+                elif self._source[offset - 8 : offset] == MAGIC or (
+                    not self._summary.checked and self._source[0:8] == MAGIC
+                ):  # else it may be this log's own beginning, moved
                     return Record(BORDER, offset, offset, offset + len(MAGIC))
                 continue
             with suppress(BadRecord):
@@ -526,17 +521,11 @@ class RecordFinder:
             return False
         if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
             return not self._known or self._is_index_here(record.offset)
-        if opcode == MESSAGE and not self._is_likely_message(record):
+        if opcode == MESSAGE and not self._is_known(content[0]):
             return False
         with suppress(BadRecord):
             return bool(self.record(record.end))
         return False
-
-    def _is_another_log(self, offset: int) -> bool:
-        """Whether these are the first bytes of a log behind this one, and none that were moved."""
-        if self._source[offset - len(MAGIC) : offset] == MAGIC:
-            return True
-        return not self._summary.checked and self._source[0 : len(MAGIC)] == MAGIC
 
     def _end_of_log(self, offset: int) -> int:
         for at in range(offset, self._size, _BLOCK):

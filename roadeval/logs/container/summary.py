@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import zlib
 from dataclasses import dataclass, field
 from typing import Final
@@ -32,8 +31,8 @@ SUMMARY_RECORDS: Final = (
 _FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
 _CHECKED: Final = HEAD.size + 16
 """Bytes of the footer that its own checksum covers."""
-_CHUNK_INDEX: Final = struct.Struct("<QQQQI")
-"""Start time, end time, offset and length of the chunk, bytes of the map of its indexes."""
+_MAP: Final = 32
+"""Where a chunk index has the map of the chunk's message indexes: its length, then its bytes."""
 
 
 @dataclass(slots=True)
@@ -100,18 +99,16 @@ def read_summary(source: Bytes) -> Summary:
 def _parse_chunk_index(body: Buffer) -> tuple[Chunk, int]:
     """Read a chunk's head, but for its checksum, and where its message indexes end.
 
-    Unlike the library, which takes long for the map of these.
+    The map of these is left out: the library takes long for it.
     """
-    try:
-        start, end, offset, length, map_length = _CHUNK_INDEX.unpack_from(body)
-        at = _CHUNK_INDEX.size + map_length
-        index_length, name_length = struct.unpack_from("<QI", body, at)
-        name = bytes(body[at + 12 : at + 12 + name_length]).decode()
-        data_size, size = struct.unpack_from("<QQ", body, at + 12 + name_length)
-    except (struct.error, UnicodeDecodeError) as error:
-        raise BadRecord("a chunk index that does not add up") from error
-    data_offset = offset + HEAD.size + CHUNK_HEAD.size + name_length + 8
-    if data_offset + data_size != offset + length:
+    map_length = int.from_bytes(body[_MAP : _MAP + 4], "little")
+    index = parse(
+        Opcode.CHUNK_INDEX, b"".join((body[:_MAP], bytes(4), body[_MAP + 4 + map_length :]))
+    )
+    offset, name, data_size = index.chunk_start_offset, index.compression, index.compressed_size
+    end = offset + index.chunk_length
+    if end != offset + HEAD.size + CHUNK_HEAD.size + len(name.encode()) + 8 + data_size:
         raise BadRecord("a chunk index that does not add up")
-    chunk = Chunk(offset, start, end, size, None, name, data_offset, data_size)
-    return chunk, offset + length + index_length
+    times, size = (index.message_start_time, index.message_end_time), index.uncompressed_size
+    chunk = Chunk(offset, *times, size, None, name, end - data_size, data_size)
+    return chunk, end + index.message_index_length
