@@ -17,6 +17,8 @@ _HEAD: Final = 64
 """Bytes by which a file is recognised."""
 _DAMAGED: Final = 2
 """Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
+_RECORD: Final = re.compile(rb"[\x01\x06].{4}\0{4}", re.DOTALL)
+"""The head of a log's first record or of a chunk: an MCAP file whose first bytes are missing."""
 
 METADATA: Final = "metadata.yaml"
 """The file in which rosbag2 describes the files beside it."""
@@ -153,18 +155,20 @@ def _check(path: Path) -> None:
     wrong = sum(ours != theirs for ours, theirs in zip(MAGIC, head, strict=False))
     if head.startswith(MAGIC) or (wrong <= _DAMAGED and len(head) >= len(MAGIC)) or tail == MAGIC:
         return
-    raise LogError(f"{path}: not an MCAP file but {_name(path, head)}")
+    other = _other(path, head)
+    if not other and _RECORD.search(head):
+        return
+    other = other or f"something else (it begins with {head[:8].hex(' ')})"
+    raise LogError(f"{path}: not an MCAP file but {other}")
 
 
-def _name(path: Path, head: bytes) -> str:
+def _other(path: Path, head: bytes) -> str:
     for skipped, magic, name in _OTHERS:
         if head[skipped:].startswith(magic):
             stem = path.name.split(".")[0]
             clash = path.name == f"{stem}.mcap"
             return name.format(path=path.name, stem=f"{stem}_converted" if clash else stem)
-    if not any(head):
-        return "zeros: the disk or the copy failed"
-    return f"something else (it begins with {head[:8].hex(' ')})"
+    return "" if any(head) else "zeros: the disk or the copy failed"
 
 
 def _empty_folder(path: Path) -> str:

@@ -130,9 +130,10 @@ class Scan:
         self._walk()
 
     def _walk(self) -> None:
-        record = Record(BORDER, 0, 0, len(MAGIC))
-        if self._source[0 : len(MAGIC)] != MAGIC:
+        begun = self._source[0 : len(MAGIC)] == MAGIC
+        if not begun:
             self._gap(0, len(MAGIC), "the file does not begin as it should", lossy=False)
+        record = Record(BORDER, 0, 0, len(MAGIC) if begun else 0)
         while record.opcode != END:
             try:
                 following = self._following(record)

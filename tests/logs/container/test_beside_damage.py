@@ -59,6 +59,15 @@ def head_twice(log: Intact) -> bytes:
     return log.data[: at + 8] + log.data[at:]
 
 
+def first_bytes_missing(log: Intact) -> bytes:
+    """Leave out what the file begins with; this one has no end either."""
+    return log.data[8:]
+
+
+def all_before_the_first_chunk_missing(log: Intact) -> bytes:
+    return log.data[places(log, Opcode.CHUNK)[0] :]
+
+
 def channel_in_the_summary(log: Intact) -> bytes:
     """Let a damaged summary describe the camera's topic by another number as well."""
     at = places(log, Opcode.CHANNEL)[0]
@@ -86,6 +95,8 @@ def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[i
         ("uncompressed", index_to_the_end, "lengths contradict"),
         ("no_index", head_twice, "8 bytes too many"),
         ("no_index", channel_in_the_summary, ""),
+        ("unfinished", first_bytes_missing, "never finished"),
+        ("unfinished", all_before_the_first_chunk_missing, "never finished"),
         ("uncompressed", channel_in_the_summary, ""),
     ],
 )
