@@ -40,6 +40,15 @@ def losses(sentences: Sequence[str]) -> ExitCode:
     return ExitCode.LOSS if sentences else ExitCode.DONE
 
 
+def conditions(held: Sequence[str], unjudged: Sequence[str], otherwise: ExitCode) -> ExitCode:
+    """Write which conditions hold and which could not be judged; return the exit code."""
+    for sentence in (*held, *unjudged):
+        error(sentence)
+    if held:
+        return ExitCode.CONDITION_HELD
+    return ExitCode.FAILED if unjudged else otherwise
+
+
 def debug() -> bool:
     """Return whether tracebacks are asked for, by ``ROADEVAL_DEBUG=1`` in the environment."""
     return os.environ.get("ROADEVAL_DEBUG") == "1"

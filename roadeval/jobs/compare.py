@@ -34,7 +34,13 @@ from roadeval.report.charts.rates import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.report.sections.frames import BrowsedFrames, FrameFacts, browser, strip
-from roadeval.results.comparison import as_dict, judged, warnings
+from roadeval.results.comparison import (
+    as_dict,
+    comparison_cases,
+    judged,
+    junit_xml,
+    warnings,
+)
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.runtime.files import Paths, listed
@@ -221,6 +227,26 @@ def _document(compared: Compared, inspect: Inspect | None) -> Document:
         over_drive(compared),
         command if inspect and compared.recordings else None,
     )
+
+
+def write_junit(compared: Compared, path: Path) -> Path:
+    """Write what changed and the judged conditions as JUnit's XML.
+
+    Raises
+    ------
+    RoadevalError
+        If the file cannot be written.
+    """
+    found = compared.comparison
+    name = ", ".join(each.label for each in found.results)
+    return write_file(path, junit_xml(name, comparison_cases(found, compared.judgements)))
+
+
+def comment(compared: Compared) -> str:
+    """Return a comparison as Markdown that fits into one comment on a pull request."""
+    from roadeval.report.comparison import comment
+
+    return comment(compared.comparison, compared.judgements)
 
 
 def as_json(compared: Compared) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult
+from roadeval.evaluation.comparison import Condition
 from roadeval.jobs import summary
 from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.identity import deciding
@@ -22,6 +23,7 @@ from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
+from roadeval.results.over_drives import DriveJudgement, check_conditions, judge_drives
 from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
@@ -49,11 +51,23 @@ class Outcome:
     """Where in their code stages failed that are among the losses."""
     rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     """Those of the tables ``scores`` and ``effects``."""
+    judgements: tuple[DriveJudgement, ...] = ()
+    """Of the conditions that were given."""
 
     @property
     def summary(self) -> dict[str, Any]:
         """The content of ``summary.json``."""
         return self.facts.as_dict()
+
+    @property
+    def held(self) -> list[str]:
+        """The sentences of the conditions that hold."""
+        return [each.sentence for each in self.judgements if each.holds]
+
+    @property
+    def unjudged(self) -> list[str]:
+        """The conditions that could not be judged, with the reason."""
+        return [f"{j.condition}: {j.sentence}" for j in self.judgements if j.holds is None]
 
 
 def replay(
@@ -63,6 +77,7 @@ def replay(
     save: AnyPath | None = None,
     reports: AnyPath | None = None,
     mcap: AnyPath | None = None,
+    fail_if: Sequence[str] = (),
     on_progress: OnProgress = ignore,
     on_frame: OnFrame = pass_by,
 ) -> Outcome:
@@ -78,6 +93,9 @@ def replay(
     save, reports, mcap
         Where the recording, the folder of tables and figures, and the log of masks land; in place
         of what the configuration says.
+    fail_if
+        Conditions on a rate, as ``post.filtered.ERR > 20%``; see
+        `roadeval.evaluation.comparison.conditions`.
     on_progress
         Called in the caller's thread after every frame, and where something else begins that takes
         its time.
@@ -90,6 +108,8 @@ def replay(
     RoadevalError
         For whatever a user can mend: one line with what is wrong, where, and what to do.
     """
+    conditions = [Condition.parse(text) for text in fail_if]
+    check_conditions(conditions)
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
@@ -98,7 +118,9 @@ def replay(
         with to.holding((drive, config.training.model)) as left:
             outcome = _written(log, config, to, on_progress, on_frame)
             warnings = (*outcome.warnings, *_unwritten(config, to), *_superseded(left))
-            return replace(outcome, warnings=warnings)
+    scores = [{"drive": log.name, **row} for row in outcome.rows["scores"]]
+    judged = judge_drives(scores, conditions, config.evaluation.least_frames)
+    return replace(outcome, warnings=warnings, judgements=tuple(judged))
 
 
 def _written(

@@ -48,6 +48,9 @@ NAMED: Final = 20
 """Drives that a table of changed ones names, of each mask."""
 CHANGE: Final = ("base %", "new %", "change pp", "interval pp")
 """The titles of a change."""
+LONGEST: Final = 65_536
+"""Characters of a comment on GitHub."""
+_CUT: Final = "\nThe rest is left out here: `roadeval compare -o changes.md` writes all of it.\n"
 _COMMAND: Final = "in the viewer"
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region, or frames", "stamp")
 """The columns that hold words, beside the commands."""
@@ -101,6 +104,17 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
     blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
     return f"# roadeval comparison\n\n{written(blocks)}"
+
+
+def comment(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
+    """Return the verdict, the table and the changed drives as Markdown of one comment at most."""
+    blocks = [*overview(comparison, judgements), *changed_drives(comparison)]
+    text = f"## roadeval comparison\n\n{written([*blocks, *_warnings(comparison)])}"
+    if len(text) <= LONGEST:
+        return text
+    begin = text[: LONGEST - len(_CUT)]
+    whole = begin.rfind("\n") + 1  # lines; a single long one is cut within
+    return (begin[:whole] if 2 * whole > LONGEST else begin) + _CUT
 
 
 def _about(result: ComparedResult) -> str:

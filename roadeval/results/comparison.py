@@ -1,15 +1,17 @@
-"""A comparison for people and machines: its sentences, and the content of its JSON file."""
+"""A comparison for people and machines: sentences, the content of its JSON file, and JUnit XML."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
+from xml.etree import ElementTree
 
 from roadeval.data.words import percent, plain_points
 from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
 from roadeval.evaluation.score import TESTED
 from roadeval.results.sentences import sentence, stands
+from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
 NAMED: Final = 5
@@ -205,3 +207,55 @@ def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+# --- JUnit ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A case of a JUnit file."""
+
+    kind: str
+    """What was done, or the condition that was judged."""
+    name: str
+    """The drive or the result."""
+    parts: Mapping[str, str | None] = field(default_factory=dict)
+    """Texts by JUnit's elements: ``error``, ``failure``, ``skipped``, ``system-out``."""
+    seconds: float | None = None
+
+
+def comparison_cases(comparison: Comparison, judgements: Iterable[Judgement]) -> Iterator[Case]:
+    """Yield a case with what changed, and one a condition and result, which fails if it holds."""
+    labels = ", ".join(each.label for each in comparison.results)
+    lines = [*changed_settings(comparison), verdict(comparison), *where(comparison)]
+    yield Case("compare", labels, {"system-out": "\n".join(lines)})
+    for each in judgements:
+        kind = "failure" if each.holds else "system-out"
+        yield Case(each.condition.text, each.result, {kind: judged(each)})
+
+
+def junit_xml(name: str, cases: Iterable[Case]) -> bytes:
+    """Return JUnit's XML of a suite, as CI systems read it."""
+    suite = ElementTree.Element("testsuite", name=visible(name))
+    for case in cases:
+        about = {"classname": visible(case.kind), "name": visible(case.name)}
+        if case.seconds is not None:
+            about["time"] = f"{case.seconds:.3f}"
+        element = ElementTree.SubElement(suite, "testcase", about)
+        for kind, text in case.parts.items():
+            said = "\n".join(visible(line) for line in (text or "").splitlines())
+            if kind.startswith("system"):
+                ElementTree.SubElement(element, kind).text = said
+            else:
+                ElementTree.SubElement(element, kind, message=said)
+    for count, kind in (
+        ("tests", "testcase"),
+        ("errors", "testcase/error"),
+        ("failures", "testcase/failure"),
+        ("skipped", "testcase/skipped"),
+    ):
+        suite.set(count, str(len(suite.findall(kind))))
+    ElementTree.indent(suite)
+    xml: bytes = ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True)
+    return xml + b"\n"

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import is_plain
 from roadeval.evaluation.comparison import Condition
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.comparison import junit_xml
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -34,9 +35,10 @@ from roadeval.results.facts import (
 )
 from roadeval.results.over_drives import (
     DriveJudgement,
+    drive_cases,
     flat_metrics,
     judge_drives,
-    junit_xml,
+    scores_of,
     summarise,
 )
 from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
@@ -361,7 +363,8 @@ class FleetWriter:
         # Two commands may replay drives of one folder together.
         with self._explained(), alone(*(self.folder / name for name in FILES)):
             write_tables(self.folder, members, _Records(self.folder, asked or {}))
-            judged = [*judge_drives(self.folder, conditions, settings.least_frames)]
+            scores = scores_of(self.folder) if conditions else ()
+            judged = [*judge_drives(scores, conditions, settings.least_frames)]
             drives = read_parquet(self.folder / "drives.parquet", "drives").to_pylist()
             facts = summarise(
                 self.folder,
@@ -373,7 +376,7 @@ class FleetWriter:
             )
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / METRICS, json_text(plain(flat_metrics(facts))).encode())
-            put(self.folder / JUNIT, junit_xml(self.folder.name, drives, judged))
+            put(self.folder / JUNIT, junit_xml(self.folder.name, drive_cases(drives, judged)))
             put(self.folder / FLEET, facts.text().encode())
         return facts
 

@@ -1,4 +1,4 @@
-"""The facts of many drives, made of their tables; the same as flat JSON and JUnit XML."""
+"""The facts of many drives, made of their tables; the same as flat JSON and cases for CI."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
-from xml.etree import ElementTree
 
 from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts
 from roadeval.data.words import defined
@@ -19,12 +18,11 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import TESTED, Effect, corrected
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference, DriveMean, over_drives, strata
-from roadeval.results.comparison import judged
+from roadeval.results.comparison import Case, judged
 from roadeval.results.facts import ConditionFacts, FleetFacts, Member, OverDrives, StratumFacts
 from roadeval.results.schema import ALL, DAMAGED, FAILED, LIGHT, TAG, UNSCORED
 from roadeval.results.sentences import verdict
 from roadeval.results.tables import read_parquet
-from roadeval.runtime.text import visible
 from roadeval.version import VERSION
 
 WARNINGS: Final = 5
@@ -251,24 +249,31 @@ class DriveJudgement:
 
 
 def check_conditions(conditions: Sequence[Condition]) -> None:
-    """Raise a `ConditionError` for a condition on a change: a fleet alone has no base."""
+    """Raise a `ConditionError` for a condition on a change: one result alone has no base."""
     for condition in conditions:
         if condition.is_change:
             raise ConditionError(
-                f"{condition.text}: a fleet alone has no base to have changed from; limit the rate "
-                "of its drives in %, or compare two fleets with roadeval compare"
+                f"{condition.text}: a result alone has no base to have changed from; limit the "
+                "rate in %, or compare two results with roadeval compare"
             )
 
 
+def scores_of(folder: Path) -> Rows:
+    """Return what conditions are judged on: the rows of ``scores`` in the folder of a fleet."""
+    columns = ["drive", "variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
+    rows: Rows = read_parquet(folder / "scores.parquet", "scores", [*columns, *POOLED]).to_pylist()
+    return rows
+
+
 def judge_drives(
-    folder: Path, conditions: Sequence[Condition], least: int
+    scores: Iterable[Mapping[str, Any]], conditions: Sequence[Condition], least: int
 ) -> Iterator[DriveJudgement]:
     """Judge conditions on each scored drive: on the rates of its own frames.
 
     Parameters
     ----------
-    folder
-        Of the fleet, its tables written.
+    scores
+        Rows of ``scores``.
     conditions
         On levels alone, see `check_conditions`.
     least
@@ -277,17 +282,9 @@ def judge_drives(
     Raises
     ------
     ConditionError
-        If no drive has the mask that a condition names.
+        If nothing scored is the mask that a condition names.
     """
-    if not conditions:
-        return
-    columns = ["drive", "variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
-    columns += POOLED
-    rows = [
-        row
-        for row in read_parquet(folder / "scores.parquet", "scores", columns).to_pylist()
-        if row["region"] == ALL
-    ]
+    rows = [row for row in scores if row["region"] == ALL]
     for condition in conditions:
         own = [
             r for r in rows if (r["stage"], r["variant"]) == (condition.stage, condition.variant)
@@ -295,8 +292,8 @@ def judge_drives(
         if not own:
             there = ", ".join(sorted({f"{row['stage']}.{row['variant']}" for row in rows}))
             raise ConditionError(
-                f"{condition.text}: no drive has a mask {condition.stage}.{condition.variant}; "
-                f"there are {there or 'none'}"
+                f"{condition.text}: nothing scored is called {condition.stage}."
+                f"{condition.variant}; there are {there or 'none'}"
             )
         yield from (_judged(condition, row, least) for row in own)
 
@@ -346,60 +343,34 @@ def flat_metrics(facts: FleetFacts) -> dict[str, float]:
     return {name: value for name, value in flat.items() if defined(value)}
 
 
-def junit_xml(
-    fleet: str, drives: Iterable[Mapping[str, Any]], conditions: Iterable[DriveJudgement] = ()
-) -> bytes:
-    """Return JUnit's XML: a case a drive, and a case a drive and condition.
+_OF_STATUS: Final = {
+    FAILED: ("error", "reason"),
+    UNSCORED: ("skipped", "reason"),
+    DAMAGED: ("system-err", "losses"),
+}
+"""The element of a drive's case, and the column with its text."""
+
+
+def drive_cases(
+    drives: Iterable[Mapping[str, Any]], conditions: Iterable[DriveJudgement] = ()
+) -> Iterator[Case]:
+    """Yield a case a drive, and a case a drive and condition.
 
     Parameters
     ----------
-    fleet
-        Its name.
     drives
         Rows of ``drives``. One that failed is an error, one without a score is skipped.
     conditions
         Judged on drives: where a condition holds its case fails, where it was not judged its case
         is skipped.
     """
-    suite = ElementTree.Element("testsuite", name=visible(fleet))
     for row in drives:
-        case = _case(suite, "replay", row["drive"], row["seconds"])
-        if row["status"] == FAILED:
-            _part(case, "error", row["reason"])
-        elif row["status"] == UNSCORED:
-            _part(case, "skipped", row["reason"])
-        if row["status"] == DAMAGED:
-            _part(case, "system-err", row["losses"])
+        kind, column = _OF_STATUS.get(row["status"], ("", ""))
+        parts = {kind: row[column]} if kind else {}
         if row["verdict"]:
-            _part(case, "system-out", row["verdict"])
+            parts["system-out"] = row["verdict"]
+        yield Case("replay", row["drive"], parts, row["seconds"])
     for each in conditions:
-        case = _case(suite, each.condition, each.drive, None)
-        if each.holds is not False:
-            _part(case, "failure" if each.holds else "skipped", each.sentence)
-    for name, kind in (
-        ("tests", "testcase"),
-        ("errors", "testcase/error"),
-        ("failures", "testcase/failure"),
-        ("skipped", "testcase/skipped"),
-    ):
-        suite.set(name, str(len(suite.findall(kind))))
-    ElementTree.indent(suite)
-    text: bytes = ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True)
-    return text + b"\n"
-
-
-def _case(
-    suite: ElementTree.Element, kind: str, drive: str, seconds: float | None
-) -> ElementTree.Element:
-    about = {"classname": visible(kind), "name": visible(drive)}
-    if seconds is not None:
-        about["time"] = f"{seconds:.3f}"
-    return ElementTree.SubElement(suite, "testcase", about)
-
-
-def _part(case: ElementTree.Element, kind: str, text: str | None) -> None:
-    said = "\n".join(visible(line) for line in (text or "").splitlines())
-    if kind.startswith("system"):
-        ElementTree.SubElement(case, kind).text = said
-    else:
-        ElementTree.SubElement(case, kind, message=said)
+        kind = "failure" if each.holds else "skipped"
+        said = {} if each.holds is False else {kind: each.sentence}
+        yield Case(each.condition, each.drive, said)

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import pytest
 
@@ -85,6 +86,44 @@ def test_the_files_are_written_by_their_endings(demo, worse, tmp_path):
     told = f"{100 * final['base']['ERR']:.2f} | {100 * final['new']['ERR']:.2f}"
     assert told in markdown.decode()
     assert told.replace(" | ", " ") in text(document)
+
+
+def test_ci_gets_a_case_a_condition_as_junit(demo, worse, tmp_path):
+    kept = ("--fail-if", "svm.filtered.ERR > 99%")
+    words = (*LIMIT, *kept, "--junit", tmp_path / "compare.xml", "-q")
+    run = here("compare", demo.recording, worse.reports, *words)
+    assert run.returncode == 4
+    suite = ElementTree.parse(tmp_path / "compare.xml").getroot()
+    counts = {name: suite.get(name) for name in ("tests", "failures", "errors", "skipped")}
+    assert counts == {"tests": "3", "failures": "1", "errors": "0", "skipped": "0"}
+    first, exceeded, limited = suite
+    assert first.find("system-out").text.startswith("Changed settings: ")
+    assert exceeded.get("classname") == LIMIT[1]
+    message = exceeded.find("failure").get("message")
+    assert message in run.stderr
+    assert "> +0.5pp holds" in message
+    assert limited.find("system-out").text.endswith("> 99% does not hold")
+
+
+def test_the_summary_of_a_job_on_github_is_appended(fleets, tmp_path, monkeypatch):
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
+    (tmp_path / "summary.md").write_text("before\n")
+    content = json.loads(here("compare", *fleets, "--json").stdout)
+    text = (tmp_path / "summary.md").read_text()
+    assert text.startswith("before\n## roadeval comparison\n")
+    assert content["verdict"].split(";")[0] in text
+    assert "| filtered | " in text
+    changed = [each["drive"] for each in content["drives"] if each["changed"]]
+    assert len(changed) == 3
+    assert all(drive.replace("_", "\\_") in text for drive in changed)
+    here("compare", *fleets, "-q")
+    assert (tmp_path / "summary.md").read_text().count("## roadeval comparison") == 2
+
+
+def test_without_github_no_summary_is_written(fleets, tmp_path, monkeypatch):
+    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
+    here("compare", *fleets, "-q", cwd=tmp_path)
+    assert not [*tmp_path.iterdir()]
 
 
 def test_the_variants_of_one_recording_are_compared_with_each_other(demo):

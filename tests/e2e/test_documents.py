@@ -6,12 +6,15 @@ import re
 import shlex
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
 import pytest
 import typer.main
+import yaml
 
 import roadeval
 from roadeval.cli.app import app
@@ -28,6 +31,7 @@ BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.DOTALL | re.
 FILE = re.compile(r"# ([\w./-]+\.(?:csv|py|toml|yml))\n")
 BY_CI = "python3 -m venv .venv"
 """Begins the two commands of README.md, which `.ci/run` runs."""
+HOLDS = "post.filtered.ERR > 0%"
 
 
 def write_drive(path: Path, first: int = 0) -> None:
@@ -147,7 +151,10 @@ def test_a_page_does_what_it_says(page, here, pytestconfig):
         end = block.end()
         if file := FILE.match(content):
             (here / file[1]).unlink(missing_ok=True)
+            (here / file[1]).parent.mkdir(parents=True, exist_ok=True)
             (here / file[1]).write_text(content)
+            for line in lines_of(content) if language == "yaml" else ():
+                run(here, "bash", "-e", "-c", line)
         elif language == "sh" and not content.startswith(BY_CI):
             said = run(here, "bash", "-eu", "-c", content)
             continue
@@ -163,20 +170,30 @@ def test_a_page_does_what_it_says(page, here, pytestconfig):
         (ROOT / page).write_text(written)
 
 
-def run(folder: Path, *command: str) -> str:
+def lines_of(workflow: str) -> Iterator[str]:
+    """The commands of a workflow of GitHub or GitLab, but those that need either."""
+    content = yaml.safe_load(workflow)
+    jobs = content.get("jobs", content)
+    lines = [line for job in jobs.values() for line in job.get("script", ())]
+    lines += [s["run"] for job in jobs.values() for s in job.get("steps", ()) if "run" in s]
+    assert lines
+    yield from (line for line in lines if not line.startswith(("pip install", "gh pr")))
+
+
+def run(folder: Path, *command: str, code: int = 0, **more: str) -> str:
     """Run a command where everything lies; return what it prints."""
     plain = {"COLUMNS": "80", "NO_COLOR": "1", "TERM": "dumb", "MPLBACKEND": "agg"}
     path = f"{ROADEVAL.parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         command,
         cwd=folder,
-        env={**os.environ, **plain, "PATH": path},
+        env={**os.environ, **plain, **more, "PATH": path},
         capture_output=True,
         text=True,
         check=False,
         timeout=300,
     )
-    assert done.returncode == 0, f"{command[-1]}\n{done.stdout}\n{done.stderr}"
+    assert done.returncode == code, f"{command[-1]}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
 
@@ -189,6 +206,32 @@ def test_the_commands_that_are_not_run_have_these_options(page):
         for line in re.findall(r"^\$ roadeval (.*)$", block["text"], re.MULTILINE):
             name, *words = shlex.split(line, comments=True)
             group.commands[name].make_context(name, words)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "code", "failures"),
+    [("", 0, 0), ("post.filtered.ERR > 99%\npost.filtered.ERR > +9pp", 0, 0), (HOLDS, 4, 1)],
+)
+def test_the_action_judges_every_condition_and_leaves_a_comment(
+    conditions, code, failures, world, tmp_path
+):
+    action = yaml.safe_load((ROOT / ".github/actions/roadeval/action.yml").read_text())
+    install, compare = action["runs"]["steps"]
+    assert install["run"].endswith('"$GITHUB_ACTION_PATH/../../.."')
+    given = {name: about.get("default") for name, about in action["inputs"].items()}
+    given |= {"base": str(world / "old.rrd"), "new": str(world / "new.rrd"), "fail-if": conditions}
+    words = {
+        name: re.sub(r"\$\{\{ inputs\.([\w-]+) \}\}", lambda m: given[m[1]], value)
+        for name, value in compare["env"].items()
+    }
+    summary = tmp_path / "summary.md"
+    shell = ("bash", "--noprofile", "--norc", "-eo", "pipefail", "-c")
+    run(tmp_path, *shell, compare["run"], code=code, GITHUB_STEP_SUMMARY=str(summary), **words)
+    suite = ElementTree.parse(tmp_path / "roadeval.xml").getroot()
+    assert len(suite) == 1 + len(conditions.splitlines())
+    assert suite.get("failures") == str(failures)
+    assert summary.read_text() == (tmp_path / "roadeval.md").read_text()
+    assert summary.read_text().startswith("## roadeval comparison")
 
 
 def test_every_page_of_the_site_begins_with_an_example():

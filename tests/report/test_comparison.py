@@ -17,7 +17,7 @@ from roadeval.evaluation.comparison import (
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table, Text
 from roadeval.report.chart import Chart, ChartKind, Series, looks
-from roadeval.report.comparison import document, markdown
+from roadeval.report.comparison import LONGEST, comment, document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
 from tests.evaluation import making
@@ -51,6 +51,17 @@ def over_drive():
     drawn = looks(["base: filtered", "new|er: filtered"])
     series = [Series(name, look, [4.5], [10.0]) for name, look in drawn.items()]
     return [Chart("ERR", ChartKind.LINES, series)]
+
+
+def test_a_comment_of_ten_thousand_masks_still_fits_and_says_that_it_was_cut():
+    whole = comment(a_comparison(), LIMITS)
+    assert whole.startswith("## roadeval comparison\n")
+    assert "left out here" not in whole
+    masks = tuple(replace(CHANGE, variant=f"variant_{number}") for number in range(10_000))
+    cut = comment(making.a_comparison(*masks), LIMITS)
+    assert 65_000 < len(cut) <= LONGEST == 65_536
+    assert cut.endswith("writes all of it.\n")
+    assert FAILED.replace("|", "\\|").replace(">", "\\>") in comment(a_comparison(), LIMITS)
 
 
 def test_markdown_has_exceeded_limits_first_and_names_do_not_break_its_tables():

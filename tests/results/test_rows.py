@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from roadeval.results.over_drives import junit_xml
+from roadeval.results.comparison import junit_xml
+from roadeval.results.over_drives import drive_cases
 from roadeval.results.rows import drive_row, probability_rows
 from tests.results.making import facts_of
 
@@ -23,5 +24,5 @@ def test_a_drive_that_lost_a_part_of_its_log_has_exit_code_3(losses, code):
 @pytest.mark.parametrize(("status", "parts"), [("scored", []), ("unscored", ["skipped"])])
 def test_the_case_of_a_drive_without_a_score_is_skipped(status, parts):
     row = {"drive": "a", "seconds": 1.0, "status": status, "reason": "no truth", "verdict": ""}
-    xml = junit_xml("fleet", [row | {"losses": None}])
+    xml = junit_xml("fleet", drive_cases([row | {"losses": None}]))
     assert [part for part in ("error", "skipped") if f"<{part}" in xml.decode()] == parts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -49,6 +50,18 @@ Outputs = Annotated[
     ),
 ]
 
+Junit = Annotated[
+    Path | None,
+    typer.Option(
+        "--junit",
+        metavar="FILE",
+        help="Write a case for each condition as JUnit's XML, for CI.",
+        readable=False,
+    ),
+]
+SUMMARY: Final = "GITHUB_STEP_SUMMARY"
+"""Names the file that GitHub shows on the page of a job."""
+
 
 def compare(
     results: Results,
@@ -56,6 +69,7 @@ def compare(
     variant: Variants = None,
     fail_if: arguments.Conditions = None,
     output: Outputs = None,
+    junit: Junit = None,
     paper: arguments.PaperSize = "a4",
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
@@ -66,26 +80,30 @@ def compare(
     out. One drive is judged over its frames, several over drives. Results of different drives are
     put side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one
     cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
-    of the smaller one.
+    of the smaller one. Where $GITHUB_STEP_SUMMARY names a file, verdict, table and changed drives
+    are appended to it as Markdown.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs import compare as comparing
     from roadeval.jobs.outputs import holding
 
     size = arguments.paper_of(paper)
-    with holding(*(output or ()), inputs=results):
+    with holding(*(output or ()), *filter(None, [junit]), inputs=results):
         compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
         for path in output or []:
             comparing.write(compared, path, paper=size, inspect=inspect_command)
+        if junit:
+            comparing.write_junit(compared, junit)
+    if place := os.environ.get(SUMMARY):
+        with Path(place).open("a", encoding="utf-8") as file:
+            file.write(comparing.comment(compared))
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:
         screen.show(compared.comparison, compared.judgements, console.results())
     for warning in compared.warnings:
         messages.warning(warning)
-    for sentence in compared.held:
-        messages.error(sentence)
-    return ExitCode.CONDITION_HELD if compared.held else ExitCode.DONE
+    return messages.conditions(compared.held, (), ExitCode.DONE)
 
 
 COMMAND: Final = compare

@@ -74,13 +74,8 @@ def fleet(
     messages.loops_missing()
     for sentence in screen.problems(found):
         messages.warning(sentence)
-    for sentence in (*found.held, *found.unjudged):
-        messages.error(sentence)
-    if found.held:
-        return ExitCode.CONDITION_HELD
-    if found.unjudged:
-        return ExitCode.FAILED
-    return ExitCode.LOSS if found.lost else ExitCode.DONE
+    otherwise = ExitCode.LOSS if found.lost else ExitCode.DONE
+    return messages.conditions(found.held, found.unjudged, otherwise)
 
 
 COMMAND: Final = fleet

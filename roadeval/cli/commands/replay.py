@@ -19,13 +19,15 @@ def replay(
     drive: arguments.Drive,
     *,
     given: Given,
+    fail_if: arguments.Conditions = None,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Replay a log; record, score and plot every step.
 
     Every intermediate goes into a recording for the Rerun viewer. Where the log has truth, each
-    stage is scored against it, with the shadow filter and without.
+    stage is scored against it, with the shadow filter and without. Exit code 4 if a --fail-if
+    condition holds on the drive; 1 if one cannot be judged.
     """
     config = arguments.configuration(given)
     from roadeval.cli.screens import replay as screen
@@ -33,7 +35,7 @@ def replay(
 
     _spare_pandas(config)
     with progress.watched(quiet) as watch:
-        found = run(drive, config, on_progress=watch)
+        found = run(drive, config, fail_if=fail_if or (), on_progress=watch)
     if json:
         console.emit(found.facts.text().rstrip())
     elif not quiet:
@@ -43,7 +45,7 @@ def replay(
     messages.loops_missing()
     for warning in found.warnings:
         messages.warning(warning)
-    return messages.losses(found.losses)
+    return messages.conditions(found.held, found.unjudged, messages.losses(found.losses))
 
 
 def _spare_pandas(config: RunConfig) -> None:

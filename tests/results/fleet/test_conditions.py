@@ -6,7 +6,13 @@ import pytest
 
 from roadeval import Result
 from roadeval.evaluation.comparison import Condition, ConditionError
-from roadeval.results.over_drives import check_conditions, judge_drives, junit_xml
+from roadeval.results.comparison import junit_xml
+from roadeval.results.over_drives import (
+    check_conditions,
+    drive_cases,
+    judge_drives,
+    scores_of,
+)
 from tests.results.fleet.making import fleet_of
 
 
@@ -26,22 +32,26 @@ def test_a_condition_holds_on_the_drives_that_are_above_it(fleet):
     rates = errors(fleet)
     limit = round(100 * sorted(rates.values())[4], 3)
     condition = Condition.parse(f"post.filtered.ERR > {limit}%")
-    found = {each.drive: each.holds for each in judge_drives(fleet.paths[0], [condition], 10)}
+    found = {
+        each.drive: each.holds for each in judge_drives(scores_of(fleet.paths[0]), [condition], 10)
+    }
     assert found == {drive: 100 * rate > limit for drive, rate in rates.items()}
     assert {*found.values()} == {True, False}
 
 
 def test_a_drive_of_few_frames_is_not_judged(fleet):
     condition = Condition.parse("post.filtered.ERR > 0%")
-    found = [*judge_drives(fleet.paths[0], [condition], 1000)]
+    found = [*judge_drives(scores_of(fleet.paths[0]), [condition], 1000)]
     assert [each.holds for each in found] == [None] * len(errors(fleet))
     assert "1000 are needed" in found[0].sentence
 
 
 def test_a_mask_that_is_not_there_is_named_with_those_that_are(fleet):
     condition = Condition.parse("post.nobody.ERR > 0%")
-    with pytest.raises(ConditionError, match=r"no drive has a mask post\.nobody; .*post\.filtered"):
-        [*judge_drives(fleet.paths[0], [condition], 10)]
+    with pytest.raises(
+        ConditionError, match=r"nothing scored is called post\.nobody; .*post\.filtered"
+    ):
+        [*judge_drives(scores_of(fleet.paths[0]), [condition], 10)]
 
 
 def test_a_change_has_no_base():
@@ -52,8 +62,8 @@ def test_a_change_has_no_base():
 def test_a_condition_that_holds_is_a_failed_case(fleet):
     every = Condition.parse("post.filtered.ERR >= 0%")
     none = Condition.parse("post.filtered.ERR > 100%")
-    judged = [*judge_drives(fleet.paths[0], [every, none], 10)]
-    suite = ElementTree.fromstring(junit_xml("monday", (), judged))
+    judged = [*judge_drives(scores_of(fleet.paths[0]), [every, none], 10)]
+    suite = ElementTree.fromstring(junit_xml("monday", drive_cases((), judged)))
     assert suite.get("failures") == str(len(errors(fleet)))
     assert suite.get("tests") == str(2 * len(errors(fleet)))
     failed = {case.get("classname") for case in suite if case.find("failure") is not None}
