@@ -50,7 +50,7 @@ def _linked(link: re.Match[str], origin: Path, here: Path) -> str:
     picture, words, target, place = link.groups(default="")
     path = Path(os.path.normpath(origin / target))
     path = PAGES.get(path, path)
-    if picture or path.is_relative_to(DOCS):
+    if picture or (path.suffix == ".md" and path.is_relative_to(DOCS)):
         return f"{picture}[{words}]({os.path.relpath(path, here)}{place})"
     return words
 
