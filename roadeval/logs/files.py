@@ -220,6 +220,11 @@ def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
     return in_order, [times[file] for file in in_order]
 
 
+def of_ids(labels: Sequence[Path]) -> Sequence[Path]:
+    """Return the label images of classes' ids where Cityscapes has others beside them; else all."""
+    return [label for label in labels if label.stem.endswith("_labelIds")] or labels
+
+
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
     """Find for each label the image of its name, as it is or as `bare`."""
     exact, loose = ({name(image): image for image in images} for name in (_stem, bare))

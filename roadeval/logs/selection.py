@@ -138,7 +138,7 @@ def settle(
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
     """Refuse, as a `LogError`, a topic of whose sampled messages none can be decoded."""
-    for picture in samples(reader):
+    for _, picture in samples(reader):
         with suppress(BadMessage):
             to_rgb(picture, reader.limits)
             return

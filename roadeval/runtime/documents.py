@@ -35,6 +35,7 @@ DOTS: Final = 2_000
 def read_bounded(path: Path, most: int = BYTES) -> bytes:
     """Return the bytes of a document; an OSError if it is no file, a ValueError if too large."""
     check_input(path)
+    _check_size(path.stat().st_size, most)
     with path.open("rb") as file:
         content = file.read(most + 1)
     _check_size(len(content), most)

@@ -61,15 +61,15 @@ def check_input(path: str | Path) -> None:
 
 def check_output(path: Path, *, folder: bool = False) -> None:
     """Raise an OSError if no file, or folder, can be written under a name."""
-    if "\0" in str(path):
-        raise OSError(errno.EINVAL, "its name has a null character", str(path))
-    with suppress(FileNotFoundError):
-        own_name(path).lstat()  # it is longer, and may be too long
     with suppress(FileNotFoundError):
         _check_kind(path, "a folder" if folder else "a file", "; name another")
+    with suppress(FileNotFoundError):
+        own_name(path).lstat()  # it is longer, and may be too long
 
 
 def _check_kind(path: Path, wanted: str, advice: str) -> None:
+    if "\0" in str(path):
+        raise OSError(errno.EINVAL, "its name has a null character", str(path))
     mode = stat.S_IFMT(path.stat().st_mode)
     kind = _KINDS.get(mode, "a device")
     if kind != wanted:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Sequence
 from functools import cache, partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
-from xml.etree.ElementTree import ParseError, fromstring
+from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
-from roadeval.images import Limits
+from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.files import IMAGES, listed
+from roadeval.logs.files import IMAGES, listed, natural, of_ids
 from roadeval.logs.messages.pictures import Picture, RawPicture
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, Drawn, Size
@@ -27,7 +28,7 @@ VALUES: Final = 20_000_000
 """Numbers and texts in it."""
 _TRIED: Final = 8
 """Files of an ending, of a folder, that are tried for a format."""
-_NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError)
+_NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
 """What a reader raises for a file that is not as its format asks."""
 
 
@@ -35,7 +36,8 @@ def labels_in(path: Path, size: Size | None) -> LabelSet:
     """List the labels in a folder or a file.
 
     In a folder, files of an annotation tool come before images: these may be the ones that were
-    annotated. A folder without any of both is searched with all below it.
+    annotated. A folder without any of both, or with lists of names alone, is searched with all
+    below it.
 
     Parameters
     ----------
@@ -52,17 +54,27 @@ def labels_in(path: Path, size: Size | None) -> LabelSet:
     if path.is_file() and path.suffix.lower() not in _readers():
         known = ", ".join(sorted({each.name for own in _readers().values() for each in own}))
         raise LogError(f"{path}: no file of labels; known are folders of images, and {known}")
-    files = [path] if path.is_file() else listed(path, IMAGES | {NPY} | _readers().keys())
+    endings = IMAGES | {NPY} | _readers().keys()
+    files = [path] if path.is_file() else listed(path, endings)
+    if (found := _labels_of(files, path, size)) is None and path.is_dir():
+        below = (file for file in path.rglob("*") if file.suffix.lower() in endings)
+        found = _labels_of(sorted(below, key=natural), path, size)
+    if found is None:
+        raise LogError(f"{path}: no label in it that roadeval can read")
+    return found
+
+
+def _labels_of(files: Sequence[Path], path: Path, size: Size | None) -> LabelSet | None:
+    """Return the labels that some files hold, of a folder or alone; None if they hold none."""
     for ending in _readers():
         own = [file for file in files if file.suffix.lower() == ending]
-        for file in own[:_TRIED]:
+        filled = (file for file in own if file.is_file() and file.stat().st_size)
+        for file in islice(filled, _TRIED):
             if (format_ := _format_of(file, alone=path.is_file())) is not None:
                 return _drawn(own, format_, size)
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
-    if not images:
-        raise LogError(f"{path}: no label in it that roadeval can read")
-    by_id = [file for file in images if file.stem.endswith("_labelIds")]  # Cityscapes has others
-    return LabelSet(tuple(map(file_label, by_id or images)), colour_names(path), by_color=True)
+    labels = tuple(map(file_label, of_ids(images)))
+    return LabelSet(labels, colour_names(path), by_color=True) if labels else None
 
 
 @cache
@@ -100,9 +112,10 @@ def _parsed(file: Path) -> Any:
             case ".json":
                 return read_json(content, VALUES, shown=False, most=GREATEST)
             case ".xml":
-                if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-                    raise ValueError("it defines entities, which labels have no use for")
-                return fromstring(content)
+                # Another encoding, 16 bits a letter among them, could hide these words.
+                if any(word in content for word in (b"<!DOCTYPE", b"<!ENTITY", b"\0")):
+                    raise ValueError("it defines entities, or is not in UTF-8")
+                return fromstring(content, XMLParser(encoding="utf-8"))
             case _:
                 return content.decode()
     except OSError as error:
@@ -123,7 +136,7 @@ def _drawn(files: Sequence[Path], format_: LabelFormat, size: Size | None) -> La
                 drawn += format_.read(file, content, size)
             else:
                 others.append(file.name)
-        except LogError as error:
+        except (LogError, ImageError) as error:
             problems[file] = str(error).removeprefix(f"{file}: ")
         except _NOT_SO as error:
             problems[file] = f"not as {format_.name} files are: {type(error).__name__} {error}"

@@ -29,6 +29,17 @@ FARTHEST: Final = 1e6
 """Pixels from the image's corner at which a point may lie."""
 
 
+def _numbers(values: Sequence[float], most: float, wrong: str) -> npt.NDArray[np.float64]:
+    """Return a list of numbers of which none is beyond ``most``; else a `BadMessage`."""
+    try:
+        found = np.asarray(values, np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise BadMessage(wrong) from error
+    if found.ndim != 1 or not (np.abs(found) <= most).all():
+        raise BadMessage(wrong)
+    return found
+
+
 class Outline(NamedTuple):
     """An area inside a ring of points."""
 
@@ -52,10 +63,19 @@ class Outline(NamedTuple):
 
     def _points(self) -> npt.NDArray[np.float64]:
         """Return the ``(n, 2)`` points of the ring, from the centre of the first pixel."""
-        flat = np.asarray(self.ring, np.float64)
-        if flat.ndim != 1 or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
-            raise BadMessage(f"an outline of {self.label} whose points are no pixels")
+        wrong = f"an outline of {self.label} whose points are no pixels"
+        flat = _numbers(self.ring, FARTHEST, wrong)
+        if len(flat) % 2:
+            raise BadMessage(wrong)
         return flat.reshape(-1, 2) - 0.5
+
+    def is_beyond(self, size: Size) -> bool:
+        """Whether it reaches more than a pixel beyond an image; not if it is no outline."""
+        try:
+            points = self._points()
+        except BadMessage:
+            return False
+        return bool(((points < -1.5) | (points > np.add(size, 0.5))).any())
 
 
 def rectangle(label: str, left: float, top: float, right: float, bottom: float) -> Outline:
@@ -76,10 +96,12 @@ class Runs(NamedTuple):
     def fill(self, size: Size) -> Mask:
         """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if the runs do not fit."""
         left, top, width, height = self.box or (0, 0, *size)
-        lengths = np.asarray(self.lengths, np.int64)
-        fits = min(left, top) >= 0 and left + width <= size[0] and top + height <= size[1]
+        wrong = f"a mask of {self.label} that does not fit its image"
+        lengths = _numbers(self.lengths, width * height, wrong).astype(np.int64)
+        fits = min(left, top, width, height) >= 0
+        fits = fits and left + width <= size[0] and top + height <= size[1]
         if not fits or (lengths < 0).any() or lengths.sum() != width * height:
-            raise BadMessage(f"a mask of {self.label} that does not fit its image")
+            raise BadMessage(wrong)
         inside = np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)
         filled = np.zeros(size[::-1], np.bool_)
         filled[top : top + height, left : left + width] = (
@@ -108,12 +130,8 @@ class Drawing:
 
     def is_cut(self) -> bool:
         """Whether an outline reaches more than a pixel beyond the image."""
-        size, rings = self.size, [each.ring for each in self.shapes if isinstance(each, Outline)]
-        return size is not None and any(
-            not -1 <= float(at) <= size[place % 2] + 1
-            for ring in rings
-            for place, at in enumerate(ring)
-        )
+        outlines = [each for each in self.shapes if isinstance(each, Outline)]
+        return self.size is not None and any(each.is_beyond(self.size) for each in outlines)
 
     def content(self) -> bytes:
         """Return all that decides its pixels."""

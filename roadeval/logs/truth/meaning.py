@@ -274,6 +274,8 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
         If no class is named that means road, or one that does not occur.
     """
     classes = origin.classes
+    # A class may be called 7.
+    labels = LabelSettings(tuple(map(str, labels.road)), tuple(map(str, labels.ignore)))
     known = _counted(origin, [each for each in classes if each != UNLABELLED])
     if not labels.road:
         raise LogError(

@@ -99,8 +99,7 @@ class NamedLabels:
 
     def some(self) -> str:
         """Return the names of the first three, for messages."""
-        names = ", ".join(visible(label.path.name) for label in self.labels[:3])
-        return names + (", ..." if len(self.labels) > 3 else "")
+        return _some([label.path for label in self.labels])
 
     def place(self, position: int) -> str:
         """Return a label's path, for messages to people."""
@@ -130,14 +129,26 @@ def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits)
     labels = origin.labels
     named = None if settings.images is None else _images(Path(settings.images))
     by, keys = _keys([label.path for label in labels], settings, named)
+    if named is not None and not keys:
+        theirs, ours = (_some(own) for own in ([label.path for label in labels], named))
+        raise LogError(
+            f"{name}: none of them has the name of an image in {settings.images}: theirs are "
+            f"{theirs}, the images' {ours}; without `truth.images` numbers or stamps pair them"
+        )
     found = sorted((label for label in labels if label.path in keys), key=lambda x: keys[x.path])
     for one, other in pairwise(label.path for label in found):
         if keys[one] == keys[other]:
-            both = f"{visible(one.name)} and {visible(other.name)}"
+            first, second = (one, other) if one.name == other.name else (one.name, other.name)
+            both = f"{visible(str(first))} and {visible(str(second))}"
             raise LogError(f"{name}: {both} belong to the same frame, by {by}")
     in_order = np.array([keys[label.path] for label in found], np.int64)
     nameless, images = len(labels) - len(found), None if named is None else len(named)
     return NamedLabels(visible(name), tuple(found), origin, in_order, by, limits, nameless, images)
+
+
+def _some(files: Sequence[Path]) -> str:
+    names = ", ".join(visible(file.name) for file in files[:3])
+    return names + (", ..." if len(files) > 3 else "")
 
 
 def _keys(
@@ -160,7 +171,10 @@ def _keys(
 def _number(file: Path) -> int:
     found = _LAST_NUMBER.search(bare(file))
     if found is None or len(found[1]) > _DIGITS:
-        raise LogError(f"{file}: its name has no number, so its frame cannot be found")
+        raise LogError(
+            f"{file}: its name has no number, so its frame cannot be found; name the folder of "
+            "the images that the log was made of with `truth.images`"
+        )
     return int(found[1])
 
 

@@ -281,13 +281,9 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
         raise LogError(
-            f"{name}: none of them belongs to a frame by {labels.by}: "
-            + (
-                f"no image of {settings.images} has the name of one ({labels.some()})"
-                if named is not None
-                else f"theirs are {keys[0] + first} to {keys[-1] + first} ({labels.some()}), the "
-                f"frames' {first} to {first + frames - 1}{_help(labels, first)}"
-            )
+            f"{name}: none of them belongs to a frame by {labels.by}: theirs are {keys[0] + first} "
+            f"to {keys[-1] + first} ({labels.some()}), the frames' {first} to "
+            f"{first + frames - 1}{_help(labels, first)}"
         )
     if named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames):
         raise LogError(

@@ -108,13 +108,16 @@ def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameEr
         return error
 
 
-def samples(pictures: PictureSequence) -> Iterator[Picture]:
-    """Read the first pictures, and some spread over the rest, as far as they can be read."""
+def samples(pictures: LabelPictures) -> Iterator[tuple[str, Picture]]:
+    """Read the first pictures, and some spread over the rest, as far as they can be read.
+
+    Each comes with its place.
+    """
     count = len(pictures)
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
     for position in sorted({*range(min(LOOKED_AT, count)), *spread}):
         with suppress(FrameError):
-            yield pictures.picture(position)
+            yield pictures.place(position), pictures.picture(position)
 
 
 def in_log(
@@ -227,10 +230,10 @@ def _meaning(
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
     problem, fractions = "", False
-    for picture in samples(labels):
+    for place, picture in samples(labels):
         try:
             if camera is not None:
-                check_size(labels.name, size_of(picture), camera)
+                check_size(place, size_of(picture), camera)
             if confidence is None:
                 seen += seen_in(picture, wanted, labels.name, labels.limits)
             else:

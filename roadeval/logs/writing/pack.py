@@ -10,7 +10,7 @@ from typing import Final
 
 from roadeval.images import ImageError, Limits, format_of, size_of, to_png
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import IMAGES, images_of, listed, ordered
+from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered
 from roadeval.logs.settings import NS
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.files import check_input
@@ -89,7 +89,7 @@ def pack(
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
-    files, labels = listed(images, IMAGES), listed(masks, IMAGES) if masks else []
+    files, labels = listed(images, IMAGES), _label_images(masks, images) if masks else []
     belong = images_of(labels, files)
     if labels and not belong:
         some = ", ".join(each.name for each in labels[:NAMED])
@@ -112,6 +112,20 @@ def _pack_folder(
         *_unpaired("masks without an image", [label for label in labels if label not in used]),
     )
     return PackResult(output, len(files), len(by_image), words, warnings)
+
+
+def _label_images(masks: Path, images: Path) -> Sequence[Path]:
+    try:
+        if masks.resolve() == images.resolve():
+            raise LogError(f"{masks}: the images themselves")
+        return of_ids(listed(masks, IMAGES))
+    except LogError as error:
+        if not masks.exists():
+            raise
+        raise LogError(
+            f"{error}; labels of an annotation tool are for the packed log: pack without them, "
+            f"then roadeval replay LOG.mcap --truth {masks} --truth-images {images}"
+        ) from error
 
 
 def _unpaired(what: str, files: Sequence[Path]) -> Iterator[str]:

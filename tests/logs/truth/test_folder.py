@@ -25,9 +25,9 @@ def folder(tmp_path, *names):
     return made
 
 
-def opened(path: Path, **settings) -> NamedLabels:
+def opened(path: Path, size=None, **settings) -> NamedLabels:
     return with_keys(
-        labels_in(path, None), str(path), MaskSettings(str(path), **settings), Limits()
+        labels_in(path, size), str(path), MaskSettings(str(path), **settings), Limits()
     )
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import Drawing, Drawn, Outline, Runs, Segments, Shape, Size
 from roadeval.logs.truth.format import LabelFormat
+
+_WIDEST: Final = 60
+"""Bits of a number in a text of runs."""
 
 
 def _holds(_: Path, content: Any) -> bool:
@@ -27,12 +30,12 @@ def _read(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Dr
         size = int(image["width"]), int(image["height"])
         if annotations and "segments_info" in annotations[0]:
             for each in annotations:
-                segments = {s["id"]: names[s["category_id"]] for s in each["segments_info"]}
+                segments = {int(s["id"]): names[s["category_id"]] for s in each["segments_info"]}
                 file = _picture(path, each["file_name"])
-                yield Segments(image["file_name"], size, file, segments)
+                yield Segments(str(image["file_name"]), size, file, segments)
         else:
             shapes = [s for each in annotations for s in _shapes(each, names[each["category_id"]])]
-            yield Drawing(image["file_name"], size, shapes)
+            yield Drawing(str(image["file_name"]), size, shapes)
     if own:
         raise LogError(f"{path}: annotations are of image {next(iter(own))}, which is not listed")
 
@@ -59,7 +62,7 @@ def lengths_in(text: str) -> Sequence[int]:
         code = letter - 48
         value |= (code & 31) << shift
         shift += 5
-        if code & 32:
+        if code & 32 and shift < _WIDEST:
             continue
         if code & 16:
             value -= 1 << shift

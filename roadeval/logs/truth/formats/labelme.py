@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from roadeval.images import Limits, to_rgb
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Outline, Shape, Size, rectangle
+from roadeval.logs.truth.drawn import Drawing, Outline, Runs, Shape, Size, rectangle
 from roadeval.logs.truth.format import LabelFormat
 
 NO_AREAS = ("point", "points", "line", "linestrip")
@@ -34,6 +38,12 @@ def _shape(shape: Mapping[str, Any], path: Path) -> Shape:
             return rectangle(label, *points)
         case (("polygon" | "rotation" | "rectangle"), _):
             return Outline(label, points)
+        case "mask", 4:
+            pixels = to_rgb(b64decode(shape["mask"]), Limits())[..., 0] > 0
+            height, width = pixels.shape
+            changes = np.flatnonzero(np.diff(pixels.ravel(), prepend=False))
+            lengths = np.diff(changes, prepend=0, append=pixels.size).tolist()
+            return Runs(label, lengths, (int(points[0]), int(points[1]), width, height))
         case other, _:
             raise LogError(f"{path}: it holds a shape ({other}) that roadeval does not read")
 

@@ -24,7 +24,8 @@ def _read(path: Path, content: Mapping[str, Any], size: Size | None) -> Iterator
             for polygon in each["object_data"].get("poly2d", ()):
                 if polygon.get("mode", "MODE_POLY2D_ABSOLUTE") != "MODE_POLY2D_ABSOLUTE":
                     raise LogError(f"{path}: polygons of {polygon['mode']}, not of absolute points")
-                shapes.append(Outline(types[key], polygon["val"]))
+                if polygon.get("closed", True):
+                    shapes.append(Outline(types[key], polygon["val"]))
         yield Drawing(str(int(number)), size, shapes)
 
 

@@ -13,7 +13,9 @@ from roadeval.logs.truth.drawn import Drawing, Outline, Shape, Size
 from roadeval.logs.truth.format import LabelFormat
 from roadeval.runtime.documents import read_bounded
 
-_LINE: Final = re.compile(r"\d+( +-?[\d.eE+-]+){4,}\s*")
+_LINE: Final = re.compile(r"\d+( +[-+.\deE]+){4,}\s*")
+_NAMES: Final = 1 << 20
+"""Bytes of a file with the names of classes."""
 _LISTS: Final = ("classes.txt", "obj.names", "labels.txt")
 """Files with the name of a class in each line."""
 
@@ -45,7 +47,7 @@ def _names(folder: Path) -> Mapping[int, str]:
                 return found
         for name in _LISTS:
             if (place / name).is_file():
-                return dict(enumerate(read_bounded(place / name).decode().split("\n")))
+                return dict(enumerate(read_bounded(place / name, _NAMES).decode().splitlines()))
     return {}
 
 
@@ -54,12 +56,13 @@ def _names_in(file: Path) -> Mapping[int, str]:
     import yaml
 
     try:
-        content: Any = yaml.safe_load(read_bounded(file))
-    except (yaml.YAMLError, RecursionError, ValueError):
+        content: Any = yaml.safe_load(read_bounded(file, _NAMES))
+    except (yaml.YAMLError, RecursionError, ValueError, OSError):
         return {}
     names = content.get("names") if isinstance(content, dict) else None
     pairs = enumerate(names) if isinstance(names, list) else (names or {}).items()
-    return {int(number): str(name) for number, name in pairs}
+    # A text of all else could be longer than any memory: YAML repeats by reference.
+    return {int(number): name for number, name in pairs if isinstance(name, str)}
 
 
 FORMAT = LabelFormat("YOLO segmentation", ".txt", _holds, _read)

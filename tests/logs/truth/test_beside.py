@@ -1,0 +1,519 @@
+"""Labels beside the log that do not fit, or cannot be read: each is refused, or counted."""
+
+import json
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import cv2
+import numpy as np
+import pytest
+
+from roadeval.images import Limits
+from roadeval.logs import (
+    LabelPlace,
+    LabelSettings,
+    LogConfig,
+    LogError,
+    LogWriter,
+    TopicSettings,
+    open_log,
+)
+from roadeval.logs.errors import FrameError
+from roadeval.logs.truth.beside import GREATEST, labels_in
+from roadeval.logs.truth.formats.coco import lengths_in
+from tests.e2e.commands import here
+from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
+from tests.logs.truth.test_folder import opened
+from tests.logs.truth.test_formats import LABELS, SIZE
+
+FRAMES = 6
+START = 1_700_000_000 * 10**9
+STEP = 10**8
+LOWER = np.zeros((32, 48), np.uint8)
+LOWER[16:] = 255
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("drive") / "drive.mcap"
+    with LogWriter(path) as writer:
+        for number in range(FRAMES):
+            noise = np.random.default_rng(number).integers(0, 256, (32, 48, 3), np.uint8)
+            writer.image("/camera", START + number * STEP, png(noise), "png")
+    return path
+
+
+def images(folder: Path, *names: str, pixels=LOWER) -> Path:
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        cv2.imwrite(str(folder / name), pixels)
+    return folder
+
+
+def select(drive: Path, path: Path, road: str = "", *, resize: bool = False, **place: Any) -> Any:
+    config = LogConfig(
+        truth=LabelPlace(str(path), **place),
+        labels=LabelSettings(road=(road,) if road else ()),
+        topics=TopicSettings(resize_truth=resize),
+    )
+    with open_log(drive, config) as log:
+        selection = log.select()
+        frames = list(log.frames(selection))
+        return selection, [frame.number for frame in frames if frame.labelled], frames
+
+
+def refusal(*given: Any, **place: Any) -> str:
+    with pytest.raises(LogError) as caught:
+        select(*given, **place)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def replay(drive: Path, path: Path, *words: Any):
+    """Score masks, which learn nothing, against truth beside the log."""
+    folder = images(path.parent / "net", *(f"{number}.png" for number in range(FRAMES)))
+    out = path.parent / "reports"
+    run = here(
+        *("replay", drive, "--truth", path, "--masks", f"net={folder}", "--only", "net", "-q"),
+        *("--record", "none", "--reports", out, *words),
+    )
+    summary = out / "summary.json"
+    return run, json.loads(summary.read_text()) if summary.exists() else {}
+
+
+# --- Names ----------------------------------------------------------------------------------------
+
+
+def test_numbers_from_one_are_refused_with_the_setting_that_shifts_them(drive, tmp_path):
+    path = images(tmp_path / "truth", *(f"{number}.png" for number in range(1, FRAMES + 1)))
+    message = refusal(drive, path)
+    assert "its numbers are 1 to 6, and the frames' 0 to 5" in message
+    assert message.endswith("set `truth.first` to 1")
+    assert select(drive, path, first=1)[1] == [*range(FRAMES)]
+
+
+def test_numbers_of_no_frame_are_refused_with_three_of_them(drive, tmp_path):
+    path = images(tmp_path / "truth", *(f"x{number}.png" for number in range(100, 200, 20)))
+    message = refusal(drive, path)
+    assert "by number: theirs are 100 to 180 (x100.png, x120.png, x140.png, ...)" in message
+    assert "the frames' 0 to 5: name the folder" in message
+    assert message.endswith("with `truth.images`")
+
+
+def test_stamps_of_no_frame_are_refused_with_three_of_each(drive, tmp_path):
+    stamps = [START - 10**12 + number * STEP for number in range(FRAMES)]
+    message = refusal(drive, images(tmp_path / "truth", *(f"{stamp}.png" for stamp in stamps)))
+    for first in (stamps[0], START):
+        assert ", ".join(str(first + number * STEP) for number in range(3)) + ", ..." in message
+    assert "`topics.sync_tolerance_ms`" in message
+    assert "`truth.pair`" in message
+
+
+def test_names_of_no_image_are_refused_with_three_of_each(drive, tmp_path):
+    named = images(tmp_path / "images", *(f"a{letter}.png" for letter in "uvwxyz"))
+    path = images(tmp_path / "truth", *(f"b{letter}.png" for letter in "uvwx"))
+    message = refusal(drive, path, images=str(named))
+    assert "theirs are bu.png, bv.png, bw.png, ..., the images' au.png, av.png, aw.png" in message
+    assert "without `truth.images`" in message
+
+
+def test_a_name_without_a_number_is_refused_with_the_setting_that_takes_names(drive, tmp_path):
+    message = refusal(drive, images(tmp_path / "truth", "road.png"))
+    assert "road.png: its name has no number" in message
+    assert message.endswith("with `truth.images`")
+
+
+def test_names_pair_labels_whatever_their_order(drive, tmp_path):
+    """Swapped names are swapped labels: what the names say is believed, and nothing else."""
+    letters = "uvwxyz"
+    named = images(tmp_path / "images", *(f"{letter}.png" for letter in letters))
+    path = tmp_path / "truth"
+    for number, letter in enumerate(reversed(letters)):
+        images(path, f"{letter}_mask.png", pixels=np.full((32, 48), 255 * (number < 2), np.uint8))
+    _, labelled, frames = select(drive, path, images=str(named))
+    assert labelled == [*range(FRAMES)]
+    assert [int(frame.decode().truth.max()) for frame in frames] == [0, 0, 0, 0, 1, 1]
+
+
+def test_two_labels_of_one_frame_are_refused_by_name(drive, tmp_path):
+    message = refusal(drive, images(tmp_path / "truth", "a_1.png", "b_1.png"))
+    assert message.endswith("a_1.png and b_1.png belong to the same frame, by number")
+    (tmp_path / "two").mkdir()
+    for part in ("a", "b"):
+        images(tmp_path / "two" / part, "1.png")
+    message = refusal(drive, tmp_path / "two")
+    assert all(str(tmp_path / "two" / part / "1.png") in message for part in ("a", "b"))
+
+
+def test_half_of_the_labels_are_half_of_the_frames(drive, tmp_path):
+    path = images(tmp_path / "truth", "1.png", "3.png", "5.png")
+    run, summary = replay(drive, path)
+    assert run.returncode == 0
+    assert summary["frames"]["evaluated"] == 3
+    assert summary["frames"]["skipped"] == {"unlabelled": 3}
+
+
+# --- Sizes and damage -----------------------------------------------------------------------------
+
+
+def test_another_size_is_refused_or_scaled(drive, tmp_path):
+    path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
+    images(path, "3.png", pixels=LOWER[::2, ::2])
+    assert refusal(drive, path).endswith(
+        "3.png is 24x16, but /camera is 48x32: scale the labels with `topics.resize_truth`"
+    )
+    _, _, frames = select(drive, path, resize=True)
+    np.testing.assert_array_equal(frames[3].decode().truth, frames[2].decode().truth)
+
+
+def test_a_damaged_file_among_many_loses_its_frame(drive, tmp_path):
+    path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
+    whole = (path / "3.png").read_bytes()
+    (path / "3.png").write_bytes(whole[:50])
+    run, summary = replay(drive, path)
+    assert run.returncode == 3
+    assert f"lost: frame 3: {path / '3.png'}: " in run.stderr
+    assert summary["frames"]["skipped"] == {"undecodable": 1}
+
+
+def test_a_damaged_annotation_file_among_many_loses_its_frame(drive, tmp_path):
+    path = shutil.copytree(LABELS / "labelme", tmp_path / "truth")
+    (path / "frame_0001.json").write_text('{"shapes": [')
+    run, summary = replay(drive, path, "--road-label", "road")
+    assert run.returncode == 3
+    assert "lost: frame 1: " in run.stderr
+    assert "frame_0001.json: cannot be read as labels: " in run.stderr
+    assert summary["frames"]["evaluated"] == 2
+
+
+@pytest.mark.parametrize("name", ["1.png", "1.npy", "a.json", "a.xml", "1.txt"])
+def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
+    path = tmp_path / "truth"
+    path.mkdir()
+    (path / name).write_bytes(b"\x89no label\xff")
+    run, _ = replay(drive, path, "--road-label", "1")
+    assert run.returncode == 1
+    assert len(run.stderr.splitlines()) == 1
+    assert run.stderr.startswith("roadeval: error: ")
+
+
+def test_an_empty_folder_is_refused(drive, tmp_path):
+    assert "no image in it" in refusal(drive, images(tmp_path / "truth"))
+    assert "no such folder" in refusal(drive, tmp_path / "nowhere")
+
+
+def test_a_note_beside_label_images_is_no_label(drive, tmp_path):
+    path = images(tmp_path / "truth", "1.png")
+    (path / "notes.txt").touch()
+    (path / "about.json").write_text('{"by": "us"}')
+    assert select(drive, path)[1] == [1]
+
+
+@pytest.mark.parametrize("list_", ["classes.txt", "labelmap.txt"])
+def test_labels_lie_below_a_list_of_names(drive, tmp_path, list_):
+    """As Label Studio and CVAT export them."""
+    path = tmp_path / "export"
+    if list_ == "classes.txt":
+        shutil.copytree(LABELS / "yolo" / "labels", path / "labels")
+        images(path / "images", "frame_0000.png")
+        (path / list_).write_text("road\ncar\nego\n")
+    else:
+        shutil.copytree(LABELS / "masks", path)
+    assert select(drive, path, "road")[1] == [0, 1, 3]
+
+
+# --- Annotation tools' files ----------------------------------------------------------------------
+
+
+def written(path: Path, name: str, content: Any) -> Path:
+    path.mkdir(exist_ok=True)
+    (path / name).write_text(content if isinstance(content, str) else json.dumps(content))
+    return path / name
+
+
+def coco(segmentation: Any, **image: Any) -> dict[str, Any]:
+    return {
+        "images": [{"id": 1, "file_name": "1.png", "width": 48, "height": 32} | image],
+        "categories": [{"id": 1, "name": "road"}],
+        "annotations": [{"image_id": 1, "category_id": 1, "segmentation": segmentation}],
+    }
+
+
+SQUARE = [[10, 10, 20, 10, 20, 20, 10, 20]]
+
+
+def test_an_outline_beyond_the_image_is_cut_and_counted(drive, tmp_path):
+    path = written(tmp_path / "truth", "a.json", coco([[-8, 16, 60, 16, 60, 90, -8, 90]]))
+    selection, _, frames = select(drive, path, "road")
+    assert selection.truth.notes == (
+        "1 of 1 labels reach beyond their image, and are cut at its edge: 1.png",
+    )
+    np.testing.assert_array_equal(frames[1].decode().truth, LOWER == 255)
+    near = written(tmp_path / "truth", "b.json", coco([[-1, 16, 49, 16, 49, 33, -1, 33]]))
+    assert select(drive, near, "road")[0].truth.notes == ()
+
+
+WRONG = {
+    "a number that is none": coco([[10, 10, float("nan"), 10, 20, 20]]),
+    "an endless one": coco([[10, 10, float("inf"), 10, 20, 20]]),
+    "1e300": coco([[10, 10, 1e300, 10, 20, 20]]),
+    "a text": coco([[10, 10, "x", 10, 20, 20]]),
+    "an odd number of numbers": coco([[10, 10, 20, 10, 20]]),
+    "lists in it": coco([[[10, 10], [20, 10], [20, 20]]]),
+    "no list": coco([7]),
+    "runs that are too short": coco({"counts": [10, 20], "size": [32, 48]}),
+    "runs that are too long": coco({"counts": [10, 48 * 32], "size": [32, 48]}),
+    "negative runs": coco({"counts": [-10, 48 * 32 + 10], "size": [32, 48]}),
+    "runs that add up by overflow": coco({"counts": [2**63 - 1, 2**63 - 1, 48 * 32 + 2]}),
+    "runs of texts": coco({"counts": ["a", "b"]}),
+    "a text that is no runs": coco({"counts": "~~~"}),
+    "a text that never ends": coco({"counts": "o" * 300_000}),
+    "a text of other letters": coco({"counts": "\u20ac!"}),
+    "a huge image": coco(SQUARE, width=10**9, height=10**9),
+    "a negative one": coco(SQUARE, width=-48),
+    "none": coco(SQUARE, width=0),
+    "an endless one's width": coco(SQUARE, width=float("inf")),
+    "a width in letters": coco(SQUARE, width="wide"),
+    "no width": coco(SQUARE, width=None),
+    "a list": [],
+    "no images": {"images": 3, "annotations": [], "categories": []},
+    "a class that is not listed": coco(SQUARE) | {"categories": []},
+    "an image that is not listed": coco(SQUARE) | {"images": []},
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_cannot_be_drawn_is_one_line(drive, tmp_path, what):
+    began = time.perf_counter()
+    path = written(tmp_path / "truth", "a.json", WRONG[what])
+    run, _ = replay(drive, path, "--road-label", "road")
+    assert run.returncode == 1, run.stderr
+    assert len(run.stderr.splitlines()) == 1
+    assert str(path) in run.stderr
+    assert time.perf_counter() - began < 20
+
+
+def test_what_cannot_be_drawn_loses_its_frame_alone(drive, tmp_path):
+    content = json.loads((LABELS / "coco" / "labelformat.json").read_text())
+    content["annotations"][0]["segmentation"][0][0] = float("nan")
+    content["images"][3]["width"] = 10**9
+    run, summary = replay(drive, written(tmp_path / "t", "a.json", content), "--road-label", "road")
+    assert run.returncode == 3
+    assert "frame 0: frame_0000.png: an outline of road whose points are no pixels" in run.stderr
+    assert "frame 3: frame_0003.png: an image of 1000000000x32, more than" in run.stderr
+    assert summary["frames"]["evaluated"] == 1
+
+
+def replaced(content: Any, value: Any):
+    """Yield the content with each of its parts in turn replaced by a value."""
+    yield value
+    parts = content.items() if isinstance(content, dict) else ()
+    parts = enumerate(content[:2]) if isinstance(content, list) else parts
+    for key, part in parts:
+        for other in replaced(part, value):
+            changed = content.copy()
+            changed[key] = other
+            yield changed
+
+
+def look(path: Path) -> None:
+    """Read all labels that can be read; anything but a known error of one line fails the test."""
+    errors = []
+    try:
+        labels = opened(path, SIZE)
+        _ = labels.digest
+        for position in range(len(labels)):
+            try:
+                labels.picture(position)
+            except FrameError as error:
+                errors.append(error)
+    except LogError as error:
+        errors.append(error)
+    assert not any("\n" in str(error) for error in errors)
+
+
+@pytest.mark.parametrize("value", [None, -1, 1e300, "\0", [], {"a": 1}], ids=repr)
+@pytest.mark.parametrize(
+    "path",
+    [
+        "coco/pycocotools.json",
+        "labelme/frame_0001.json",
+        "label_studio/tasks.json",
+        "label_studio/min.json",
+        "openlabel/openlabel.json",
+        "panoptic/panoptic_drive.json",
+    ],
+)
+def test_any_part_may_be_something_else(tmp_path, path, value):
+    content = json.loads((LABELS / path).read_text())
+    if path.startswith("panoptic"):
+        shutil.copytree(LABELS / "panoptic" / "panoptic_drive", tmp_path / "frame_0001")
+    for changed in replaced(content, value):
+        look(written(tmp_path, "frame_0001.json", changed))
+
+
+@pytest.mark.parametrize("value", ["", "x", "-1", "1e300", "nan", "9" * 5000, "1,2;3", "1,2,3;4"])
+def test_any_attribute_may_be_something_else(tmp_path, value):
+    names = {"annotations.xml": range(12), "boxed.xml": range(4)}
+    for name, places in names.items():
+        for place in places:
+            tree = ElementTree.parse(LABELS / "cvat" / name)
+            element = [*tree.iter()][-place]
+            for key in list(element.attrib):
+                before = element.attrib[key]
+                element.attrib[key] = value
+                tree.write(tmp_path / "1.xml")
+                look(tmp_path / "1.xml")
+                element.attrib[key] = before
+
+
+def quickly(refused: Callable[[], object]) -> None:
+    began = time.perf_counter()
+    with pytest.raises(LogError) as caught:
+        refused()
+    assert "\n" not in str(caught.value)
+    assert time.perf_counter() - began < 10
+
+
+LAUGHS = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10 if n else "ha"}">' for n in range(12))
+ENTITIES = f"<!DOCTYPE a [{LAUGHS}]><annotations>&l11;</annotations>"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        ENTITIES.encode(),
+        ENTITIES.encode("utf-16"),
+        b'<?xml version="1.0" encoding="cp037"?>' + ENTITIES.encode("cp037"),
+        b"<annotations>" + b"<a>" * 100_000 + b"</a>" * 100_000 + b"</annotations>",
+    ],
+    ids=["entities", "in 16 bits", "in EBCDIC", "deep"],
+)
+def test_xml_that_would_grow_is_refused(tmp_path, content):
+    (tmp_path / "1.xml").write_bytes(content)
+    quickly(lambda: labels_in(tmp_path / "1.xml", SIZE))
+
+
+def test_json_that_nests_deep_or_is_too_large_is_refused(tmp_path):
+    (tmp_path / "deep.json").write_text("[" * 100_000 + "]" * 100_000)
+    quickly(lambda: labels_in(tmp_path / "deep.json", SIZE))
+    with (tmp_path / "large.json").open("wb") as file:
+        file.truncate(300 << 20)
+    with pytest.raises(LogError, match=f"314,572,800 bytes, and at most {GREATEST:,} are read"):
+        labels_in(tmp_path / "large.json", SIZE)
+
+
+def test_a_line_of_yolo_is_read_in_a_time_that_grows_with_its_length(tmp_path):
+    (tmp_path / "1.txt").write_text("0" + " -1" * 5000 + " x")
+    quickly(lambda: labels_in(tmp_path / "1.txt", SIZE))
+
+
+def test_names_of_yolo_are_texts(tmp_path):
+    """YAML repeats by reference: as a text, the first name would have 10 ** 11 letters."""
+    (tmp_path / "1.txt").write_text("0 .1 .1 .5 .1 .5 .5\n1 .1 .1 .5 .1 .5 .5")
+    nested = [f"l{n}: &l{n} [{', '.join([f'*l{n - 1}' if n else 'ha'] * 10)}]" for n in range(11)]
+    (tmp_path / "data.yaml").write_text("\n".join([*nested, "names: {0: *l10, 1: road}"]))
+    assert {*labels_in(tmp_path / "1.txt", SIZE).classes} == {"0", "road"}
+
+
+def test_a_class_may_be_called_by_a_number(drive, tmp_path):
+    path = written(tmp_path / "truth", "1.txt", "7 .1 .1 .5 .1 .5 .5")
+    run, summary = replay(drive, path, "--road-label", "7")
+    assert run.returncode == 0, run.stderr
+    assert summary["frames"]["evaluated"] == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("1.txt", "0 .5 .5 .2 .2", "boxes, as for detection"),
+        ("a.xml", "<annotations><track/></annotations>", "tracks of a video"),
+        (
+            "a.xml",
+            '<annotations><image name="1.png" width="48" height="32"><ellipse label="a"/></image>'
+            "</annotations>",
+            r"it holds a shape \(ellipse\)",
+        ),
+        ("a.json", {"shapes": [], "imageWidth": 4, "imageHeight": 4}, "LabelMe without a shape"),
+    ],
+)
+def test_what_a_format_has_and_nobody_reads_is_said(tmp_path, name, content, reason):
+    with pytest.raises(LogError, match=reason):
+        labels_in(written(tmp_path / "truth", name, content), SIZE)
+
+
+def test_areas_of_a_brush_are_said_to_be_unread(tmp_path):
+    content = json.loads((LABELS / "label_studio" / "tasks.json").read_text())
+    # The value as label-studio-sdk's `brush.image2annotation` makes it.
+    content[0]["annotations"][0]["result"][0]["value"] = {
+        "rle": [0, 0, 24, 0, 57, 27, 255, 9, 55, 0],
+        "format": "rle",
+        "brushlabels": ["car"],
+    }
+    with pytest.raises(LogError, match=r"it holds brushlabels, .*; export masks as PNG"):
+        labels_in(written(tmp_path / "truth", "a.json", content), SIZE)
+
+
+def test_a_line_of_openlabel_is_no_area(tmp_path):
+    content = json.loads((LABELS / "openlabel" / "openlabel.json").read_text())
+    polygons = content["openlabel"]["frames"]["1"]["objects"]["0"]["object_data"]["poly2d"]
+    polygons[0]["closed"] = False
+    found = opened(written(tmp_path / "truth", "a.json", content), SIZE)
+    assert found.log_times.tolist() == [0, 3]
+
+
+def test_a_long_text_of_runs_is_read_in_a_time_that_grows_with_its_length():
+    began = time.perf_counter()
+    assert len(lengths_in("o" * 1_000_000)) > 1000
+    assert time.perf_counter() - began < 10
+
+
+def test_the_limit_on_pixels_holds_before_anything_is_drawn(tmp_path):
+    path = written(tmp_path / "truth", "a.json", coco(SQUARE, width=40_000, height=40_000))
+    found = opened(path)
+    with pytest.raises(FrameError, match="an image of 40000x40000, more than"):
+        found.picture(0)
+    assert Limits().max_pixels < 40_000**2
+
+
+# --- Another log ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory) -> tuple[Path, Path]:
+    """A log of two cameras, and a log of truth of the left one."""
+    folder = tmp_path_factory.mktemp("rig")
+    stamps = [START + number * STEP for number in range(FRAMES)]
+    cameras, labels = [], []
+    for stamp in stamps:
+        for side in ("left", "right"):
+            own = compressed(stamp, jpeg(grey(90)))
+            own["header"]["frame_id"] = f"cam_{side}"
+            cameras.append((f"/{side}/image", stamp, own))
+        mask = grey(0)
+        mask[3:] = 255
+        own = raw(stamp, mask, "mono8")
+        own["header"]["frame_id"] = "cam_left"
+        labels += [("/left/labels", stamp, own), ("/labels", stamp, own)]
+    rig = ros2_log(folder / "rig.mcap", cameras)
+    by_path = ros2_log(folder / "path.mcap", labels[::2])
+    by_id = ros2_log(folder / "id.mcap", labels[1::2])
+    return rig, by_path, by_id
+
+
+@pytest.mark.parametrize(("which", "topic"), [(1, "/left/labels"), (2, "/labels")])
+def test_truth_of_another_camera_is_refused_unless_its_topic_is_named(rig, which, topic):
+    def select_of(side, path):
+        topics = TopicSettings(image=f"/{side}/image")
+        with open_log(rig[0], LogConfig(topics=topics, truth=LabelPlace(path))) as log:
+            return log.select().truth.where
+
+    path = str(rig[which])
+    assert select_of("left", path).startswith(f"{topic} of ")
+    with pytest.raises(LogError, match=f"{topic} belongs to another camera than /right/image, by"):
+        select_of("right", path)
+    assert select_of("right", f"{path}:{topic}").startswith(f"{topic} of ")

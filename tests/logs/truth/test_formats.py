@@ -1,0 +1,276 @@
+"""Files of annotation tools give the pixels that independent implementations give."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+from pycocotools import mask as coco
+from skimage.draw import polygon2mask
+
+from roadeval.images import Limits
+from roadeval.logs import LabelSettings, LogError
+from roadeval.logs.truth.beside import labels_in
+from roadeval.logs.truth.drawn import UNLABELLED, Outline, Runs
+from roadeval.logs.truth.meaning import of_classes
+from tests.logs.truth.test_folder import opened
+
+LABELS = Path(__file__).parents[2] / "fixtures" / "labels"
+SIZE = WIDTH, HEIGHT = 48, 32
+POINTS = {
+    "road": [(4.3, 31.7), (18.6, 10.4), (29.7, 10.9), (44.1, 31.2), (25.2, 24.6)],
+    "car": [(20.2, 13.3), (31.4, 13.7), (30.8, 22.2), (21.1, 21.9)],
+    "ego": [(-6.4, 27.3), (24.5, 26.1), (52.7, 28.8), (52.2, 37.6), (-6.1, 37.3)],
+}
+BLOB = np.zeros((HEIGHT, WIDTH), bool)
+for row, (first, end) in enumerate(
+    [(4, 5), (2, 7), (1, 8), (0, 9), (1, 8), (2, 7), (4, 5)], start=12
+):
+    BLOB[row, 10 + first : 10 + end] = True
+
+
+def inside(points):
+    """Pixels whose centre lies inside, by scikit-image, for which centres are whole numbers."""
+    return polygon2mask((HEIGHT, WIDTH), np.array(points)[:, ::-1] - 0.5)
+
+
+def painted(*shapes):
+    """Names of the classes, the later shape over the earlier one; empty where there is none."""
+    names = np.zeros((HEIGHT, WIDTH), "U12")
+    for name in shapes:
+        label, area = ("car", BLOB) if name == "blob" else (name, inside(POINTS[name]))
+        names[area] = label
+    return names
+
+
+def turned(name, points):
+    names = painted("car") if name == "road" else painted()
+    names[inside(points)] = name
+    return names
+
+
+WHOLE = {0: painted("road", "car", "ego"), 3: painted("car", "road")}
+FOREIGN = {
+    "coco/datumaro.json": {**WHOLE, 1: painted("road", "blob")},
+    "coco/labelformat.json": {**WHOLE, 1: painted("road", "blob")},
+    "coco/pycocotools.json": {**WHOLE, 1: painted("road", "blob")},
+    "cvat/annotations.xml": {**WHOLE, 1: painted("road", "blob")},
+    "cvat/boxed.xml": {1: painted("road", "blob")},
+    "labelme": {**WHOLE, 1: painted("road", "blob")},
+    "yolo/labels": {**WHOLE, 1: painted("road")},
+    "label_studio/tasks.json": {**WHOLE, 1: painted("road")},
+    "label_studio/min.json": {**WHOLE, 1: painted("road")},
+    "openlabel/openlabel.json": {**WHOLE, 1: painted("road")},
+}
+
+
+def values_of(path, size=SIZE):
+    """By the number of each frame the values of its label, and the values of the classes."""
+    found = opened(path, size)
+    pictures = [label.picture(label.content(), Limits()) for label in found.labels]
+    arrays = [np.frombuffer(p.data, "<u2").reshape(p.height, p.width) for p in pictures]
+    return dict(zip(found.log_times.tolist(), arrays, strict=True)), found.origin
+
+
+def names_of(path, size=SIZE):
+    values, origin = values_of(path, size)
+    names = np.array(["", *sorted(origin.classes, key=origin.classes.__getitem__)])
+    return {number: names[each] for number, each in values.items()}
+
+
+@pytest.mark.parametrize("path", FOREIGN)
+def test_a_file_of_the_formats_own_tool_gives_the_pixels_of_scikit_image(path):
+    found = names_of(LABELS / path)
+    assert found.keys() == FOREIGN[path].keys()
+    for number, expected in FOREIGN[path].items():
+        np.testing.assert_array_equal(found[number], expected)
+
+
+@pytest.mark.parametrize("path", FOREIGN)
+def test_the_folder_of_such_a_file_gives_the_same(path, tmp_path):
+    where = shutil.copytree(LABELS / path, tmp_path / "labels") if "." not in path else tmp_path
+    if where == tmp_path:
+        shutil.copy(LABELS / path, where)
+    elif path.startswith("yolo"):
+        shutil.copy(LABELS / "yolo" / "data.yaml", tmp_path)
+    found = names_of(where)
+    for number, expected in FOREIGN[path].items():
+        np.testing.assert_array_equal(found[number], expected)
+
+
+def test_rectangles_of_x_anylabeling_may_be_turned():
+    found = names_of(LABELS / "x_anylabeling")
+    np.testing.assert_array_equal(found[0], WHOLE[0])
+    expected = painted()
+    expected[inside([(20.2, 13.3), (31.4, 13.3), (31.4, 22.2), (20.2, 22.2)])] = "car"
+    expected[inside([(20.2, 20.3), (30.1, 16.3), (34.9, 28.4), (25.0, 32.4)])] = "road"
+    np.testing.assert_array_equal(found[3], expected)
+
+
+def test_panoptic_pixels_have_the_class_of_their_segment():
+    found = names_of(LABELS / "panoptic")
+    about = json.loads((LABELS / "panoptic" / "panoptic_drive.json").read_text())
+    classes = {each["id"]: each["name"] for each in about["categories"]}
+    for label in about["annotations"]:
+        segments = {s["id"]: classes[s["category_id"]] for s in label["segments_info"]}
+        with Image.open(LABELS / "panoptic" / "panoptic_drive" / label["file_name"]) as image:
+            pixels = np.asarray(image.convert("RGB")).tolist()
+        expected = [
+            [segments.get(r + 256 * g + 65536 * b, UNLABELLED) for r, g, b in row] for row in pixels
+        ]
+        number = int(label["file_name"][6:10])
+        np.testing.assert_array_equal(found[number], expected)
+        assert {"road", "car"} & set(np.unique(found[number]))
+
+
+def test_pixels_that_nobody_labelled_are_ignored():
+    values, origin = values_of(LABELS / "panoptic")
+    meaning = of_classes(LabelSettings(road=("road",), ignore=("ego",)), origin, "labels")
+    names = names_of(LABELS / "panoptic")[0]
+    truth = meaning.of_values(values[0])
+    for name, expected in (("road", 1), ("car", 0), ("ego", 255), (UNLABELLED, 255)):
+        assert (names == name).any()
+        assert set(truth[names == name].tolist()) == {expected}
+    assert "ego unlabelled is ignored" in meaning.words
+    # Of outlines, what no shape covers is non-road.
+    values, origin = values_of(LABELS / "labelme")
+    meaning = of_classes(LabelSettings(road=("road",)), origin, "labels")
+    np.testing.assert_array_equal(meaning.of_values(values[0]) == 1, WHOLE[0] == "road")
+
+
+def test_a_class_that_does_not_occur_is_refused_with_the_list():
+    origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
+    known = r"which has the classes car \(3\), road \(3\), ego \(1\)"
+    with pytest.raises(LogError, match=rf"`labels.road` Road does not occur in labels, {known}"):
+        of_classes(LabelSettings(road=("Road",)), origin, "labels")
+    with pytest.raises(LogError, match=rf"`labels.ignore` sky does not occur in labels, {known}"):
+        of_classes(LabelSettings(road=("road",), ignore=("sky",)), origin, "labels")
+    with pytest.raises(LogError, match=r"labels has the classes .*: name those that mean road"):
+        of_classes(LabelSettings(), origin, "labels")
+
+
+def test_the_other_classes_are_said_to_be_non_road():
+    origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
+    meaning = of_classes(LabelSettings(road=("road",)), origin, "labels")
+    assert meaning.words == "road is road; non-road is all else, car (3), ego (1)"
+
+
+def test_masks_of_labelmap_have_the_names_of_their_colours():
+    origin = labels_in(LABELS / "masks" / "SegmentationClass", SIZE)
+    names = {color: name for name, color in origin.classes.items()}
+    for label, expected in zip(origin.labels, (WHOLE[0], painted("road", "blob")), strict=False):
+        with Image.open(label.path) as image:
+            pixels = np.asarray(image.convert("RGB")).tolist()
+        found = [[names[r << 16 | g << 8 | b] for r, g, b in row] for row in pixels]
+        np.testing.assert_array_equal(np.where(expected == "", "background", expected), found)
+
+
+def test_of_four_files_a_frame_that_cityscapes_has_the_ids_are_taken(tmp_path):
+    where = shutil.copytree(LABELS / "cityscapes", tmp_path / "gtFine")
+    polygons = {
+        "imgHeight": 32,
+        "imgWidth": 48,
+        "objects": [{"label": "road", "polygon": [[0, 0]]}],
+    }
+    for number in (0, 1, 3):
+        (where / f"frame_{number:04d}_gtFine_polygons.json").write_text(json.dumps(polygons))
+    found = opened(where)
+    assert [label.path.name[10:] for label in found.labels] == ["_gtFine_labelIds.png"] * 3
+    assert found.log_times.tolist() == [0, 1, 3]
+
+
+NAMES = {
+    "Cityscapes": (
+        "aachen_000001_000019_leftImg8bit.png",
+        "aachen_000001_000019_gtFine_labelIds.png",
+    ),
+    "KITTI": ("um_000012.png", "um_road_000012.png"),
+    "KITTI, several lanes": ("umm_000012.png", "umm_road_000012.png"),
+    "BDD100K, drivable area": ("b1c66a42-6f7d68ca.jpg", "b1c66a42-6f7d68ca_drivable_id.png"),
+    "BDD100K, classes": ("b1c66a42-6f7d68ca.jpg", "b1c66a42-6f7d68ca_train_id.png"),
+    "Mapillary": ("_0B-yJ1Ylq5ruDTTfGGN_w.jpg", "_0B-yJ1Ylq5ruDTTfGGN_w.png"),
+    "CamVid": ("0016E5_00390.png", "0016E5_00390_L.png"),
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_labels_with_the_names_of_a_data_set_belong_to_their_images(name, tmp_path):
+    image, label = NAMES[name]
+    for folder, file in (("images", image), ("labels", label)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / file).touch()
+    found = opened(tmp_path / "labels", images=str(tmp_path / "images"))
+    assert (found.by, found.log_times.tolist(), found.nameless) == ("name", [0], 0)
+
+
+@pytest.mark.parametrize("path", ["cvat/annotations.xml", "labelme", "label_studio/tasks.json"])
+def test_drawn_labels_belong_to_the_images_that_they_name(path, tmp_path):
+    for number in (3, 1, 0, 2):
+        (tmp_path / f"frame_{number:04d}.png").touch()
+    found = opened(LABELS / path, SIZE, images=str(tmp_path))
+    assert (found.by, found.log_times.tolist(), found.images) == ("name", [0, 1, 3], 4)
+
+
+# --- The rules ------------------------------------------------------------------------------------
+
+RINGS = st.lists(
+    st.tuples(st.floats(-20, 70, width=32), st.floats(-20, 50, width=32)), min_size=3, max_size=9
+)
+
+
+@given(RINGS)
+def test_an_outline_holds_the_pixels_whose_centre_is_inside_by_the_even_odd_rule(points):
+    # Not on a centre's row or column, where the two differ in what an edge belongs to.
+    points = [(np.floor(x) + 0.2371, np.floor(y) + 0.6113) for x, y in points]
+    filled = Outline("road", np.ravel(points).tolist()).fill(SIZE)
+    for y in range(HEIGHT):
+        for x in range(0, WIDTH, 5):
+            right = 0  # crossings of a ray to the right, exact enough at these points
+            for (x1, y1), (x2, y2) in zip(points, [*points[1:], points[0]], strict=True):
+                if (y1 > y + 0.5) != (y2 > y + 0.5):
+                    right += x1 + (y + 0.5 - y1) * (x2 - x1) / (y2 - y1) > x + 0.5
+            assert filled[y, x] == right % 2
+
+
+@given(RINGS)
+def test_outlines_are_those_of_scikit_image(points):
+    points = [
+        (np.floor(x) + 0.2371, np.floor(y) + 0.6113 + i / 997) for i, (x, y) in enumerate(points)
+    ]
+    filled = Outline("road", np.ravel(points).tolist()).fill(SIZE)
+    assert (filled ^ inside(points)).sum() <= 1  # an edge through a centre
+
+
+@given(st.floats(-5, 55), st.floats(-5, 55))
+def test_outlines_side_by_side_share_no_pixel_and_leave_none(top, bottom):
+    left = Outline("a", [-1, -1, top, -1, bottom, 33, -1, 33]).fill(SIZE)
+    right = Outline("b", [top, -1, 60, -1, 60, 33, bottom, 33]).fill(SIZE)
+    assert (left ^ right).all()
+
+
+@given(arrays(bool, (HEIGHT, WIDTH)))
+def test_runs_are_those_of_pycocotools(mask):
+    from roadeval.logs.truth.formats.coco import lengths_in
+
+    encoded = coco.encode(np.asfortranarray(mask.astype(np.uint8)))
+    lengths = lengths_in(encoded["counts"].decode())
+    np.testing.assert_array_equal(Runs("road", lengths, by_columns=True).fill(SIZE), mask)
+    text = coco.frPyObjects({"size": [HEIGHT, WIDTH], "counts": list(lengths)}, HEIGHT, WIDTH)
+    assert text["counts"] == encoded["counts"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_long_runs_are_those_of_pycocotools(seed):
+    from roadeval.logs.truth.formats.coco import lengths_in
+
+    rng = np.random.default_rng(seed)
+    mask = np.repeat(rng.random(40) < 0.5, rng.integers(1, 60_000, 40))
+    mask = np.resize(mask, (1080, 1920))
+    encoded = coco.encode(np.asfortranarray(mask.astype(np.uint8)))
+    runs = Runs("road", lengths_in(encoded["counts"].decode()), by_columns=True)
+    np.testing.assert_array_equal(runs.fill((1920, 1080)), mask)
