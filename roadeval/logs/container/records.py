@@ -311,6 +311,10 @@ class ChunkReader:
         """Uncompress a chunk as far as possible."""
         return self._uncompressed(chunk, whole=False)
 
+    def sized(self, chunk: Chunk) -> Chunk:
+        """Return a chunk with the size of what its data is uncompressed to, if time allows."""
+        return chunk if self._doubts_left < 0 else chunk._replace(size=len(self.remains(chunk)))
+
     def is_sound(self, chunk: Chunk) -> bool:
         """Whether the content of a chunk is what its head says.
 

@@ -445,7 +445,7 @@ class RecordFinder:
             heads = [own, own._replace(data_size=record.end - own.data_offset)]
         crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
         known = [listed._replace(crc=crc or None)] if listed and self._summary.checked else []
-        sized = (each._replace(size=len(self._reader.remains(each))) for each in heads if each.crc)
+        sized = (self._reader.sized(chunk) for chunk in heads if chunk.crc)
         for chunk in chain(known, heads, sized):
             # Zeros would be an empty chunk.
             if chunk.data_size >= 0 and (chunk.size or agrees) and self._reader.is_sound(chunk):

@@ -142,6 +142,22 @@ def test_millions_of_empty_records_take_seconds(tmp_path):
     assert told
 
 
+def test_chunks_of_a_wrong_size_that_unpack_to_gigabytes_take_seconds(tmp_path):
+    import zstandard
+
+    packed = zstandard.compress(bytes(256 << 20))
+    head = struct.pack("<QQQII", 0, 1, 1_000, 12_345, 4) + b"zstd"
+    chunk = head + struct.pack("<Q", len(packed)) + packed
+    record = b"\x06" + struct.pack("<Q", len(chunk)) + chunk
+    data = logged(tmp_path / "whole.mcap", 4)
+    at = next(at for at in range(len(data)) if is_chunk(data, at))
+    began = process_time()
+    (found,), told = read(tmp_path, data[:at] + 50 * record + data[at:])
+    assert process_time() - began < 5
+    assert found == 4
+    assert told
+
+
 def test_what_is_wrong_with_a_log_of_as_many_channels_as_there_can_be_takes_seconds(tmp_path):
     path = tmp_path / "many.mcap"
     with path.open("wb") as file:
