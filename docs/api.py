@@ -22,8 +22,8 @@ import roadeval
 from roadeval.results import schema
 
 UNRESOLVED: Final = (
-    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef|"
-    r"(Frame|Label|Mask|Topic)Settings|Literal)"
+    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
+    r"|.* for roadeval\.[\w.]+\.__(init|new)__\."
 )
 """Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of
 constructors, inherited or of named tuples, which do not know the module that they were written

@@ -28,7 +28,10 @@ extensions = ["myst_parser"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = f"roadeval {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
+smartquotes = False
 html_show_sphinx = False
 html_theme_options = {"footer_icons": []}
 

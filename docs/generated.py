@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import textwrap
 from collections.abc import Callable, Iterator
 from inspect import getdoc, getsource
 from pathlib import Path
@@ -30,6 +31,8 @@ COPIES: Final = {
 """Pages that are a file elsewhere in the project, by their names on the site."""
 PAGES: Final = {path: DOCS / f"{name}.md" for name, path in COPIES.items()}
 LINK: Final = re.compile(r"(!?)\[([^\]]+)\]\((?!https?:|#)([^)#\s]+)(#[^)\s]*)?\)")
+COMMENT: Final = re.compile(r"(^# (?!\w+ =).*\n)+", re.MULTILINE)
+"""The meaning of a setting; a setting without a value is none."""
 MARK: Final = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 
 
@@ -67,7 +70,7 @@ def commands() -> str:
 def _command(group: Any, name: str) -> Iterator[str]:
     command = group.commands[name]
     context = command.make_context(name, [], resilient_parsing=True)
-    yield from (f"## {name}", "", command.help, "")
+    yield from (f"## {name}", "", _plain(command.help), "")
     part = ""
     for param in command.get_params(context):
         flags, words = param.get_help_record(context) or ("", "")
@@ -77,12 +80,17 @@ def _command(group: Any, name: str) -> Iterator[str]:
         if of != part:
             yield from ("", f"| {of} | |", "| --- | --- |")
         part = of
-        yield f"| {_code(flags)} | {_cell(words)} |"
+        yield f"| {_code(flags)} | {_cell(_plain(words))} |"
     yield ""
 
 
 def _code(text: str) -> str:
     return f"`{_cell(text)}`"
+
+
+def _plain(text: str) -> str:
+    """Let a text of the terminal mean nothing to Markdown."""
+    return re.sub(r"([<*_`\[])", r"\\\1", text)
 
 
 def _cell(text: str) -> str:
@@ -104,12 +112,19 @@ def settings() -> str:
     tables: dict[str, str] = {}
     for preset in PRESETS:
         text = roadeval.config_toml(roadeval.configure({"preset": preset}))
+        text = COMMENT.sub(_narrow, text)
         for part in re.split(r"\n\n(?=(?:#[^\n]*\n)*\[)", text):
             head = re.search(r"^\[(.+)\]$", part, re.MULTILINE)
             tables.setdefault(head[1] if head else "", part.strip())
     first = tables.pop("")
     parts = {"At the top": first, **{f"\\[{name}\\]": part for name, part in tables.items()}}
     return "\n".join(f"## {name}\n\n```toml\n{part}\n```\n" for name, part in parts.items())
+
+
+def _narrow(comment: re.Match[str]) -> str:
+    """Return a comment in lines that fit the page."""
+    words = comment[0].replace("\n# ", " ").removeprefix("# ")
+    return textwrap.fill(words, 80, initial_indent="# ", subsequent_indent="# ") + "\n"
 
 
 # --- Results --------------------------------------------------------------------------------------
