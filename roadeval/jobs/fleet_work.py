@@ -19,6 +19,7 @@ from roadeval import logs
 from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
 from roadeval.data import Frame
 from roadeval.errors import RoadevalError
+from roadeval.evaluation.regions import ALL
 from roadeval.fleet.entry import DriveEntry, FleetError, in_order
 from roadeval.fleet.remote import staged, stamp
 from roadeval.jobs.fleet_frames import FrameGatherer
@@ -40,7 +41,7 @@ from roadeval.results.fleet import (
     results_path,
 )
 from roadeval.results.rows import Key, cells, drive_row
-from roadeval.results.schema import ALL, FAILED, TABLES
+from roadeval.results.schema import FAILED, TABLES
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, own_names, put

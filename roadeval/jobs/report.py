@@ -13,6 +13,7 @@ import numpy as np
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
+from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.report_frames import FramePicker, browsed, evenly, strips_of
@@ -33,7 +34,7 @@ from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
-from roadeval.results.schema import ALL
+from roadeval.results.tables import parquet_rows
 from roadeval.runtime.files import leads_outside
 
 PAGES: Final = (".html", ".htm")
@@ -323,6 +324,7 @@ def collect_fleet(
     ResultsError
         If a table cannot be read.
     """
+    scores, regions = _scores(fleet)
     return FleetFindings(
         name=fleet.name,
         source=str(fleet.path),
@@ -330,7 +332,8 @@ def collect_fleet(
         drives=fleet.drives,
         names=fleet.names,
         effects=_effects(fleet),
-        scores=_scores(fleet),
+        regions=regions,
+        scores=scores,
         worst=list(_worst(fleet, worst)),
         inspect=inspect,
     )
@@ -348,18 +351,19 @@ def _effects(fleet: FleetFolder) -> dict[tuple[str, str], list[Row]]:
     return dict(found)
 
 
-def _scores(fleet: FleetFolder) -> list[Row]:
+def _scores(fleet: FleetFolder) -> tuple[list[Row], dict[tuple[str, str], dict[str, float]]]:
+    """Return the first variant's final rows of ``scores``, and the regions of all drives."""
     from pyarrow import compute
 
     rates = fleet.facts.rates
     if not rates:
-        return []
-    columns = ["drive", "variant", "final", "region", "frames", "ERR", "FPR", "FNR", "boundary_f"]
-    table = fleet.table("scores", columns)
-    wanted = compute.and_(table["final"], compute.equal(table["region"], ALL))
-    wanted = compute.and_(wanted, compute.equal(table["variant"], rates[0]["variant"]))
-    rows: list[Row] = table.filter(wanted).to_pylist()
-    return rows
+        return [], {}
+    table = fleet.table("scores")
+    table = table.filter(table["final"])
+    whole = compute.equal(table["region"], ALL)
+    first = compute.equal(table["variant"], rates[0]["variant"])
+    rows: list[Row] = table.filter(compute.and_(whole, first)).to_pylist()
+    return rows, score.by_region(parquet_rows(table.filter(compute.invert(whole)), "scores"))
 
 
 def _worst(fleet: FleetFolder, count: int) -> Iterator[WorstPicture]:

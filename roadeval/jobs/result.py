@@ -404,9 +404,11 @@ def _members(fleet: FleetFolder) -> Iterator[Part]:
 
 
 def _rows_of_member(fleet: FleetFolder, drive: str, table: str) -> Rows:
-    """Return the rows of a fleet's drive; of its frames alone, for they are in one small file."""
+    """Return the rows of a fleet's drive: of its frames and scores, else of its results folder."""
+    if table == "scores":
+        return fleet.scores.get(drive, as_arrays(table, ()))
     if table != "frames":
-        return as_arrays(table, ())
+        return ResultsFolder(fleet.results(drive)).rows(table)
     try:
         return parquet_rows(fleet.frames(drive), table)
     except FileNotFoundError:

@@ -55,11 +55,18 @@ _COMMAND: Final = "in the viewer"
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region, or frames", "stamp")
 """The columns that hold words, beside the commands."""
 _REGIONS: Final = "ERR of the final masks, percent: means over the frames that label any of it."
+_OVER_DRIVES: Final = (
+    "ERR of the final masks, percent: means over drives, of the frames that label any of it; a "
+    "drive counts where both results have scored the same frames of it."
+)
 _FRAMES: Final = "Percent of the labelled pixels that only one of the two final masks has right."
 _LEFT_OUT: Final = (
     "A region that is not the same pixels in both, as the shadow that another filter found, is "
-    "left out. Frames with most shadow are a third, by the share of their pixels in true shadow, "
-    "or in that which both detected."
+    "left out."
+)
+_SHADE: Final = (
+    "Frames with most shadow are a third, by the share of their pixels in true shadow, or in that "
+    "which both detected."
 )
 
 
@@ -266,8 +273,10 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
     if comparison.regions:
         legend = correction(row.difference for row in comparison.regions)
         yield Heading("Where it is better, and where worse", 2)
-        yield _region_table(comparison.regions)
-        yield Text(f"{legend} {_LEFT_OUT}".strip(), "note")
+        over = _OVER_DRIVES if comparison.drives else _REGIONS
+        yield _region_table(comparison.regions, over)
+        notes = [legend, _LEFT_OUT, "" if comparison.drives else _SHADE]
+        yield Text(" ".join(filter(None, notes)), "note")
     if comparison.disagreements:
         yield Heading("Frames on which they disagree most", 2)
         yield _disagreement_table(comparison.disagreements)
@@ -354,13 +363,13 @@ def _plot(comparison: Comparison) -> Iterator[Block]:
 # --- Regions and frames ---------------------------------------------------------------------------
 
 
-def _region_table(rows: Sequence[RegionChange]) -> Table:
+def _region_table(rows: Sequence[RegionChange], caption: str) -> Table:
     columns: Columns = {
         "region, or frames": lambda row: row.title,
         "frames": lambda row: str(row.frames),
         **_change(lambda row: marked_interval(row.difference)),
     }
-    return _table(rows, columns, _REGIONS)
+    return _table(rows, columns, caption)
 
 
 def _disagreement_table(rows: Sequence[Disagreement]) -> Table:

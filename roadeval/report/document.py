@@ -21,8 +21,8 @@ SCORED: Final = (
 def document(findings: Findings | FleetFindings) -> Document:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFindings):
-        parts: tuple[Section, ...] = (drives.plots, drives.strata, drives.missing, drives.worst)
-        return _of(findings, *parts, provenance.of_drives)
+        parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
+        return _of(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
     scored = (*SCORED, frames.worst_frames) if findings.totals else (drive.masks,)
     return _of(findings, *scored, provenance.section)
 
@@ -31,7 +31,7 @@ def page_document(findings: Findings | FleetFindings, browsed: BrowsedFrames | N
     """Return the report as a page: with a browser of frames, or a table of all drives."""
     if isinstance(findings, FleetFindings):
         parts: tuple[Section, ...] = (drives.table, drives.worst, drives.plots, drives.strata)
-        return _of(findings, *parts, drives.missing, provenance.of_drives)
+        return _of(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     scored = SCORED if findings.totals else (drive.masks,)
     frame_browser = frames.browser(browsed) if browsed else ()
     return _of(findings, lambda _: frame_browser, *scored, provenance.section)

@@ -134,6 +134,11 @@ class Findings:
         return self.facts.drive.name
 
     @property
+    def height(self) -> int:
+        """Height of the frames in pixels."""
+        return self.facts.drive.height
+
+    @property
     def totals(self) -> Totals:
         """Counts and rates by variant and stage."""
         return self.facts.totals
@@ -178,6 +183,8 @@ class FleetFindings:
     """The drives' names for people, by their identity; no two are equal."""
     effects: Mapping[tuple[str, str], Sequence[Row]]
     """Rows of ``effects`` of the final masks' ERR, by base and variant."""
+    regions: Mapping[tuple[str, str], Mapping[str, float]]
+    """See `roadeval.evaluation.score.by_region`: of all drives together."""
     scores: Sequence[Row]
     """Rows of ``scores`` of the first variant's final mask, over all labelled pixels."""
     worst: Sequence[WorstPicture] = ()
@@ -185,6 +192,17 @@ class FleetFindings:
     inspect: Callable[[int], str] | None = None
     """Returns the command that opens one of them, by its rank; None where the report is not made at
     a terminal."""
+
+    @property
+    def finals(self) -> Mapping[str, str]:
+        """Each scored variant's final stage."""
+        return {row["variant"]: row["stage"] for row in self.facts.rates}
+
+    @property
+    def height(self) -> int:
+        """Height of the frames in pixels; 0 where drives differ."""
+        heights = {row["height"] or 0 for row in self.drives.values() if row["evaluated"]}
+        return heights.pop() if len(heights) == 1 else 0
 
     def pages(self) -> dict[str, str]:
         """Return where each drive's own page lies below that of a served fleet.

@@ -95,7 +95,8 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
         elif names:
             parts.append(f"{word} ({'; '.join(names)})")
     told = ", ".join(parts) or "no change is sure in any"
-    return f"{_whose(result, variant)} by region and shade: {told}"
+    shade = "" if comparison.drives else " and shade"
+    return f"{_whose(result, variant)} by region{shade}: {told}"
 
 
 def _whose(result: str, variant: str) -> str:

@@ -16,7 +16,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import is_plain
+import numpy as np
+
+from roadeval.data import Rows, is_plain
 from roadeval.evaluation.comparison import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.comparison import junit_xml
@@ -42,7 +44,14 @@ from roadeval.results.over_drives import (
     summarise,
 )
 from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
-from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFile, read_parquet
+from roadeval.results.tables import (
+    AGAIN,
+    FLEET_FORMAT,
+    ResultsError,
+    TableFile,
+    parquet_rows,
+    read_parquet,
+)
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, check_output, leads_outside, put
 from roadeval.runtime.text import is_utf8
@@ -164,6 +173,14 @@ class FleetFolder:
             drive: row["name"] if times[row["name"]] == 1 else drive
             for drive, row in self.drives.items()
         }
+
+    @cached_property
+    def scores(self) -> dict[str, Rows]:
+        """The rows of ``scores`` of each drive that has any."""
+        rows = parquet_rows(self.table("scores"), "scores")
+        names, first, counts = np.unique(rows["drive"], return_index=True, return_counts=True)
+        ends = zip(names.tolist(), first.tolist(), counts.tolist(), strict=True)
+        return {name: rows.take(slice(begin, begin + count)) for name, begin, count in ends}
 
     def frames(self, drive: str) -> pa.Table:
         """Read the rows of a drive's frames; a FileNotFoundError if none was scored."""

@@ -15,12 +15,13 @@ from roadeval.data.words import defined
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison import Change, Condition, ConditionError
 from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED, Effect, corrected
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference, DriveMean, over_drives, strata
 from roadeval.results.comparison import Case, judged
 from roadeval.results.facts import ConditionFacts, FleetFacts, Member, OverDrives, StratumFacts
-from roadeval.results.schema import ALL, DAMAGED, FAILED, LIGHT, TAG, UNSCORED
+from roadeval.results.schema import DAMAGED, FAILED, LIGHT, TAG, UNSCORED
 from roadeval.results.sentences import verdict
 from roadeval.results.tables import read_parquet
 from roadeval.version import VERSION

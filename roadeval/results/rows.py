@@ -18,8 +18,9 @@ from roadeval.data import (
     Rows,
     Transition,
 )
+from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import at_levels
-from roadeval.results.schema import ALL, DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind
+from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:

@@ -95,8 +95,6 @@ FAILED: Final = "failed"
 """The values of ``status`` in ``drives``."""
 TAG: Final = "tag_"
 """Begins the name of a column of ``drives`` that holds a tag."""
-ALL: Final = "all"
-"""The region of all labelled pixels."""
 
 DRIVE: Final = Column("drive", Kind.TEXT, "the log's name; in a fleet, its own name there")
 CAMERA: Final = Column("camera", Kind.TEXT, "the image topic")

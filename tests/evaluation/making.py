@@ -12,6 +12,7 @@ import pandas as pd
 from scipy import signal
 
 from roadeval.data import (
+    OUTCOMES,
     Counts,
     Frame,
     Mask,
@@ -131,6 +132,11 @@ class APart:
 
 
 _NOTHING = {
+    "scores": rows_of(
+        pd.DataFrame(
+            {name: [] for name in ("variant", "stage", "region", "frames", "ERR", *OUTCOMES)}
+        )
+    ),
     "regions": rows_of(pd.DataFrame({"variant": [], "stage": [], "region": [], "frame": []})),
     "disagreements": rows_of(
         pd.DataFrame(

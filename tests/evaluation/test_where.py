@@ -1,6 +1,7 @@
 """Where one of two masks is better: by region and shade, and on which frames they disagree."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from roadeval.data import Rows
@@ -97,18 +98,34 @@ def test_of_two_results_the_same_variant_is_compared():
     ]
 
 
-def test_over_several_drives_a_region_is_that_of_the_drives():
-    def a_result(wrong):
-        parts = []
-        for place in range(6):
-            frames = rows_of(a_table({("first", "post"): [10] * 12}))
-            lit = regions({("first", "lit"): [wrong + place] * 12})
-            parts.append(APart({"frames": frames, "regions": lit}, f"{place}", f"d{place}"))
-        return Side(str(wrong), parts)
+def scores(wrong, labelled=100, frames=12):
+    """Rows of the sums of one mask over a drive: of the whole frames, and of one region."""
+    counts = {"TP": 0, "TN": frames * (labelled - wrong), "FP": frames * wrong, "FN": 0}
+    sums = {"frames": frames, **counts, "ERR": wrong / labelled}
+    rows = [
+        {"variant": "first", "stage": "post", "region": name, **sums} for name in ("all", "lit")
+    ]
+    return rows_of(pd.DataFrame(rows))
 
-    (row,) = compare([a_result(20), a_result(30)], SETTINGS).regions
+
+def over_drives(wrong, **more):
+    frames = rows_of(a_table({("first", "post"): [10] * 12}))
+    parts = [
+        APart({"frames": frames, "scores": scores(wrong + place, **more)}, f"{place}", f"d{place}")
+        for place in range(6)
+    ]
+    return Side(str(wrong), parts)
+
+
+def test_over_several_drives_a_region_is_that_of_the_drives():
+    (row,) = compare([over_drives(20), over_drives(30)], SETTINGS).regions
     assert (row.frames, row.difference.unit, row.difference.units) == (72, "drives", 6)
     assert (row.base, row.difference.mean) == (pytest.approx(0.225), pytest.approx(0.1))
+
+
+@pytest.mark.parametrize("more", [{"labelled": 101}, {"frames": 11}])
+def test_of_several_drives_regions_of_other_pixels_or_frames_are_left_out(more):
+    assert not compare([over_drives(20), over_drives(30, **more)], SETTINGS).regions
 
 
 def test_a_region_of_other_pixels_is_left_out():

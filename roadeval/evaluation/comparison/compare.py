@@ -38,6 +38,7 @@ from roadeval.evaluation.comparison.where import (
     region_counts,
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.regions import ALL, titles
 from roadeval.evaluation.score import TESTED, FourCounts, Name, counts_of, means, stages_of
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
@@ -488,7 +489,8 @@ class _Against:
             self._uncommon.update(
                 dict.fromkeys(v for v in before.distinct("variant") if v in theirs)
             )
-        regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
+        name = "scores" if self._several else "regions"
+        regions = self._base.rows(base, name), self._new.rows(new, name)
         for mask in masks:
             chosen = mask.final and mask.variant != BASELINE
             tested = COMPARED
@@ -496,7 +498,9 @@ class _Against:
                 tested = (TESTED,) if chosen else ()
             made = self._on_drive(new, group, mask.counts, tested)
             self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
-            if chosen:
+            if chosen and self._several:
+                self._add_region_sums(new, group, mask, *regions)
+            elif chosen:
                 self._add_regions(new, group, mask, *regions)
         if not self._several:
             first = next((mask for mask in masks if mask.final), masks[-1])
@@ -522,10 +526,31 @@ class _Against:
         called = self._base.label if self._across else mask.variant
         before = region_counts(base, called, mask.base_stage, mask.before)
         after = region_counts(new, mask.variant, mask.stage, mask.after)
-        tested = () if self._several else (TESTED,)
         for region, title, *counts in parts_of(before, after, mask):
-            made = self._on_drive(part, group, (counts[0], counts[1]), tested)
+            made = self._on_drive(part, group, (counts[0], counts[1]), (TESTED,))
             self._regions[mask.variant, region].append(replace(made, title=title))
+
+    def _add_region_sums(
+        self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows
+    ) -> None:
+        """Add a final mask's regions on one of several drives, from the sums over its frames.
+
+        Only where both have scored the same frames, and of a region as many pixels and as much
+        road: else they may be other places.
+        """
+        called = self._base.label if self._across else mask.variant
+        before = _region_sums(base, called, mask.base_stage)
+        after = _region_sums(new, mask.variant, mask.stage)
+        if {len(mask.before)} != {known[ALL][0] for known in (before, after) if ALL in known}:
+            return
+        for region, title in titles([name for name in before if name != ALL]).items():
+            (frames, own), (others, theirs) = before[region], after.get(region, before[ALL])
+            pixels, other_pixels = own.counts.sum(), theirs.counts.sum()
+            road, other_road = (each.counts[[0, 3]].sum() for each in (own, theirs))
+            if pixels and (frames, pixels, road) == (others, other_pixels, other_road):
+                change = {TESTED: theirs.means[TESTED] - own.means[TESTED]}
+                made = _OnDrive(part, group, frames, theirs, own, change, title=title)
+                self._regions[mask.variant, region].append(made)
 
     def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
         """Return the difference within the one drive, or over several."""
@@ -606,6 +631,16 @@ class _Against:
             yield replace(self.changed, settings=of_the_log)
         if self._relabelled:
             yield Note(Kind.TRUTH, base, new, self._relabelled, settings=of_the_log)
+
+
+def _region_sums(rows: Rows, variant: str, stage: str) -> dict[str, tuple[int, _Sum]]:
+    """Return a mask's frames and sums by region, from rows of ``scores``."""
+    own = rows.take((rows["variant"] == variant) & (rows["stage"] == stage))
+    columns = (own[name].tolist() for name in ("region", "frames", TESTED))
+    return {
+        region: (frames, _Sum({TESTED: error}, counts))
+        for region, frames, error, counts in zip(*columns, counts_of(own), strict=True)
+    }
 
 
 def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:

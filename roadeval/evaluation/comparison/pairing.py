@@ -51,7 +51,7 @@ class Part(Protocol):
         """Settings that may change its numbers, by names as ``frames.scale``, where known."""
 
     def rows(self, table: str) -> Rows:
-        """Return its rows of ``frames``, ``regions`` or ``disagreements``."""
+        """Return its rows of ``frames``, ``regions``, ``disagreements`` or ``scores``."""
 
 
 Pair = tuple[Part, Part]

@@ -14,6 +14,8 @@ from roadeval.data.arrays import Bits
 from roadeval.evaluation.region import LabelledFrame, Region
 from roadeval.runtime.discovery import found_in
 
+ALL: Final = "all"
+"""The name of the whole frame where sums are by region."""
 REGIONS: Final[tuple[Region, ...]] = tuple(
     sorted(chain(*found_in(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
 )

@@ -28,7 +28,7 @@ from roadeval.report.charts import rates
 from roadeval.report.charts.differences import difference
 from roadeval.report.charts.rates import coverage, figures_over_drive
 from roadeval.report.charts.thresholds import CAPTION, curves
-from roadeval.report.findings import Findings, PairedComparison
+from roadeval.report.findings import Findings, FleetFindings, PairedComparison
 from roadeval.report.images import variants_of
 from roadeval.report.sections.common import (
     SIDE_BY_SIDE,
@@ -282,11 +282,12 @@ SHARES: Final = {"ERR": "ERR within, %", "errors": "share of its wrong pixels, %
 """Columns of `Findings.regions` that are tabulated for each variant, with their titles."""
 
 
-def regions(findings: Findings) -> Iterator[Block]:
-    """Yield in which parts of the image the errors are."""
+def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
+    """Yield in which parts of the image the errors are, of a drive or of many together."""
+    if not findings.regions:
+        return
     yield Heading("Where the errors are")
-    height = findings.facts.drive.height
-    names = titles([*dict.fromkeys(region for region, _ in findings.regions)], height)
+    names = titles([*dict.fromkeys(region for region, _ in findings.regions)], findings.height)
     yield Figure(
         rates.regions(findings.regions, [*findings.finals], names),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
@@ -296,7 +297,7 @@ def regions(findings: Findings) -> Iterator[Block]:
     for columns in [[*SHARES]] if together else [[column] for column in SHARES]:
         yield regions_table(findings, names, {column: SHARES[column] for column in columns})
     yield Text(_regions_note(findings, names), "note")
-    if findings.heatmaps:
+    if isinstance(findings, Findings) and findings.heatmaps:
         yield Figure(
             [*rates.heat(findings.heatmaps)],
             f"Where the final masks go wrong, over {sampled_frames(findings)}. FP: non-road called "
@@ -305,7 +306,7 @@ def regions(findings: Findings) -> Iterator[Block]:
 
 
 def regions_table(
-    findings: Findings, names: Mapping[str, str], columns: Mapping[str, str]
+    findings: Findings | FleetFindings, names: Mapping[str, str], columns: Mapping[str, str]
 ) -> Table:
     """Tabulate the regions with their share of the pixels, and some columns for each variant.
 
@@ -341,7 +342,7 @@ def regions_table(
     )
 
 
-def _regions_note(findings: Findings, names: Mapping[str, str]) -> str:
+def _regions_note(findings: Findings | FleetFindings, names: Mapping[str, str]) -> str:
     width = findings.facts.run.get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
     shadow = (

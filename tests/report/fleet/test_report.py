@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 
 from roadeval.jobs.report import collect_fleet, write_report
+from roadeval.jobs.result import Result
 from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf
-from roadeval.report.sections import drives, provenance, summary
+from roadeval.report.sections import drive, drives, provenance, summary
 from roadeval.results.fleet import FleetFolder
 from tests.report.making import column, links_within, plain_rows, reader, text, the
 from tests.results.fleet import making
@@ -46,6 +47,17 @@ def test_the_first_page_has_the_verdict_the_rates_and_the_differences(findings):
     assert bold == [f"{100 * min(r['ERR'] for r in findings.facts.rates):.2f}"]
     assert plain_rows(effects)[0][:2] == ["filtered \N{MINUS SIGN} unfiltered", "ERR"]
     assert len(effects.rows) == 9
+
+
+def test_the_regions_of_all_drives_are_tabulated(findings):
+    (table,) = tables(drive.regions, findings)
+    final = Result(findings.source).scores.query("final and region != 'all'")
+    sums = final.groupby(["variant", "region"])[["FP", "FN", "N"]].sum()
+    names = sorted({region for region, _ in findings.regions})
+    assert len(table.rows) == len(names) > 0
+    for (region, variant), own in findings.regions.items():
+        counted = sums.loc[(variant, region)]
+        assert own["ERR"] == pytest.approx((counted.FP + counted.FN) / counted.N)
 
 
 def test_what_failed_was_lost_and_trained_on_itself_is_warned_of(findings):
