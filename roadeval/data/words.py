@@ -73,6 +73,25 @@ def number(value: int) -> str:
     return f"{value:,}"
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun.
+
+    >>> counted(1, "drive"), counted(1200, "drive")
+    ('1 drive', '1,200 drives')
+    """
+    return f"{number(count)} {noun}{'' if count == 1 else 's'}"
+
+
+def first_of(words: Sequence[str], most: int) -> str:
+    """Return the first words, and how many more there are.
+
+    >>> first_of(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    more = f" and {number(len(words) - most)} more" if len(words) > most else ""
+    return f"{', '.join(words[:most])}{more}"
+
+
 def timestamp(stamp_ns: int) -> str:
     """Return a stamp as date and time, or in seconds where it is less than a year.
 

@@ -30,7 +30,7 @@ from roadeval.jobs.report_frames import BYTES, PICTURED, fitting, outcomes, rate
 from roadeval.jobs.result import DriveResult, Result
 from roadeval.report.blocks import Strip
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
-from roadeval.report.charts.rates import over_frames, over_windows
+from roadeval.report.charts.standard import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.report.sections.frames import BrowsedFrames, FrameFacts, browser, strip

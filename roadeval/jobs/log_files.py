@@ -9,7 +9,7 @@ from typing import Final
 from roadeval import logs
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
-from roadeval.runtime.files import AnyPath, put
+from roadeval.runtime.files import AnyPath, put, writing
 
 
 def info(drive: str | Path, config: logs.LogConfig | None = None) -> logs.LogDescription:
@@ -103,9 +103,6 @@ def demo(output: AnyPath) -> Path:
     source = next((each for each in _PLACES if each.is_file()), None)
     if source is None:
         raise RoadevalError("this installation lacks the demo drive; install roadeval again")
-    with holding(path):
-        try:
-            put(path, source.read_bytes())
-        except OSError as error:
-            raise RoadevalError(f"{path}: cannot be written: {error.strerror}") from error
+    with holding(path), writing(path, RoadevalError):
+        put(path, source.read_bytes())
     return path

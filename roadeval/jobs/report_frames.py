@@ -24,7 +24,7 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.result import DriveResult
 from roadeval.report.blocks import Strip
-from roadeval.report.charts.rates import over_frames
+from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
 from roadeval.report.sections.frames import SMALL, BrowsedFrames, FrameFacts, strip

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from roadeval.data import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
+from roadeval.evaluation.comparison import Part
 from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
@@ -203,27 +203,6 @@ class DriveResult:
 
 
 # --- Any number of drives -------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Part:
-    """A drive's part of results. Its tables are read when they are asked for."""
-
-    drive: str
-    """Its identity in the result."""
-    name: str
-    """Its name for people."""
-    digest: str | None
-    """The log's SHA-256, None where the result does not know it."""
-    scored: bool
-    """Whether any frame of it was."""
-    asked: Mapping[str, Any]
-    """Settings that may change its numbers, by names as ``frames.scale``, where known."""
-    rows: Callable[[str], Rows]
-    """Returns its rows of a table, without pandas."""
-    group: str | None = None
-    """What it shares with other drives, as a day or a route."""
-    tags: Mapping[str, str] = field(default_factory=dict)
 
 
 class Result:

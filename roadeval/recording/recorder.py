@@ -34,7 +34,7 @@ from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
 from roadeval.recording.rrd_file import MessageSums, indexed_chunks
-from roadeval.runtime.files import NewFile
+from roadeval.runtime.files import NewFile, writing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -264,7 +264,7 @@ class Recorder:
             If it cannot be written.
         """
         try:
-            with self._explained():
+            with writing(self.path, RecordingError):
                 self._file.begin()
                 self.check_disk_space()
                 self.partial.touch()
@@ -288,7 +288,7 @@ class Recorder:
         try:
             self._close()
             if self._finished and error is None:
-                with self._explained():
+                with writing(self.path, RecordingError):
                     self._file.publish()
         except RecordingError as failed:
             if error is None:  # else the first error is the one to report
@@ -466,13 +466,6 @@ class Recorder:
         if self._stream is None:
             raise RuntimeError("a recorder is used inside its 'with' block")
         return self._stream
-
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
 
     def _flush_stream(self) -> None:
         self._unwritten = 0

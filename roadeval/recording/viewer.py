@@ -126,10 +126,8 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
             shown = go(client, frame)
             time.sleep(_SETTLING_S)
             png = asked(client.take_screenshot)
-    try:
+    with files.writing(picture, RecordingError):
         files.put(picture, png)
-    except OSError as error:
-        raise RecordingError(f"{picture}: cannot be written: {error.strerror}") from error
     return shown
 
 

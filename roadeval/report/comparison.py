@@ -33,8 +33,8 @@ from roadeval.report.blocks import (
 )
 from roadeval.report.blocks import markdown as written
 from roadeval.report.chart import Chart
-from roadeval.report.charts import differences
-from roadeval.report.charts.differences import MEAN, ForestRow
+from roadeval.report.charts import standard as charts
+from roadeval.report.charts.standard import MEAN, ForestRow
 from roadeval.report.sections.drives import Part, strata_table
 from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
@@ -254,9 +254,9 @@ def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Bl
     finals = [row for row in comparison.changes if row.final]
     if comparison.paired:
         caption = "Change of the final mask's rates against the base."
-        yield Figure(differences.changes(finals), caption)
+        yield Figure(charts.changes(finals), caption)
     else:
-        yield Figure(differences.levels(finals), "Rates of the final masks.")
+        yield Figure(charts.levels(finals), "Rates of the final masks.")
     if over_drive:
         yield Heading("Over the drive", 2)
         yield Figure(over_drive, f"{TESTED} of the final masks over the common frames.")
@@ -356,8 +356,8 @@ def _plot(comparison: Comparison) -> Iterator[Block]:
         if (each.result, each.variant, each.stage) == key
     )
     mean = ForestRow(MEAN, None, over.mean, over.low, over.high)
-    charts = differences.forest(rows, mean, f"change of {TESTED} of {own[0].variant}")
-    yield Figure(charts, differences.caption(rows, mean))
+    drawn = charts.forest(rows, mean, f"change of {TESTED} of {own[0].variant}")
+    yield Figure(drawn, charts.caption(rows, mean))
 
 
 # --- Regions and frames ---------------------------------------------------------------------------

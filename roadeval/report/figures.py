@@ -40,7 +40,7 @@ from roadeval.data import (
 )
 from roadeval.evaluation import score
 from roadeval.report.chart import FAINT, thinned
-from roadeval.report.charts.rates import over_windows
+from roadeval.report.charts.standard import over_windows
 from roadeval.report.images import (
     EXAMPLE_WIDTH,
     ExampleFrame,

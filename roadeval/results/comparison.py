@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from roadeval.data.words import percent, plain_points
+from roadeval.data.words import first_of, percent, plain_points
 from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
 from roadeval.evaluation.score import TESTED
 from roadeval.results.sentences import sentence, stands
@@ -135,8 +135,7 @@ def warnings(comparison: Comparison) -> list[str]:
 def _told(note: Note) -> str:
     one, other, count = note.result, note.other, note.count
     drives = "1 drive is" if count == 1 else f"{count} drives are"
-    more = f" and {count - NAMED} more" if count > NAMED else ""
-    names = f"{', '.join(note.names[:NAMED])}{more}"
+    names = first_of(note.names, NAMED)
     settings = ", ".join(
         f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in note.settings.items()
     )

@@ -10,7 +10,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -53,7 +53,7 @@ from roadeval.results.tables import (
     read_parquet,
 )
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, check_output, leads_outside, put
+from roadeval.runtime.files import alone, check_output, leads_outside, put, writing
 from roadeval.runtime.text import is_utf8
 
 if TYPE_CHECKING:
@@ -333,7 +333,7 @@ class FleetWriter:
                 f"{self.folder}: its bytes are not UTF-8, and Parquet files cannot be written "
                 "there: choose another name"
             )
-        with self._explained():
+        with writing(self.folder, ResultsError):
             check_output(self.folder, folder=True)
             if is_fleet(self.folder):
                 with suppress(ValueError):  # damage: it is written anew
@@ -378,7 +378,7 @@ class FleetWriter:
             Digests of what each drive's record must have been made for; anything by default.
         """
         # Two commands may replay drives of one folder together.
-        with self._explained(), alone(*(self.folder / name for name in FILES)):
+        with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
             write_tables(self.folder, members, _Records(self.folder, asked or {}))
             scores = scores_of(self.folder) if conditions else ()
             judged = [*judge_drives(scores, conditions, settings.least_frames)]
@@ -396,15 +396,6 @@ class FleetWriter:
             put(self.folder / JUNIT, junit_xml(self.folder.name, drive_cases(drives, judged)))
             put(self.folder / FLEET, facts.text().encode())
         return facts
-
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise ResultsError(
-                f"{self.folder}: cannot be written: {error.strerror or error}"
-            ) from error
 
 
 def _condition(condition: Condition, judged: Sequence[DriveJudgement]) -> ConditionFacts:

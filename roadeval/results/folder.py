@@ -6,8 +6,8 @@ It is built beside the one of its name, and replaces it as one: see `roadeval.ru
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +18,7 @@ from roadeval.results.facts import SUMMARY, Facts
 from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
 from roadeval.results.tables import ResultsError, TableFacts, read_rows, read_table
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import Content, NewFolder
+from roadeval.runtime.files import Content, NewFolder, writing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,16 +126,10 @@ class ResultsWriter:
         self._finished = True
         return facts
 
-    @contextmanager
-    def explained(self) -> Iterator[None]:
+    def explained(self) -> AbstractContextManager[None]:
         """Turn an OSError inside the block into a `ResultsError`."""
-        try:
-            yield
-        except OSError as error:
-            raise ResultsError(
-                f"{self._new.path}: cannot write results ({error.strerror}); "
-                "choose another folder with `output.reports`"
-            ) from error
+        advice = "; choose another folder with `output.reports`"
+        return writing(self._new.path, ResultsError, advice)
 
 
 class _Growing:

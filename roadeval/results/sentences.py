@@ -9,7 +9,15 @@ from statistics import median
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED, Tally
-from roadeval.data.words import defined, in_percent, interval, listing, percent, plain_points
+from roadeval.data.words import (
+    counted,
+    defined,
+    in_percent,
+    interval,
+    listing,
+    percent,
+    plain_points,
+)
 from roadeval.evaluation.score import TESTED, Effect, final_stages
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
 from roadeval.evaluation.stats import Difference
@@ -108,8 +116,10 @@ def sentence(found: Difference, what: str, rate: str, settings: EvaluationSettin
 def _here(found: Difference) -> str:
     if found.unit == "frames":
         return "On this frame" if found.units == 1 else f"On these {found.units} frames"
-    groups = "" if found.groups in (None, found.units) else f" in {_count(found.groups, 'group')}"
-    return f"Over {_count(found.units, 'drive')}{groups}"
+    groups = (
+        "" if found.groups in (None, found.units) else f" in {counted(found.groups or 0, 'group')}"
+    )
+    return f"Over {counted(found.units, 'drive')}{groups}"
 
 
 def _counted(found: Difference) -> str:
@@ -122,10 +132,6 @@ def _family(found: Difference) -> str:
     """Return how many differences a p-value was corrected for, where they were several."""
     more = (found.comparisons or 1) > 1
     return f" (corrected for {found.comparisons} comparisons)" if more else ""
-
-
-def _count(count: int | None, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 # --- Marks in tables ------------------------------------------------------------------------------

@@ -51,6 +51,16 @@ def listed(paths: Paths) -> list[AnyPath]:
     return [paths] if isinstance(paths, str | Path) else list(paths)
 
 
+@contextmanager
+def writing(place: object, kind: type[Exception], advice: str = "") -> Iterator[None]:
+    """Turn an OSError inside the block into an error of a room: where, why, and what to do."""
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or error
+        raise kind(f"{place}: cannot be written: {why}{advice}") from error
+
+
 def check_input(path: str | Path) -> None:
     """Raise an OSError if a path does not lead to a file that can be read from begin to end.
 

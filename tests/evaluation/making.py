@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Bits
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison import Change, ComparedResult, Comparison, Side
+from roadeval.evaluation.comparison import Change, ComparedResult, Comparison, Part, Side
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
 
@@ -108,27 +107,13 @@ def autoregression(rng: np.random.Generator, frames: int, rho: float) -> npt.NDA
     return series * np.sqrt(1 - rho**2)
 
 
-@dataclass(frozen=True)
-class APart:
-    """A drive of a result that is compared."""
-
-    tables: Mapping[str, Rows]
-    drive: str = "street"
-    digest: str | None = "d1"
-    group: str | None = None
-    tags: Mapping[str, str] = field(default_factory=dict)
-    asked: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def name(self) -> str:
-        return self.drive
-
-    @property
-    def scored(self) -> bool:
-        return "frames" in self.tables and len(self.tables["frames"]) > 0
-
-    def rows(self, table: str) -> Rows:
-        return self.tables[table] if table in self.tables else _NOTHING[table]
+def compared_drive(
+    tables: Mapping[str, Rows], drive: str = "street", digest: str | None = "d1", **more: Any
+) -> Part:
+    """A drive of a result that is compared, with some tables."""
+    known = {**_NOTHING, **tables}
+    scored = "frames" in tables and len(tables["frames"]) > 0
+    return Part(drive, drive, digest, scored, more.pop("asked", {}), known.__getitem__, **more)
 
 
 _NOTHING = {
@@ -149,9 +134,9 @@ _NOTHING = {
 }
 
 
-def a_part(errors: Mapping[tuple[str, str], Sequence[int]], **more: Any) -> APart:
+def a_part(errors: Mapping[tuple[str, str], Sequence[int]], **more: Any) -> Part:
     """A drive whose frames have so many wrong pixels of 100 by variant and stage, at 10 Hz."""
-    return APart({"frames": rows_of(a_table(errors))}, **more)
+    return compared_drive({"frames": rows_of(a_table(errors))}, **more)
 
 
 def a_side(label: str, errors: Sequence[int], **more: Any) -> Side:

@@ -19,7 +19,7 @@ from roadeval.evaluation.comparison import (
 )
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import within_drive
-from tests.evaluation.making import APart, a_part, a_side, a_table, rows_of
+from tests.evaluation.making import a_part, a_side, a_table, compared_drive, rows_of
 
 SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
@@ -28,9 +28,9 @@ POST = ("filtered", "post")
 def altered(side, **columns):
     """The result with columns of its frames replaced by what these functions make of them."""
     (part,) = side.parts
-    frames = part.tables["frames"]
+    frames = part.rows("frames")
     frames = frames.replace(**{name: make(frames[name]) for name, make in columns.items()})
-    return replace(side, parts=[replace(part, tables={"frames": frames})])
+    return replace(side, parts=[compared_drive({"frames": frames}, asked=part.asked)])
 
 
 def a_street(**errors):
@@ -63,7 +63,7 @@ def test_a_variant_that_both_have_on_no_frame_both_is_told():
     rows = rows_of(a_table({POST: [10] * 4, ("net", "post"): [20] * 4}))
     net, frame = rows["variant"] == "net", rows["frame"]
     sides = [
-        Side(name, [APart({"frames": rows.take(~net | mine)})])
+        Side(name, [compared_drive({"frames": rows.take(~net | mine)})])
         for name, mine in (("a", frame < 2), ("b", frame >= 2))
     ]
     assert compare(sides, SETTINGS).notes == (Note(Kind.VARIANT, "a", "b", names=("net",)),)
@@ -169,7 +169,7 @@ def test_variants_of_one_result_are_compared_with_unfiltered():
 
 def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_same():
     rows = rows_of(a_table({POST: [10] * 12, ("unfiltered", "post"): [12] * 12}))
-    street = Side("street", [APart({"frames": rows}, digest=None)])
+    street = Side("street", [compared_drive({"frames": rows}, digest=None)])
     sides = variants_as_sides(street, ["filtered", "unfiltered"])
     found = compare(sides, SETTINGS, across_variants=True)
     assert found.changes[0].difference["ERR"].mean == pytest.approx(-0.02)
@@ -296,7 +296,9 @@ def test_changes_are_parted_by_the_tags_of_the_new_result():
 
 def test_drives_that_are_left_out_or_have_moved_are_told():
     base, new = a_fleet("a", noisy(3)), a_fleet("b", noisy(4))
-    moved = [replace(part, drive=f"new/{part.drive}") for part in new.parts]
+    moved = [
+        replace(part, drive=f"new/{part.drive}", name=f"new/{part.drive}") for part in new.parts
+    ]
     notes = compare([base, replace(new, parts=moved)], SETTINGS).notes
     assert notes == (
         Note(Kind.ABSENT, "b", "a", 1, ("new/3",)),

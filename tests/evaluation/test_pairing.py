@@ -10,15 +10,15 @@ from roadeval.evaluation.comparison import (
     matched,
     one_drive,
 )
-from tests.evaluation.making import APart, a_part, a_table, rows_of
+from tests.evaluation.making import a_table, compared_drive, rows_of
 
-SCORED = a_part({("filtered", "post"): [1]}).tables
+SCORED = {"frames": rows_of(a_table({("filtered", "post"): [1]}))}
 
 
 def a_result(label, *drives, scored=True):
     """A result of drives, each with its digest."""
     tables = SCORED if scored else {}
-    return Side(label, [APart(tables, drive, digest) for drive, digest in drives])
+    return Side(label, [compared_drive(tables, drive, digest) for drive, digest in drives])
 
 
 def pairs_of(found):

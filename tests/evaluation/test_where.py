@@ -13,7 +13,7 @@ from roadeval.evaluation.comparison import (
     variants_as_sides,
 )
 from roadeval.evaluation.settings import EvaluationSettings
-from tests.evaluation.making import APart, a_table, rows_of
+from tests.evaluation.making import a_table, compared_drive, rows_of
 
 SETTINGS = EvaluationSettings()
 
@@ -64,7 +64,7 @@ def test_a_frame_that_the_table_lacks_has_no_pixels_there():
 
 def a_run(first, second, **more):
     table = a_table({("first", "post"): first, ("second", "post"): second})
-    return Side("street", [APart({"frames": rows_of(table), **more})])
+    return Side("street", [compared_drive({"frames": rows_of(table), **more})])
 
 
 def test_a_mask_may_be_better_in_one_region_and_worse_in_another():
@@ -111,7 +111,9 @@ def scores(wrong, labelled=100, frames=12):
 def over_drives(wrong, **more):
     frames = rows_of(a_table({("first", "post"): [10] * 12}))
     parts = [
-        APart({"frames": frames, "scores": scores(wrong + place, **more)}, f"{place}", f"d{place}")
+        compared_drive(
+            {"frames": frames, "scores": scores(wrong + place, **more)}, f"{place}", f"d{place}"
+        )
         for place in range(6)
     ]
     return Side(str(wrong), parts)

@@ -413,7 +413,7 @@ def test_where_figures_cannot_be_written_the_earlier_outputs_stay_all_three(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(drawn, "write_figures", fail)
-    with pytest.raises(RoadevalError, match=r"reports: cannot write results \(No space") as caught:
+    with pytest.raises(RoadevalError, match=r"reports: cannot be written: No space") as caught:
         roadeval.replay(
             drive,
             settings(max_frames=12),

@@ -13,9 +13,8 @@ from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.report import charts as folder
 from roadeval.report.chart import ChartKind, Look, legend, looks, looks_of_results
-from roadeval.report.charts import differences, rates
-from roadeval.report.charts.differences import MEAN, NAMED, ForestRow
-from roadeval.report.charts.rates import figures_over_drive
+from roadeval.report.charts import standard as charts
+from roadeval.report.charts.standard import MEAN, NAMED, ForestRow, figures_over_drive
 from roadeval.report.findings import ErrorHeatmap
 from tests.evaluation.making import a_table, rows_of
 
@@ -62,7 +61,7 @@ def test_variants_of_one_result_are_compared_in_their_own_looks():
 
 def test_lines_go_along_the_drive_whatever_the_table_s_order():
     rows = rows_of(a_table({("net", "svm"): [90, 90, 90], ("net", "post"): [10, 20, 30]}))
-    (chart,) = rates.over_frames(rows.take(np.array([4, 3, 2, 5, 0, 1])), ["ERR"])
+    (chart,) = charts.over_frames(rows.take(np.array([4, 3, 2, 5, 0, 1])), ["ERR"])
     (line,) = chart.series
     assert numbers(line) == [(0, 10), (1, 20), (2, 30)]
 
@@ -70,7 +69,7 @@ def test_lines_go_along_the_drive_whatever_the_table_s_order():
 def test_each_rate_of_the_stages_has_its_own_chart_and_the_baseline_is_a_level():
     own = {"ERR": 0.1, "FPR": 0.2, "FNR": None}
     totals = {"filtered": {"svm": own, "post": own}, "blind": {"post": own}}
-    for chart, value in zip(rates.stages(totals), (10, 20, np.nan), strict=True):
+    for chart, value in zip(charts.stages(totals), (10, 20, np.nan), strict=True):
         for series in chart.series:
             np.testing.assert_allclose(series.y, [value, value])
 
@@ -80,19 +79,19 @@ def test_stages_of_variants_stand_in_the_order_of_their_chains():
     totals = {
         name: dict.fromkeys(chain, dict.fromkeys(SHORT, 0.1)) for name, chain in chains.items()
     }
-    assert rates.stages(totals)[0].names == ["svm", "trees", "post"]
+    assert charts.stages(totals)[0].names == ["svm", "trees", "post"]
 
 
 def test_a_rate_that_is_better_higher_need_not_begin_at_zero(monkeypatch):
-    monkeypatch.setattr(rates, "SHORT", {name: METRICS[name] for name in ("ERR", "ACC")})
-    made = rates.stages({"filtered": {"post": {"ERR": 0.1, "ACC": 0.9}}})
+    monkeypatch.setattr(charts, "SHORT", {name: METRICS[name] for name in ("ERR", "ACC")})
+    made = charts.stages({"filtered": {"post": {"ERR": 0.1, "ACC": 0.9}}})
     assert [chart.from_zero for chart in made] == [True, False]
 
 
 def test_a_region_has_its_error_rate_and_its_share_of_the_errors():
     table = {("lit", "filtered"): {"pixels": 0.5, "ERR": 0.1, "errors": 0.3}}
     titles = {"lit": "in light", "dark": "not counted"}
-    left, right = rates.regions(table, ["filtered"], titles)
+    left, right = charts.regions(table, ["filtered"], titles)
     assert left.names == right.names == ["in light", "not counted"]
     np.testing.assert_allclose(left.series[0].y, [10, np.nan])
     np.testing.assert_allclose(right.series[0].y, [30, np.nan])
@@ -101,19 +100,19 @@ def test_a_region_has_its_error_rate_and_its_share_of_the_errors():
 
 def test_equal_shades_are_equal_shares_in_every_map():
     maps = [ErrorHeatmap(n, np.array([[e]]), np.array([[e]])) for n, e in (("a", 0.1), ("b", 0.4))]
-    made = [*rates.heat(maps)]
+    made = [*charts.heat(maps)]
     assert [each.title for each in made] == ["FP of a", "FN of a", "FP of b", "FN of b"]
     assert [each.top for each in made] == pytest.approx([40] * 4)
     assert (made[0].most, made[0].colour, made[1].colour) == (10, colours.FP, colours.FN)
 
 
 def test_the_covered_share_is_in_percent():
-    chart = rates.coverage({"filtered": {3: 0.25, 8: 0.5}})
+    chart = charts.coverage({"filtered": {3: 0.25, 8: 0.5}})
     assert numbers(chart.series[0]) == [(3, 25), (8, 50)]
 
 
 ADDED = """
-from roadeval.report.charts.rates import OverDrive, over_windows
+from roadeval.report.charts.standard import OverDrive, over_windows
 
 FIGURE = OverDrive("Accuracy.", lambda windows: over_windows(windows, ["ACC"]))
 """
@@ -133,7 +132,7 @@ def test_a_figure_over_the_drive_is_one_file_in_the_folder(tmp_path, monkeypatch
 def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
     mean = replace(CHANGE, mean=-0.05, low=None, high=None)
     frames, changes = np.array([7, 9]), np.array([0.1, -0.2])
-    chart = differences.difference(frames, changes, "filtered", "unfiltered", mean)
+    chart = charts.difference(frames, changes, "filtered", "unfiltered", mean)
     worse, better = chart.series
     assert [*worse.points()] == [(7, pytest.approx(10))]
     assert [*better.points()] == [(9, pytest.approx(-20))]
@@ -146,7 +145,7 @@ def test_a_comparison_shows_changes_with_their_intervals():
     unsure = replace(CHANGE, low=None, high=None)
     changes = {"ERR": CHANGE, "FPR": unsure, "FNR": CHANGE}
     row = Change("new", "filtered", "post", True, 1, 12, {}, {}, changes)
-    first, second, _ = differences.changes([row])
+    first, second, _ = charts.changes([row])
     (own,) = first.series
     assert (own.y, own.low, own.high) == ([1], [-2], [4])
     assert np.isnan(second.series[0].low).all()
@@ -155,7 +154,7 @@ def test_a_comparison_shows_changes_with_their_intervals():
 def test_each_result_of_another_drive_has_a_row():
     own = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
     rows = [Change(n, "filtered", "post", True, 1, 12, {}, own, {}) for n in ("old", "new")]
-    made = differences.levels(rows)
+    made = charts.levels(rows)
     assert [chart.names for chart in made] == [["old", "new"]] * 3
     assert [chart.series[0].y for chart in made] == [[10, 10], [20, 20], [30, 30]]
 
@@ -170,7 +169,7 @@ def drives(count, group=None):
 
 
 def test_few_drives_have_a_row_each_and_below_them_the_mean():
-    (chart,) = differences.forest(drives(3), OVER, "change")
+    (chart,) = charts.forest(drives(3), OVER, "change")
     assert chart.kind is ChartKind.MARKS
     assert chart.names == ["drive_2", "drive_1", "drive_0", MEAN]
     assert chart.sums == 1
@@ -180,37 +179,37 @@ def test_few_drives_have_a_row_each_and_below_them_the_mean():
 
 def test_it_is_told_that_the_mean_has_no_interval():
     over = replace(OVER, low=None, high=None)
-    (chart,) = differences.forest(drives(3), over, "change")
+    (chart,) = charts.forest(drives(3), over, "change")
     assert np.isnan(chart.series[-1].low).all()
-    assert "The mean has no interval" in differences.caption(drives(3), over)
+    assert "The mean has no interval" in charts.caption(drives(3), over)
 
 
 def test_many_drives_are_points_from_the_worst_on_and_the_mean_lies_across():
     many = drives(NAMED + 1)
-    (chart,) = differences.forest(many, OVER, "change")
+    (chart,) = charts.forest(many, OVER, "change")
     assert chart.kind is ChartKind.POINTS
     assert chart.names[0] == f"drive_{NAMED}"
     assert (chart.level.value, chart.level.low, chart.level.high) == (1.0, -1.0, 3.0)
     worse, better = chart.series
     assert (worse.x[0], worse.y[0], better.x) == (0, NAMED / 10, [NAMED])
-    told = differences.caption(many, OVER)
+    told = charts.caption(many, OVER)
     assert f"The worst: drive_{NAMED} (+6.00), drive_{NAMED - 1} (+5.90)" in told
     assert "The best: drive_0 (0.00)" in told
 
 
 def test_the_group_of_a_drive_stands_beside_its_name():
-    (chart,) = differences.forest(drives(1, "monday"), OVER, "change")
+    (chart,) = charts.forest(drives(1, "monday"), OVER, "change")
     assert chart.names[0] == "drive_0 (monday)"
 
 
 def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
     some = [ForestRow(str(n), None, 0.0, -0.01, 0.015) for n in range(20)]
     many = [*some, ForestRow("huge", None, 0.0, -0.9, 0.9)]
-    (chart,) = differences.forest(many, OVER, "change")
+    (chart,) = charts.forest(many, OVER, "change")
     low, high = chart.y_range
     assert -2 < low < -1
     assert 3 < high < 4
-    assert "1 interval reaches beyond the edge" in differences.caption(many, OVER)
+    assert "1 interval reaches beyond the edge" in charts.caption(many, OVER)
 
 
 # --- Legends --------------------------------------------------------------------------------------
@@ -218,7 +217,7 @@ def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
 
 def test_a_legend_has_what_several_charts_show_once():
     rows = rows_of(a_table({("net", "post"): [10, 20], ("blind", "post"): [1, 2]}))
-    keys = legend(rates.over_frames(rows, ["ERR", "FPR"]))
+    keys = legend(charts.over_frames(rows, ["ERR", "FPR"]))
     assert [(key.name, key.kind) for key in keys] == [("net", "both"), ("blind", "both")]
     assert keys[0].look == looks(["net"])["net"]
     assert isinstance(keys[0].look, Look)

@@ -11,7 +11,7 @@ from roadeval.results.facts import DriveFacts, Facts, FrameAccount, Member, as_p
 from roadeval.results.fleet import FleetWriter, Record
 from roadeval.results.rows import Key, cells, effect_rows, score_rows
 from roadeval.results.sentences import degree, sentence, verdict
-from tests.evaluation.making import APart, a_table, autoregression, rows_of
+from tests.evaluation.making import a_table, autoregression, compared_drive, rows_of
 
 SETTINGS = EvaluationSettings()
 RNG = np.random.default_rng(11)
@@ -77,7 +77,7 @@ CASES = [
 def test_all_three_judge_the_same_difference_alike(variants, tmp_path):
     rows = a_drive(variants)
     effects, told = replayed(rows)
-    sides = variants_as_sides(Side("street", [APart({"frames": rows})]), variants)
+    sides = variants_as_sides(Side("street", [compared_drive({"frames": rows})]), variants)
     changes = compare(sides, SETTINGS, across_variants=True).changes
     of_replay = {e.variant: e.rates["ERR"] for e in effects if e.base == "unfiltered"}
     of_compare = {change.variant: change.difference["ERR"] for change in changes}

@@ -346,9 +346,7 @@ def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
 def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with (
-        pytest.raises(
-            ResultsError, match=r"cannot write results.*with `output\.reports`"
-        ) as caught,
+        pytest.raises(ResultsError, match=r"cannot be written: .*with `output\.reports`") as caught,
         ResultsWriter(tmp_path / "file"),
     ):
         pass

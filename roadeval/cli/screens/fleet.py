@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli.screens import tables
-from roadeval.data.words import interval, percent, points
+from roadeval.data.words import first_of, interval, percent, points
 from roadeval.evaluation.metrics import FULL
 from roadeval.report.blocks import Table
 from roadeval.results.facts import OverDrives
@@ -91,11 +90,11 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
         if condition.judged and (missing := [*condition.not_judged.values()]):
             more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
             yield f"{condition.condition}: {missing[0]}{more}"
-    reasons = Counter(_reason(drive, text, outcome) for drive, text in outcome.problems.items())
-    for reason, count in reasons.items():
-        drives = [d for d, text in outcome.problems.items() if _reason(d, text, outcome) == reason]
-        more = f" and {count - NAMED} more" if count > NAMED else ""
-        yield f"{', '.join(drives[:NAMED])}{more}: {reason}"
+    reasons: dict[str, list[str]] = {}
+    for drive, text in outcome.problems.items():
+        reasons.setdefault(_reason(drive, text, outcome), []).append(drive)
+    for reason, drives in reasons.items():
+        yield f"{first_of(drives, NAMED)}: {reason}"
 
 
 def _reason(drive: str, text: str, outcome: FleetOutcome) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,39 +19,26 @@ Places = npt.NDArray[np.intp]
 Rates = npt.NDArray[np.float64]
 
 
-class Part(Protocol):
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
     """A drive's part of a result. Its tables are read when they are asked for."""
 
-    @property
-    def drive(self) -> str:
-        """Its identity in the result."""
-
-    @property
-    def name(self) -> str:
-        """Its name for people."""
-
-    @property
-    def digest(self) -> str | None:
-        """The log's SHA-256, None where the result does not know it."""
-
-    @property
-    def group(self) -> str | None:
-        """What it shares with other drives of the result."""
-
-    @property
-    def tags(self) -> Mapping[str, str]:
-        """Values by the tags' keys."""
-
-    @property
-    def scored(self) -> bool:
-        """Whether any frame of it was."""
-
-    @property
-    def asked(self) -> Mapping[str, Any]:
-        """Settings that may change its numbers, by names as ``frames.scale``, where known."""
-
-    def rows(self, table: str) -> Rows:
-        """Return its rows of ``frames``, ``regions``, ``disagreements`` or ``scores``."""
+    drive: str
+    """Its identity in the result."""
+    name: str
+    """Its name for people."""
+    digest: str | None
+    """The log's SHA-256, None where the result does not know it."""
+    scored: bool
+    """Whether any frame of it was."""
+    asked: Mapping[str, Any]
+    """Settings that may change its numbers, by names as ``frames.scale``, where known."""
+    rows: Callable[[str], Rows]
+    """Returns its rows of ``frames``, ``regions``, ``disagreements`` or ``scores``."""
+    group: str | None = None
+    """What it shares with other drives of the result, as a day or a route."""
+    tags: Mapping[str, str] = field(default_factory=dict)
+    """Values by the tags' keys."""
 
 
 Pair = tuple[Part, Part]

@@ -33,7 +33,7 @@ from roadeval.report.blocks import (
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import drawn, span_of_frames, values
 from roadeval.report.pdf.typeset import ReportError
-from roadeval.runtime.files import companion_name, put_with
+from roadeval.runtime.files import companion_name, put_with, writing
 from roadeval.runtime.text import visible
 
 STYLE: Final = "page.css"
@@ -307,10 +307,6 @@ def write_page(path: Path, document: Document, beside: Beside = Beside.NOTHING) 
         pictures=None if beside is Beside.NOTHING else at,
         code=at if beside is Beside.ALL else None,
     )
-    try:
+    with writing(path, ReportError, "; choose another place"):
         put_with(path, page(document, place), files)
-    except OSError as error:
-        raise ReportError(
-            f"{path}: cannot be written ({error.strerror}); choose another place"
-        ) from error
     return path

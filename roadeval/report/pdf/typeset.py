@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from roadeval.data import colours
 from roadeval.errors import RoadevalError
-from roadeval.runtime.files import put
+from roadeval.runtime.files import put, writing
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -77,12 +77,8 @@ def write_file(path: Path, content: bytes) -> Path:
     ReportError
         If it cannot be written.
     """
-    try:
+    with writing(path, ReportError, "; choose another place"):
         put(path, content)
-    except OSError as error:
-        raise ReportError(
-            f"{path}: cannot be written ({error.strerror}); choose another place"
-        ) from error
     return path
 
 

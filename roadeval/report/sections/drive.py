@@ -24,10 +24,14 @@ from roadeval.report.blocks import (
     Table,
     Text,
 )
-from roadeval.report.charts import rates
-from roadeval.report.charts.differences import difference
-from roadeval.report.charts.rates import coverage, figures_over_drive
-from roadeval.report.charts.thresholds import CAPTION, curves
+from roadeval.report.charts import standard as charts
+from roadeval.report.charts.standard import (
+    CURVES_CAPTION,
+    coverage,
+    curves,
+    difference,
+    figures_over_drive,
+)
 from roadeval.report.findings import Findings, FleetFindings, PairedComparison
 from roadeval.report.images import variants_of
 from roadeval.report.sections.common import (
@@ -289,7 +293,7 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
     yield Heading("Where the errors are")
     names = titles([*dict.fromkeys(region for region, _ in findings.regions)], findings.height)
     yield Figure(
-        rates.regions(findings.regions, [*findings.finals], names),
+        charts.regions(findings.regions, [*findings.finals], names),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
@@ -299,7 +303,7 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
     yield Text(_regions_note(findings, names), "note")
     if isinstance(findings, Findings) and findings.heatmaps:
         yield Figure(
-            [*rates.heat(findings.heatmaps)],
+            [*charts.heat(findings.heatmaps)],
             f"Where the final masks go wrong, over {sampled_frames(findings)}. FP: non-road called "
             "road; FN: road missed. Percent of the frames that label the pixel; grey: none does.",
         )
@@ -360,7 +364,7 @@ def stages(findings: Findings) -> Iterator[Block]:
     """Yield what each stage did to the mask, and which part of the error is whose."""
     yield Heading("Which stage broke it")
     yield Figure(
-        rates.stages(findings.totals),
+        charts.stages(findings.totals),
         f"Rates of each stage's mask, means over the frames; {BASELINE}, which has no stages, for "
         "scale.",
     )
@@ -483,7 +487,7 @@ def thresholds(findings: Findings) -> Iterator[Block]:
     if not quoted or not charts:
         return
     yield Heading("Over thresholds")
-    yield Figure(charts, CAPTION)
+    yield Figure(charts, CURVES_CAPTION)
     yield _thresholds_table(findings, quoted)
     yield Text(
         "All labelled pixels of the evaluated frames together. F is the harmonic mean of precision "

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import DASH, interval, number, percent, points
+from roadeval.data.words import DASH, first_of, interval, number, percent, points
 from roadeval.evaluation.score import BASES, TESTED
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, LongTable, Table, Text
-from roadeval.report.charts.differences import MEAN, ForestRow, caption, forest
+from roadeval.report.charts.standard import MEAN, ForestRow, caption, forest
 from roadeval.report.findings import FleetFindings, Row, WorstPicture
 from roadeval.results.facts import OverDrives, StratumFacts
 from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
@@ -197,7 +197,10 @@ def _reasons(findings: FleetFindings, rows: list[Row]) -> Iterator[Block]:
     ranked = sorted(by_reason.items(), key=lambda each: -len(each[1]))
     yield Table(
         ["drives", "which", "reason"],
-        [[number(len(names)), _first(names), reason] for reason, names in ranked[:NAMED]],
+        [
+            [number(len(names)), first_of(names, OF_ONE_REASON), reason]
+            for reason, names in ranked[:NAMED]
+        ],
         text_columns=(0, 1, 2),
         small=True,
     )
@@ -211,11 +214,6 @@ def _reason(row: Row) -> str:
     reason = row["reason"] or "no reason known"
     begin, _, rest = reason.partition(": ")
     return rest if rest and begin.rpartition("/")[2].startswith(row["name"]) else reason
-
-
-def _first(names: list[str]) -> str:
-    more = f" and {number(len(names) - OF_ONE_REASON)} more" if len(names) > OF_ONE_REASON else ""
-    return f"{', '.join(names[:OF_ONE_REASON])}{more}"
 
 
 def _losses(findings: FleetFindings, rows: list[Row]) -> Table:
@@ -380,7 +378,6 @@ def _worst_legend(findings: FleetFindings, shown: int) -> str:
     )
     if missing:
         lacking = [frame for frame in findings.worst if frame.picture is None]
-        named = [f"{findings.names[each.drive]} frame {each.frame}" for each in lacking[:LACKING]]
-        more = f" and {missing - LACKING} more" if missing > LACKING else ""
-        legend += f" Pictures of {missing} are not in the folder: {', '.join(named)}{more}."
+        named = [f"{findings.names[each.drive]} frame {each.frame}" for each in lacking]
+        legend += f" Pictures of {missing} are not in the folder: {first_of(named, LACKING)}."
     return legend

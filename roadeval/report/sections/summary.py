@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from roadeval.data import BASELINE, FINAL_STAGE
-from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
+from roadeval.data.words import DASH, counted, defined, interval, listing, number, percent, points
 from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT
 from roadeval.evaluation.stats import STUDENT_FROM
 from roadeval.report.blocks import (
@@ -280,11 +280,11 @@ def fleet_warnings(findings: FleetFindings) -> Iterator[str]:
         of = number(len(facts.drives))
         yield f"{number(failed)} of {of} drives failed: no number counts them."
     if damaged := facts.counts.get(DAMAGED):
-        yield f"{_drives(damaged)} scored without what is lost of the log."
+        yield f"{_were(damaged)} scored without what is lost of the log."
     scored = [row for row in findings.drives.values() if row["evaluated"]]
     if own := sum(1 for row in scored if row["trained_on"] and not row["model"]):
         yield (
-            f"{_drives(own)} scored by a model trained on the drive's own frames (none of "
+            f"{_were(own)} scored by a model trained on the drive's own frames (none of "
             "these is evaluated): the rates say how well it does on a road that it has seen."
         )
     if worse := _worse_than_baseline({row["variant"]: row["ERR"] for row in facts.rates}):
@@ -292,8 +292,8 @@ def fleet_warnings(findings: FleetFindings) -> Iterator[str]:
     yield from (f"{sentence}." for sentence in facts.warnings)
 
 
-def _drives(count: int) -> str:
-    return f"{number(count)} drive{' was' if count == 1 else 's were'}"
+def _were(count: int) -> str:
+    return f"{counted(count, 'drive')} {'was' if count == 1 else 'were'}"
 
 
 def _how_sure(findings: Findings) -> str:

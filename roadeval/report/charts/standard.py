@@ -1,0 +1,500 @@
+"""The charts of a report: of rates, of differences, and over thresholds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE, Rows, colours
+from roadeval.data.rows import Cells
+from roadeval.data.words import in_percent, points
+from roadeval.evaluation import score
+from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.evaluation.score import LEVELS, Thresholds, merged
+from roadeval.evaluation.stats import Difference
+from roadeval.report.chart import (
+    BETTER,
+    FAINT,
+    WORSE,
+    Chart,
+    ChartKind,
+    HeatMap,
+    Level,
+    Look,
+    Series,
+    looks,
+    thinned,
+)
+from roadeval.runtime.discovery import found_in
+
+if TYPE_CHECKING:
+    from roadeval.evaluation.comparison import Change
+    from roadeval.report.findings import ErrorHeatmap
+    from roadeval.results.facts import Totals
+
+
+LEAST_SHARE: Final = 1.0
+"""Percent of the frames to which a heat map's shades reach at least."""
+
+
+# --- Over the drive -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class OverDrive:
+    """A figure of a drive's report."""
+
+    caption: str
+    charts: Callable[[Rows], Sequence[Chart]]
+    """Return its charts of the rows of ``windows.csv``, any number of variants; or none."""
+
+
+def figures_over_drive() -> tuple[OverDrive, ...]:
+    """Return the paper's figures 3a and 3b, and what the modules of this package add."""
+    from roadeval.report import charts
+
+    return (
+        OverDrive("The paper's figure 3a: error rate.", lambda rows: over_windows(rows, ["ERR"])),
+        OverDrive(
+            "The paper's figure 3b: false positive and false negative error rates.",
+            lambda rows: over_windows(rows, ["FPR", "FNR"]),
+        ),
+        OverDrive("Further rates over the drive.", _further_rates),
+        *found_in(charts, "FIGURE"),
+    )
+
+
+def _further_rates(windows: Rows) -> list[Chart]:
+    """Return a chart of each rate of short tables that the paper's figures lack."""
+    further = [name for name in SHORT if name not in ("ERR", "FPR", "FNR")]
+    # In results that were made before a metric was added it is undefined everywhere.
+    known = [name for name in further if len(windows) and not np.isnan(windows[name]).all()]
+    return over_windows(windows, known)
+
+
+def over_windows(
+    windows: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+) -> list[Chart]:
+    """Return a chart a rate: each variant's final mask, window by window."""
+    if not len(windows):
+        return []
+    final = score.finals(windows)
+    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
+
+
+def over_frames(
+    frames: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+) -> list[Chart]:
+    """Return a chart a rate: each variant's final mask, frame by frame."""
+    final = score.finals(frames)
+    return _along(final, final["frame"], rates, drawn)
+
+
+def _along(
+    final: Rows, x: Cells, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+) -> list[Chart]:
+    """Return a chart a rate of rows that lie at ``x`` along the drive."""
+    order = np.argsort(x, kind="stable")
+    rows = final.take(order).replace(x=x[order])
+    names = final.distinct("variant")
+    drawn = drawn or looks(names)
+    return [
+        Chart(
+            f"{rate}: {METRICS[rate].in_words}",
+            ChartKind.LINES,
+            [
+                thinned(series(name, look, own["x"], 100 * own[rate]))
+                for name, look in drawn.items()
+                if name in names
+                for own in [rows.of_variant(name)]
+            ],
+            from_zero=not METRICS[rate].higher_is_better,
+        )
+        for rate in rates
+    ]
+
+
+def coverage(shares: Mapping[str, Mapping[int, float]]) -> Chart:
+    """Return the share of the image that each variant calls road, by frame."""
+    return Chart(
+        "Share of the image called road",
+        ChartKind.LINES,
+        [
+            thinned(series(name, look, shares[name], 100 * np.array([*shares[name].values()])))
+            for name, look in looks([*shares]).items()
+        ],
+    )
+
+
+# --- By stage, by region, over the image ----------------------------------------------------------
+
+
+def stages(totals: Totals) -> list[Chart]:
+    """Return a chart a rate: each stage's mask, a line a variant."""
+    names = merged(own for variant, own in totals.items() if variant != BASELINE)
+    return [
+        Chart(
+            f"{rate}: {metric.in_words}",
+            ChartKind.LINES,
+            [
+                _of_stages(variant, look, totals[variant], names, rate)
+                for variant, look in looks([*totals]).items()
+            ],
+            names=names,
+            from_zero=not metric.higher_is_better,
+        )
+        for rate, metric in SHORT.items()
+    ]
+
+
+def _of_stages(
+    variant: str, look: Look, own: Mapping[str, Mapping[str, Any]], names: Sequence[str], rate: str
+) -> Series:
+    """Return a variant's rate by stage; of the baseline, which has no stages, a level."""
+    if variant == BASELINE:
+        (total,) = own.values()
+        return series(variant, look, range(len(names)), [in_percent(total.get(rate))] * len(names))
+    values = [in_percent(total.get(rate)) for total in own.values()]
+    return series(variant, look, [names.index(stage) for stage in own], values)
+
+
+_OF_REGIONS: Final = {"ERR": "ERR within the region", "errors": "Share of the wrong pixels"}
+
+
+def regions(
+    found: Mapping[tuple[str, str], Mapping[str, float]],
+    variants: Sequence[str],
+    titles: Mapping[str, str],
+) -> list[Chart]:
+    """Return the error rate in each region, and its share of the errors beside that of pixels.
+
+    Parameters
+    ----------
+    found
+        See `roadeval.evaluation.score.by_region`.
+    variants
+        Those to draw, in order.
+    titles
+        The regions to draw, from top to bottom, with their titles.
+    """
+
+    def column(name: str, variant: str) -> list[float]:
+        return [in_percent(found.get((region, variant), {}).get(name)) for region in titles]
+
+    return [
+        Chart(
+            title,
+            ChartKind.MARKS,
+            [
+                series(variant, look, range(len(titles)), column(name, variant))
+                for variant, look in looks(variants).items()
+            ],
+            names=[*titles.values()],
+            share=column("pixels", variants[0]) if name == "errors" else (),
+        )
+        for name, title in (
+            ("ERR", "ERR within the region"),
+            ("errors", "Share of the wrong pixels"),
+        )
+    ]
+
+
+def heat(maps: Sequence[ErrorHeatmap]) -> Iterator[HeatMap]:
+    """Yield where each variant has false positives and negatives; equal shades are equal shares."""
+    fp, fn = (
+        100 * max([float(np.nan_to_num(share).max()) for share in shares] or [0.0])
+        for shares in ([each.fp for each in maps], [each.fn for each in maps])
+    )
+    for each in maps:
+        for outcome, shares, top, colour in (
+            ("FP", each.fp, fp, colours.FP),
+            ("FN", each.fn, fn, colours.FN),
+        ):
+            title = f"{outcome} of {each.variant}"
+            yield HeatMap(title, 100 * shares, max(top, LEAST_SHARE), colour)
+
+
+def series(name: str, look: Look, x: Any, y: Any) -> Series:
+    """Return a series of any numbers."""
+    return Series(name, look, [float(each) for each in x], np.asarray(y, float).tolist())
+
+
+MEAN: Final = "mean over drives"
+NAMED: Final = 60
+"""More drives than this stand without their names, but for the extremes."""
+EXTREMES: Final = 3
+"""Drives named at either end, where not all are."""
+WIDEST: Final = 0.9
+"""The share of the drives' intervals that are seen whole; an axis for all would hide the rest."""
+LEAST: Final = 0.001
+"""The difference on either side of zero that is shown at least: less may be rounding."""
+
+
+_Interval = tuple[float | None, float | None, float | None]
+"""A mean and the ends of its interval, as fractions."""
+
+
+def difference(
+    frames: Cells, changes: Cells, treated: str, control: str, mean: Difference
+) -> Chart:
+    """Return the paired difference of ERR, frame by frame, and its mean with the interval."""
+    drawn, change = looks([treated, control]), 100 * changes
+    return Chart(
+        f"ERR of {treated} minus {control}",
+        ChartKind.BARS,
+        [
+            thinned(series(f"{treated} {word}", drawn[name], frames, np.where(own, change, np.nan)))
+            for word, name, own in (
+                ("worse", control, change > 0),
+                ("better", treated, change <= 0),
+            )
+        ],
+        unit="pp",
+        level=Level(
+            "mean" if mean.low is None else "mean and its interval",
+            *map(in_percent, (mean.mean, mean.low, mean.high)),
+        ),
+    )
+
+
+def changes(finals: Sequence[Change]) -> list[Chart]:
+    """Return each result's changes of rates against the base, a chart a rate."""
+    return [
+        Chart(
+            f"Change of {rate}",
+            ChartKind.MARKS,
+            [
+                _intervals(
+                    *("change and its interval", Look(FAINT), range(len(finals))),
+                    [(own.mean, own.low, own.high) for own in (r.difference[rate] for r in finals)],
+                )
+            ],
+            names=[row.name for row in finals],
+            unit="pp",
+        )
+        for rate in SHORT
+    ]
+
+
+def levels(finals: Sequence[Change]) -> list[Chart]:
+    """Return the rates of several results' final masks, a chart a rate."""
+    results = list(dict.fromkeys(row.result for row in finals))
+    variants = list(dict.fromkeys(row.variant for row in finals))
+    return [
+        Chart(
+            rate,
+            ChartKind.MARKS,
+            [
+                Series(
+                    variant,
+                    look,
+                    [results.index(row.result) for row in finals if row.variant == variant],
+                    [in_percent(row.new[rate]) for row in finals if row.variant == variant],
+                )
+                for variant, look in looks(variants).items()
+            ],
+            names=results,
+            from_zero=not SHORT[rate].higher_is_better,
+        )
+        for rate in SHORT
+    ]
+
+
+# --- Drive by drive -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ForestRow:
+    """A drive's difference, or the mean over drives, as a fraction; lower is better."""
+
+    name: str
+    group: str | None
+    mean: float
+    low: float | None
+    high: float | None
+    """Ends of its interval, or None."""
+
+
+def forest(rows: Sequence[ForestRow], mean: ForestRow, label: str) -> list[Chart]:
+    """Return every drive's difference with its interval, the worst first, and their mean.
+
+    Rows with names, as long as they are few; of more drives points side by side.
+    """
+    ranked = _ranked(rows)
+    names = [row.name if row.group is None else f"{row.name} ({row.group})" for row in ranked]
+    drives = [
+        _intervals(word, look, own, [(r.mean, r.low, r.high) for r in (ranked[p] for p in own)])
+        for word, look, own in (
+            ("worse", Look(WORSE), [p for p, row in enumerate(ranked) if row.mean > 0]),
+            ("better", Look(BETTER), [p for p, row in enumerate(ranked) if row.mean <= 0]),
+        )
+    ]
+    ends = _limits(rows, mean)
+    if len(rows) > NAMED:
+        level = Level(MEAN, *map(in_percent, (mean.mean, mean.low, mean.high)))
+        made = Chart(label, ChartKind.POINTS, drives, names, "pp", level=level)
+        return [replace(made, y_range=ends)]
+    look, told = Look(FAINT, mark="diamond"), [(mean.mean, mean.low, mean.high)]
+    drives.append(_intervals(MEAN, look, [len(ranked)], told))
+    made = Chart(label, ChartKind.MARKS, drives, [*names, MEAN], "pp", sums=1)
+    return [replace(made, y_range=ends)]
+
+
+def caption(rows: Sequence[ForestRow], mean: ForestRow) -> str:
+    """Return what a chart of drives shows."""
+    ranked = _ranked(rows)
+    if len(rows) <= NAMED:
+        told = ["A row a drive, with its own interval, the worst above."]
+        if any(row.group for row in rows):
+            told.append("In brackets the group that it belongs to.")
+    else:
+        told = ["A point a drive, with its own interval, the worst on the left."]
+        for word, some in (("worst", ranked[:EXTREMES]), ("best", ranked[: -EXTREMES - 1 : -1])):
+            named = (f"{row.name} ({points(row.mean)})" for row in some)
+            told.append(f"The {word}: {', '.join(named)}.")
+    if missing := sum(row.low is None for row in rows):
+        told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
+    if beyond := cut(rows, mean):
+        told.append(f"{beyond} interval{' reaches' if beyond == 1 else 's reach'} beyond the edge.")
+    if mean.low is None:
+        told.append("The mean has no interval: too few drives or groups of drives.")
+    return " ".join(told)
+
+
+def cut(rows: Sequence[ForestRow], mean: ForestRow) -> int:
+    """Count the drives whose interval reaches beyond the chart."""
+    low, high = _limits(rows, mean)
+    ends = [(row.low, row.high) for row in rows if row.low is not None and row.high is not None]
+    return sum(100 * a < low or 100 * b > high for a, b in ends)
+
+
+def _ranked(rows: Sequence[ForestRow]) -> list[ForestRow]:
+    return sorted(rows, key=lambda row: (-row.mean, row.name))
+
+
+def _limits(rows: Sequence[ForestRow], mean: ForestRow) -> tuple[float, float]:
+    """Return the ends of the axis in percentage points: every mean is seen, and most intervals."""
+    wanted = [row.mean for row in rows] + [0.0, LEAST, -LEAST]
+    wanted += [end for end in (mean.low, mean.high) if end is not None]
+    for ends, share in (
+        ([row.low for row in rows if row.low is not None], 1 - WIDEST),
+        ([row.high for row in rows if row.high is not None], WIDEST),
+    ):
+        if ends:
+            wanted.append(float(np.quantile(ends, share)))
+    low, high = 100 * min(wanted), 100 * max(wanted)
+    margin = 0.04 * (high - low)
+    return low - margin, high + margin
+
+
+def _intervals(
+    name: str,
+    look: Look,
+    places: Sequence[int],
+    found: Sequence[_Interval],
+) -> Series:
+    """Return means and the ends of their intervals, all as fractions, as a series."""
+    columns = ([in_percent(each) for each in column] for column in zip(*found, strict=True))
+    return Series(name, look, [*places], *(columns if found else ([],)))
+
+
+LEAST_AXIS: Final = 50
+"""Percent at which axes begin, unless a mask lies lower."""
+STEP: Final = 10
+"""Percent by which they are widened."""
+MOST: Final = 101.0
+"""Percent at which axes end, so that a line along the edge is seen."""
+CURVES_CAPTION: Final = (
+    "Precision over recall, ROC, and reliability: the share of road among pixels of about the same "
+    "probability, beside the diagonal on which it is what the probability says. A curve belongs to "
+    "a variant that says how probable road is; a mark is a mask at its own threshold. Axes begin "
+    "where the masks lie."
+)
+
+Masks = Mapping[str, Mapping[str, Mapping[str, Any]]]
+
+
+def curves(levels: Rows, quoted: Masks, totals: Masks) -> list[Chart]:
+    """Return precision over recall, the ROC, and reliability; none without a probability.
+
+    Parameters
+    ----------
+    levels
+        As ``probabilities.csv``.
+    quoted, totals
+        As ``curves`` and ``totals`` in ``summary.json``: of every variant.
+    """
+    if not len(levels):
+        return []
+    drawn = looks([*(name for name in totals if name != BASELINE), BASELINE])
+    recall, roc = [], []
+    for name, each in _thresholds(levels).items():
+        recall.append(_curve(name, drawn[name], each.recall, each.precision))
+        # From the threshold that nothing reaches.
+        ends = (np.concatenate([[0.0], rates]) for rates in (each.fpr, each.recall))
+        roc.append(_curve(name, drawn[name], *ends))
+    masks = {name: _mask([*totals[name].values()][-1]) for name in drawn if name in totals}
+    for name, (fpr, tpr, precision) in masks.items():
+        recall.append(_mark(f"{name}: the mask", drawn[name], tpr, precision))
+        roc.append(_mark(f"{name}: the mask", drawn[name], fpr, tpr))
+    bins = [
+        _curve(name, drawn[name], *([b[key] for b in own["bins"]] for key in _AXES))
+        for name, stages in quoted.items()
+        for own in stages.values()
+    ]
+    ideal = Series("as probabilities say", Look(FAINT, "dotted"), [0.0, 100.0], [0.0, 100.0])
+    fprs, tprs, precisions = zip(*masks.values(), strict=True)
+    # What is recall below the first chart is so beside the second, too.
+    across, up = (_below(tprs), MOST), (_below(precisions), MOST)
+    most = math.ceil(max([*filter(math.isfinite, fprs), STEP]) / STEP) * float(STEP)
+    lines, whole = ChartKind.LINES, (-1.0, MOST)
+    return [
+        Chart("precision", lines, recall, across="recall", x_range=across, y_range=up),
+        Chart("TPR", lines, roc, across="FPR", x_range=(-0.01 * most, most), y_range=across),
+        Chart(
+            *("share of road", lines, [*bins, ideal]),
+            across="probability",
+            x_range=whole,
+            y_range=whole,
+        ),
+    ]
+
+
+_AXES: Final = ("probability", "road")
+
+
+def _thresholds(levels: Rows) -> dict[str, Thresholds]:
+    """Return the thresholds of each variant that says how probable road is."""
+    made = {}
+    for variant, _, places in levels.masks():
+        rows = levels.take(places)
+        counts = np.zeros((2, LEVELS), np.int64)
+        counts[:, rows["level"]] = rows["other"], rows["road"]
+        made[variant] = Thresholds.of(counts)
+    return made
+
+
+def _mask(total: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Return FPR, TPR and precision of a mask, in percent."""
+    precision = score.overlap(total)["precision"]
+    return in_percent(total["pooled_FPR"]), in_percent(total["pooled_TPR"]), in_percent(precision)
+
+
+def _below(values: Sequence[float]) -> float:
+    known = [value for value in values if math.isfinite(value)]
+    return float(min(math.floor(min([*known, LEAST_AXIS]) / STEP) * STEP, LEAST_AXIS))
+
+
+def _curve(name: str, look: Look, x: Any, y: Any) -> Series:
+    across, up = (100 * np.asarray(each, float) for each in (x, y))
+    known = np.isfinite(across)
+    return Series(name, look, across[known].tolist(), up[known].tolist())
+
+
+def _mark(name: str, look: Look, x: float, y: float) -> Series:
+    there = math.isfinite(x) and math.isfinite(y)
+    return Series(name, look, [x] * there, [y] * there)
