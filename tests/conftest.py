@@ -18,6 +18,9 @@ settings.load_profile("roadeval")
 if find_spec("roadeval.kernels._loops") is None:
     os.environ["ROADEVAL_PLAIN"] = "1"
 
+# On GitHub the comparisons of the tests would stand on the page of the job.
+os.environ.pop("GITHUB_STEP_SUMMARY", None)
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(

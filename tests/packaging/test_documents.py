@@ -22,7 +22,7 @@ NAMED = re.compile(r"`([\w/]+\.py)`, `(\w+)`")
 MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 """The head of a file that CONTRIBUTING.md adds."""
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
-ELSEWHERE = ("reports/", "recordings/", "build/", "masks/", "images/", "../shared/")
+ELSEWHERE = (".venv/", "reports/", "recordings/", "build/", "masks/", "images/", "../shared/")
 """Where runs write, and what users bring."""
 
 
@@ -31,7 +31,7 @@ def exists(path: str, document: Path) -> bool:
 
     Tests may run where the package is installed and the checkout has none.
     """
-    path = path.removeprefix("../roadeval/").removeprefix("roadeval/")
+    path = re.sub(r"^(\.\./)*roadeval/", "", path)
     if any((place / path).exists() for place in (document.parent, ROOT, PACKAGE)):
         return True
     # A folder may be named alone where its room is clear.
