@@ -212,10 +212,13 @@ def _told_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
 
 _KEYS: Final = ("path", "group", "tags", *OF_A_LOG)
 _COLUMNS: Final = ("path", "group", "tag.KEY", *(f"{table}.KEY" for table in OF_A_LOG))
-_TEXTS: Final = ("topics.image", "topics.truth", "topics.shadow", "topics.masks")
+_TEXTS: Final = (
+    *("topics.image", "topics.truth", "topics.shadow", "topics.masks"),
+    *("truth.path", "truth.images"),
+)
 """Columns whose cells are text, even if they look like numbers."""
 _LISTS: Final = ("labels.road", "labels.ignore")
-"""Columns whose cells are numbers, with spaces, commas or semicolons between them."""
+"""Columns whose cells are numbers, with spaces, commas or semicolons between them, or names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,6 +317,8 @@ def _value(column: str, cell: str) -> Any:
     """Return a cell as in a TOML file: a number, true or false, a list, or else text."""
     if column in _LISTS and re.fullmatch(r"[\d\s,;]+", cell):
         return [int(number) for number in re.findall(r"\d+", cell)]
+    if column in _LISTS and not cell.startswith("["):
+        return [name.strip() for name in re.split("[,;]", cell)]
     if column in ("path", "group"):
         return cell
     try:

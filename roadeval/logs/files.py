@@ -12,6 +12,7 @@ from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import NS
 from roadeval.runtime.files import check_input
+from roadeval.runtime.text import visible
 
 _HEAD: Final = 64
 """Bytes by which a file is recognised."""
@@ -218,6 +219,12 @@ def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
         return list(files), None
     in_order = sorted(files, key=times.__getitem__)
     return in_order, [times[file] for file in in_order]
+
+
+def some(files: Sequence[str | Path]) -> str:
+    """Return the names of the first three files, for messages."""
+    names = ", ".join(visible(Path(file).name) for file in files[:3])
+    return names + (", ..." if len(files) > 3 else "")
 
 
 def of_ids(labels: Sequence[Path]) -> Sequence[Path]:

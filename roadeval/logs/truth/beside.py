@@ -12,7 +12,7 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.files import IMAGES, listed, natural, of_ids
+from roadeval.logs.files import IMAGES, listed, natural, of_ids, some
 from roadeval.logs.messages.pictures import Picture, RawPicture
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, Drawn, Size
@@ -161,7 +161,10 @@ def _raise(problem: str, *_: Any) -> Picture:
 
 def _label(drawn: Drawn, classes: dict[str, int]) -> NamedLabel:
     def picture(content: bytes, limits: Limits) -> Picture:
-        pixels = drawn.pixels(content, classes, limits)
+        try:
+            pixels = drawn.pixels(content, classes, limits)
+        except _NOT_SO as error:
+            raise BadMessage(str(error)) from error
         height, width = pixels.shape
         data = pixels.astype("<u2").tobytes()
         return RawPicture(0, width, height, "mono16", 0, big_endian=False, data=data)
@@ -175,17 +178,13 @@ def _notes(
     """Return what a user should know of the labels, a sentence each."""
     notes = []
     if others:
-        notes.append(f"{_some(others)}: of another format than the other labels, not read")
+        notes.append(f"{some(others)}: of another format than the other labels, not read")
     if bare := len(drawn) - len(labelled):
         notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
     beyond = [each.image for each in labelled if isinstance(each, Drawing) and each.is_cut()]
     if beyond:
         notes.append(
             f"{len(beyond)} of {len(labelled)} labels reach beyond their image, and are cut at its "
-            f"edge: {_some(beyond)}"
+            f"edge: {some(beyond)}"
         )
     return tuple(notes)
-
-
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(Path(name).name for name in names[:3]) + (", ..." if len(names) > 3 else "")

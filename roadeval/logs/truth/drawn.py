@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -29,17 +30,6 @@ FARTHEST: Final = 1e6
 """Pixels from the image's corner at which a point may lie."""
 
 
-def _numbers(values: Sequence[float], most: float, wrong: str) -> npt.NDArray[np.float64]:
-    """Return a list of numbers of which none is beyond ``most``; else a `BadMessage`."""
-    try:
-        found = np.asarray(values, np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise BadMessage(wrong) from error
-    if found.ndim != 1 or not (np.abs(found) <= most).all():
-        raise BadMessage(wrong)
-    return found
-
-
 class Outline(NamedTuple):
     """An area inside a ring of points."""
 
@@ -51,7 +41,7 @@ class Outline(NamedTuple):
         """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if it is no outline."""
         width, height = size
         crossings = np.zeros((height, width + 1), np.bool_)
-        points = self._points()
+        points = self.points()
         for (x, y), (next_x, next_y) in zip(points, np.roll(points, -1, axis=0), strict=True):
             first, end = np.ceil(np.clip(sorted((y, next_y)), 0, height)).astype(int)
             if first < end:
@@ -61,21 +51,12 @@ class Outline(NamedTuple):
         filled: Mask = np.logical_xor.accumulate(crossings, axis=1)[:, :width]
         return filled
 
-    def _points(self) -> npt.NDArray[np.float64]:
+    def points(self) -> npt.NDArray[np.float64]:
         """Return the ``(n, 2)`` points of the ring, from the centre of the first pixel."""
-        wrong = f"an outline of {self.label} whose points are no pixels"
-        flat = _numbers(self.ring, FARTHEST, wrong)
-        if len(flat) % 2:
-            raise BadMessage(wrong)
+        flat = np.asarray(self.ring, np.float64)
+        if flat.ndim != 1 or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
+            raise BadMessage(f"an outline of {self.label} whose points are no pixels")
         return flat.reshape(-1, 2) - 0.5
-
-    def is_beyond(self, size: Size) -> bool:
-        """Whether it reaches more than a pixel beyond an image; not if it is no outline."""
-        try:
-            points = self._points()
-        except BadMessage:
-            return False
-        return bool(((points < -1.5) | (points > np.add(size, 0.5))).any())
 
 
 def rectangle(label: str, left: float, top: float, right: float, bottom: float) -> Outline:
@@ -96,12 +77,13 @@ class Runs(NamedTuple):
     def fill(self, size: Size) -> Mask:
         """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if the runs do not fit."""
         left, top, width, height = self.box or (0, 0, *size)
-        wrong = f"a mask of {self.label} that does not fit its image"
-        lengths = _numbers(self.lengths, width * height, wrong).astype(np.int64)
-        fits = min(left, top, width, height) >= 0
-        fits = fits and left + width <= size[0] and top + height <= size[1]
-        if not fits or (lengths < 0).any() or lengths.sum() != width * height:
-            raise BadMessage(wrong)
+        lengths = np.asarray(self.lengths, np.int64)
+        fits = left + width <= size[0] and top + height <= size[1]
+        fits = fits and min(left, top, width, height, lengths.min(initial=0)) >= 0
+        # Lengths that are too great could add up to the same number by overflow.
+        fits = fits and lengths.max(initial=0) <= width * height
+        if not fits or lengths.sum() != width * height:
+            raise BadMessage(f"a mask of {self.label} that does not fit its image")
         inside = np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)
         filled = np.zeros(size[::-1], np.bool_)
         filled[top : top + height, left : left + width] = (
@@ -129,9 +111,12 @@ class Drawing:
         return {shape.label for shape in self.shapes}
 
     def is_cut(self) -> bool:
-        """Whether an outline reaches more than a pixel beyond the image."""
-        outlines = [each for each in self.shapes if isinstance(each, Outline)]
-        return self.size is not None and any(each.is_beyond(self.size) for each in outlines)
+        """Whether an outline reaches more than a pixel beyond the image; not if one is wrong."""
+        with suppress(BadMessage, TypeError, ValueError, OverflowError):
+            rings = [each.points() for each in self.shapes if isinstance(each, Outline)]
+            beyond = (((r < -1.5) | (r > np.add(self.size or FARTHEST, 0.5))).any() for r in rings)
+            return any(beyond)
+        return False
 
     def content(self) -> bytes:
         """Return all that decides its pixels."""

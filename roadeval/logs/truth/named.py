@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.files import IMAGES, bare, images_of, listed, ordered, time_in
+from roadeval.logs.files import IMAGES, bare, images_of, listed, ordered, some, time_in
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.settings import LabelPlace
 from roadeval.runtime.text import visible
@@ -97,10 +97,6 @@ class NamedLabels:
         except (BadMessage, ImageError) as error:
             raise FrameError(f"{self.place(position)}: {error}") from error
 
-    def some(self) -> str:
-        """Return the names of the first three, for messages."""
-        return _some([label.path for label in self.labels])
-
     def place(self, position: int) -> str:
         """Return a label's path, for messages to people."""
         return visible(str(self.labels[position].path))
@@ -130,10 +126,10 @@ def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits)
     named = None if settings.images is None else _images(Path(settings.images))
     by, keys = _keys([label.path for label in labels], settings, named)
     if named is not None and not keys:
-        theirs, ours = (_some(own) for own in ([label.path for label in labels], named))
         raise LogError(
             f"{name}: none of them has the name of an image in {settings.images}: theirs are "
-            f"{theirs}, the images' {ours}; without `truth.images` numbers or stamps pair them"
+            f"{some([label.path for label in labels])}, the images' {some(named)}; without "
+            "`truth.images` numbers or stamps pair them"
         )
     found = sorted((label for label in labels if label.path in keys), key=lambda x: keys[x.path])
     for one, other in pairwise(label.path for label in found):
@@ -144,11 +140,6 @@ def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits)
     in_order = np.array([keys[label.path] for label in found], np.int64)
     nameless, images = len(labels) - len(found), None if named is None else len(named)
     return NamedLabels(visible(name), tuple(found), origin, in_order, by, limits, nameless, images)
-
-
-def _some(files: Sequence[Path]) -> str:
-    names = ", ".join(visible(file.name) for file in files[:3])
-    return names + (", ..." if len(files) > 3 else "")
 
 
 def _keys(
@@ -171,10 +162,7 @@ def _keys(
 def _number(file: Path) -> int:
     found = _LAST_NUMBER.search(bare(file))
     if found is None or len(found[1]) > _DIGITS:
-        raise LogError(
-            f"{file}: its name has no number, so its frame cannot be found; name the folder of "
-            "the images that the log was made of with `truth.images`"
-        )
+        raise LogError(f"{file}: its name has no number: pair by names, with `truth.images`")
     return int(found[1])
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import LogError
+from roadeval.logs.files import some
 from roadeval.logs.settings import LabelPlace, TopicSettings
 from roadeval.logs.topics.description import TopicInfo, median_period
 from roadeval.logs.topics.reader import UNREADABLE, TopicReader
@@ -282,8 +283,8 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     if not inside:
         raise LogError(
             f"{name}: none of them belongs to a frame by {labels.by}: theirs are {keys[0] + first} "
-            f"to {keys[-1] + first} ({labels.some()}), the frames' {first} to "
-            f"{first + frames - 1}{_help(labels, first)}"
+            f"to {keys[-1] + first} ({some([label.path for label in labels.labels])}), the frames' "
+            f"{first} to {first + frames - 1}{_help(labels, first)}"
         )
     if named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames):
         raise LogError(

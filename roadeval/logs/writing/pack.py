@@ -10,7 +10,7 @@ from typing import Final
 
 from roadeval.images import ImageError, Limits, format_of, size_of, to_png
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered
+from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
 from roadeval.logs.settings import NS
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.files import check_input
@@ -18,8 +18,6 @@ from roadeval.runtime.files import check_input
 CAMERA: Final = "/camera/image"
 TRUTH: Final = "/truth/road"
 DEFAULT_RATE_HZ: Final = 10.0
-NAMED: Final = 3
-"""Files that a warning names, at most."""
 LABEL_DELAY_NS: Final = 1
 """A label is logged right after its image."""
 
@@ -92,8 +90,7 @@ def _pack_folder(
     files, labels = listed(images, IMAGES), _label_images(masks, images) if masks else []
     belong = images_of(labels, files)
     if labels and not belong:
-        some = ", ".join(each.name for each in labels[:NAMED])
-        raise LogError(f"{masks}: no mask has the name of an image in {images} ({some}, ...)")
+        raise LogError(f"{masks}: no mask has the name of an image in {images} ({some(labels)})")
     by_image = {image: label for label, image in belong.items()}
     if len(by_image) < len(belong):
         extra = next(label for label in belong if by_image[belong[label]] != label)
@@ -131,8 +128,7 @@ def _label_images(masks: Path, images: Path) -> Sequence[Path]:
 def _unpaired(what: str, files: Sequence[Path]) -> Iterator[str]:
     """Yield a sentence that names some of the files, if there are any."""
     if files:
-        some = ", ".join(file.name for file in files[:NAMED]) + (", ..." if files[NAMED:] else "")
-        yield f"{what}: {some} ({len(files)} in all)"
+        yield f"{what}: {some(files)} ({len(files)} in all)"
 
 
 def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], str]:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import Drawing, Drawn, Outline, Runs, Segments, Shape, Size
 from roadeval.logs.truth.format import LabelFormat
-
-_WIDEST: Final = 60
-"""Bits of a number in a text of runs."""
 
 
 def _holds(_: Path, content: Any) -> bool:
@@ -62,7 +59,7 @@ def lengths_in(text: str) -> Sequence[int]:
         code = letter - 48
         value |= (code & 31) << shift
         shift += 5
-        if code & 32 and shift < _WIDEST:
+        if code & 32 and shift < 60:  # no number is longer
             continue
         if code & 16:
             value -= 1 << shift

@@ -32,12 +32,8 @@ def _read(path: Path, content: list[Mapping[str, Any]], _: Size | None) -> Itera
             values = [[r for v in task.values() if isinstance(v, list) for r in v]]
         for shapes in values:  # of each annotator
             areas = [each for each in shapes if {*_AREAS, *_UNREAD} & each.keys()]
-            size = _size(areas[0]) if areas else None
+            size = (areas[0]["original_width"], areas[0]["original_height"]) if areas else None
             yield Drawing(_image(task), size, [_shape(each, path) for each in areas])
-
-
-def _size(value: Mapping[str, Any]) -> Size:
-    return int(value["original_width"]), int(value["original_height"])
 
 
 def _is_void(annotation: Mapping[str, Any]) -> bool:
@@ -60,7 +56,7 @@ def _shape(value: Mapping[str, Any], path: Path) -> Shape:
         raise LogError(
             f"{path}: it holds {kind}, which roadeval does not read; export masks as PNG"
         )
-    width, height = _size(value)
+    width, height = value["original_width"], value["original_height"]
     (label,) = map(str, value[kind])
     if kind == "polygonlabels":
         flat = [n for x, y in value["points"] for n in (x * width / 100, y * height / 100)]

@@ -11,11 +11,9 @@ from typing import Any, Final
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import Drawing, Outline, Shape, Size
 from roadeval.logs.truth.format import LabelFormat
-from roadeval.runtime.documents import read_bounded
+from roadeval.runtime.documents import TOML_BYTES, read_bounded
 
 _LINE: Final = re.compile(r"\d+( +[-+.\deE]+){4,}\s*")
-_NAMES: Final = 1 << 20
-"""Bytes of a file with the names of classes."""
 _LISTS: Final = ("classes.txt", "obj.names", "labels.txt")
 """Files with the name of a class in each line."""
 
@@ -47,7 +45,7 @@ def _names(folder: Path) -> Mapping[int, str]:
                 return found
         for name in _LISTS:
             if (place / name).is_file():
-                return dict(enumerate(read_bounded(place / name, _NAMES).decode().splitlines()))
+                return dict(enumerate(read_bounded(place / name, TOML_BYTES).decode().splitlines()))
     return {}
 
 
@@ -56,7 +54,7 @@ def _names_in(file: Path) -> Mapping[int, str]:
     import yaml
 
     try:
-        content: Any = yaml.safe_load(read_bounded(file, _NAMES))
+        content: Any = yaml.safe_load(read_bounded(file, TOML_BYTES))
     except (yaml.YAMLError, RecursionError, ValueError, OSError):
         return {}
     names = content.get("names") if isinstance(content, dict) else None

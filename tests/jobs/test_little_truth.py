@@ -1,0 +1,246 @@
+"""Few labels, or none, that lie beside the log."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+import roadeval
+from roadeval import RoadevalError
+from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
+from roadeval.training import TrainingError
+from tests.e2e.commands import here
+from tests.e2e.test_fleet import Here
+from tests.jobs.making import FRAMES, write_log
+
+TABLES = ("frames", "windows", "regions")
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory) -> Path:
+    """A log without truth, its truth in folders of many and of few labels, and masks to score."""
+    base = tmp_path_factory.mktemp("places")
+    whole = write_log(base / "whole.mcap", net=True)
+    topics = TopicSettings(masks={"net": "/net/road_mask_prediction"})
+    for name in ("26", "21", "6", "net"):
+        (base / name).mkdir()
+    with (
+        open_log(whole, LogConfig(topics=topics)) as log,
+        LogWriter(base / "drive.mcap") as bare,
+    ):
+        for logged in log.frames(log.select()):
+            frame = logged.decode()
+            bare.image("/camera/image", frame.stamp_ns, bytes(frame.payload), "png")
+            name = f"{frame.number}.png"
+            rolled = np.roll(frame.external["net"], frame.number % 5 - 2, 0)
+            cv2.imwrite(str(base / "net" / name), rolled * 255)
+            if frame.truth is not None:
+                own = {"26": True, "21": frame.number < 22, "6": frame.number % 4 == 1}
+                for folder in (each for each in own if own[each]):
+                    cv2.imwrite(str(base / folder / name), frame.truth * 255)
+    for number in (1, 5, 9, 13, 17, 21, 25):
+        assert (base / "6" / f"{number}.png").exists()
+    (base / "6" / "25.png").unlink()
+    assert len([*(base / "21").iterdir()]) == 21
+    assert len([*(base / "6").iterdir()]) == 6
+    return base
+
+
+def replay(places: Path, out: Path, truth: str = "", only: tuple[str, ...] = (), **tables: Any):
+    config = roadeval.configure(
+        {
+            "masks": {"net": {"path": str(places / "net")}},
+            "only": list(only),
+            "truth": {"path": str(places / truth)} if truth else {},
+            "output": {"record": "none"},
+        }
+        | tables
+    )
+    return roadeval.replay(places / "drive.mcap", config, reports=out)
+
+
+def tables(folder: Path) -> dict[str, str]:
+    return {name: (folder / f"{name}.csv").read_text() for name in TABLES}
+
+
+@pytest.mark.parametrize("labels", [6, 21])
+def test_masks_alone_are_scored_on_every_label(places, tmp_path, labels):
+    """They learn nothing: nothing is trained, and no frame is taken for that."""
+    done = replay(places, tmp_path, str(labels), ("net",))
+    assert done.summary["frames"]["evaluated"] == labels
+    assert done.summary["frames"]["trained_on"] == 0
+    assert [*done.summary["totals"]] == ["net"]
+    whole = pd.read_csv(tmp_path / "frames.csv")
+    assert set(whole["variant"]) == {"net"}
+
+
+def test_six_labels_that_must_train_are_refused_with_what_would_do(places, tmp_path):
+    with pytest.raises(TrainingError) as caught:
+        replay(places, tmp_path, "6")
+    said = str(caught.value)
+    assert "the range has 6 labelled frames, and training would take 6 of them" in said
+    assert all(each in said for each in ("`training.frames` to 3", "`training.model`", "`only`"))
+    done = replay(places, tmp_path, "6", training={"frames": 3})
+    assert (done.summary["frames"]["trained_on"], done.summary["frames"]["evaluated"]) == (3, 3)
+
+
+def test_of_twenty_one_labels_ten_train_what_must_learn(places, tmp_path):
+    done = replay(places, tmp_path, "21")
+    assert (done.summary["frames"]["trained_on"], done.summary["frames"]["evaluated"]) == (10, 11)
+    alone = replay(places, tmp_path / "alone", "21", ("net",))
+    assert alone.summary["frames"]["evaluated"] == 21
+
+
+@pytest.mark.parametrize("only", [(), ("net",)])
+def test_no_truth_is_said(places, tmp_path, only):
+    done = replay(places, tmp_path, "", only)
+    assert done.summary["frames"]["evaluated"] == 0
+    assert any("there is no road truth to score against" in each for each in done.warnings)
+    assert done.summary["totals"] == {}
+
+
+def test_no_frames_for_training_are_enough_for_what_learns_nothing(places, tmp_path):
+    done = replay(places, tmp_path, "6", ("net",), training={"frames": 0})
+    assert done.summary["frames"]["evaluated"] == 6
+    with pytest.raises(RoadevalError) as caught:
+        replay(places, tmp_path, "6", training={"frames": 0})
+    assert "training.frames" in str(caught.value)
+
+
+@pytest.mark.parametrize(("truth", "only"), [("6", ("net",)), ("21", ()), ("21", ("unfiltered",))])
+def test_labelled_frames_alone_give_the_tables_of_the_whole(places, tmp_path, truth, only):
+    whole = replay(places, tmp_path / "whole", truth, only)
+    part = replay(places, tmp_path / "part", truth, only, frames={"labelled": True})
+    assert part.summary["frames"]["read"] == int(truth) < whole.summary["frames"]["read"] == FRAMES
+    assert tables(tmp_path / "part") == tables(tmp_path / "whole")
+    assert part.summary["totals"] == whole.summary["totals"]
+    assert any(each.startswith("only frames with truth were read") for each in part.warnings)
+
+
+def test_a_stride_that_misses_every_label_says_so(places, tmp_path):
+    done = replay(places, tmp_path, "6", ("net",), frames={"every": 2})
+    (said,) = [each for each in done.warnings if "none of the frames that were read" in each]
+    assert "`frames.every` 2 leaves out each one that has" in said
+    assert "`frames.labelled` reads only frames that have" in said
+    every = replay(places, tmp_path, "6", ("net",), frames={"every": 2, "labelled": True})
+    assert every.summary["frames"]["evaluated"] == 3
+
+
+def test_an_unknown_variant_is_wrong_usage(places):
+    run = here("replay", places / "drive.mcap", "--only", "nett", cwd=places)
+    assert run.returncode == 2
+    assert len(run.stderr.splitlines()) == 1
+    assert "nett" in run.stderr
+    assert "filtered" in run.stderr
+
+
+def test_the_run_file_repeats_the_run(places, tmp_path):
+    first = replay(places, tmp_path / "a", "6", ("net",))
+    config = roadeval.load_config(tmp_path / "a" / "run.toml")
+    assert config.only == ("net",)
+    assert config.truth.path == str(places / "6")
+    again = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "b")
+    assert again.summary["totals"] == first.summary["totals"]
+    assert tables(tmp_path / "b") == tables(tmp_path / "a")
+
+
+def test_the_summary_says_where_truth_lies(places, tmp_path):
+    def stated(folder, name):
+        return replay(folder, tmp_path / name, "6", ("net",)).summary["masks"]["truth"]
+
+    found = stated(places, "a")
+    assert found["path"] == str(places / "6")
+    assert found["pairing"] == "6 labels, paired by number"
+    assert found["meaning"].startswith("a mask of 0 255: road is 255")
+    assert found["frames"] == 6
+    other = shutil.copytree(places, tmp_path / "other")
+    assert stated(other, "b")["sha256"] == found["sha256"]
+    cv2.imwrite(str(other / "6" / "5.png"), np.full((24, 32), 255, np.uint8))
+    assert stated(other, "c")["sha256"] != found["sha256"]
+
+
+@pytest.fixture
+def fleet(places, tmp_path):
+    """Two drives with the same frames, and labels of each below ``labels``."""
+    for name in ("one", "two"):
+        shutil.copy(places / "drive.mcap", tmp_path / f"{name}.mcap")
+        shutil.copytree(places / "6", tmp_path / "labels" / name)
+
+    def run(**tables: Any):
+        executor = Here()
+        given = tables.pop("drives", [tmp_path / "one.mcap", tmp_path / "two.mcap"])
+        masks = {"net": {"path": str(places / "net")}}
+        config = roadeval.configure({"masks": masks, "only": ["net"], **tables})
+        done = roadeval.replay_fleet(given, tmp_path / "fleet", config, executor=executor)
+        return done, [Path(task.entry.source).stem for task in executor.tasks]
+
+    return run
+
+
+def test_a_label_that_has_changed_replays_its_drive_of_a_fleet(fleet, tmp_path):
+    truth = {"path": str(tmp_path / "labels" / "{drive}")}
+    assert fleet(truth=truth)[0].counts == {"scored": 2}
+    assert fleet(truth=truth)[1] == []
+    label = tmp_path / "labels" / "two" / "5.png"
+    before = label.stat()
+    cv2.imwrite(str(label), np.full((24, 32), 255, np.uint8))
+    os.utime(label, ns=(before.st_atime_ns, before.st_mtime_ns))
+    done, submitted = fleet(truth=truth)
+    assert (done.replayed, submitted) == (1, ["two"])
+    (tmp_path / "labels" / "one" / "2.png").write_bytes(label.read_bytes())
+    done, submitted = fleet(truth=truth)
+    assert (done.replayed, submitted) == (1, ["one"])
+
+
+def test_a_manifest_says_where_the_truth_of_a_drive_lies(fleet, tmp_path, monkeypatch):
+    (tmp_path / "labels" / "two").rename(tmp_path / "labels" / "2024")
+    monkeypatch.chdir(tmp_path / "labels")
+    manifest = tmp_path / "fleet.csv"
+    manifest.write_text("path,truth.path\none.mcap,one\ntwo.mcap,2024\n")
+    assert fleet(drives=[manifest])[0].counts == {"scored": 2}
+    written = tmp_path / "fleet.toml"
+    entries = [
+        f'[[drives]]\npath = "{name}.mcap"\ntruth = {{ path = "{own}" }}\n'
+        for name, own in (("one", "one"), ("two", "2024"))
+    ]
+    written.write_text("\n".join(entries))
+    done, submitted = fleet(drives=[written])
+    assert done.counts == {"scored": 2}
+    assert submitted == []
+
+
+def test_a_manifest_names_the_classes_of_a_drive(fleet, tmp_path):
+    shutil.rmtree(tmp_path / "labels" / "two")
+    (tmp_path / "labels" / "two").mkdir()
+    ring = [[4, 12], [28, 12], [28, 24], [4, 24]]
+    for number, label in enumerate(("lane marking", "kerb", "road")):
+        shape = {"label": label, "points": ring, "shape_type": "polygon"}
+        text = json.dumps({"shapes": [shape], "imageWidth": 32, "imageHeight": 24})
+        (tmp_path / "labels" / "two" / f"{number}.json").write_text(text)
+    manifest = tmp_path / "fleet.csv"
+    manifest.write_text(
+        "path,truth.path,labels.road,labels.ignore\n"
+        f"one.mcap,{tmp_path}/labels/one,255,\n"
+        f'two.mcap,{tmp_path}/labels/two,"road, lane marking",kerb\n'
+    )
+    done, _ = fleet(drives=[manifest])
+    assert done.counts == {"scored": 2}, done.problems
+
+
+def test_train_and_info_take_truth_beside_the_log(places, tmp_path):
+    drive, truth = places / "drive.mcap", ("--truth", places / "21")
+    model = tmp_path / "a.model"
+    run = here("train", drive, *truth, "-o", model)
+    assert run.returncode == 0, run.stderr
+    assert "by the truth" in run.stdout
+    run = here("info", drive, *truth, "--json")
+    assert run.returncode == 0, run.stderr
+    picks = json.loads(run.stdout)["picks"]
+    assert f"truth: {places / '21'} (21 labels, paired by number; " in picks[1]
+    assert "no truth" not in " ".join(picks)
