@@ -16,7 +16,7 @@ class Shown(IntEnum):
     IN_FILES = 0
     """A column of the tables and a series of the recording, and no more."""
     IN_FULL = 1
-    """Where all rates of a mask stand: key tables, rows over the drive, paired differences."""
+    """Where all rates of a mask are: key tables, rows over the drive, paired differences."""
     EVERYWHERE = 2
     """Short tables and lists, graphs and charts, too."""
 
@@ -46,7 +46,7 @@ class Metric:
     unit: str = "fraction"
     """Of the value in tables."""
     mirrors: str | None = None
-    """The metric that tells the same, as ``FNR`` for ``TPR = 1 - FNR``, and is shown in its stead.
+    """The metric that says the same, as ``FNR`` for ``TPR = 1 - FNR``, and is shown in its stead.
     """
     shown: Shown | None = None
     """Where people see it: everywhere by default, one that mirrors another in files alone."""

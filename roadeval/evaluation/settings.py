@@ -34,8 +34,8 @@ class EvaluationSettings:
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
     """Of the interval around a difference."""
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
-    """Frames that an interval needs. Fewer tell next to nothing of how alike neighbours are, so
+    """Frames that an interval needs. Fewer say almost nothing of how alike neighbours are, so
     none is given."""
     negligible: Annotated[float, Field(gt=0, le=1)] = 0.01
-    """A change of a drive's mean rate by no more than this matters to nobody: an interval that ends
+    """A change of a drive's mean rate by no more than this does not matter: an interval that ends
     within it is the answer that there is no larger effect."""

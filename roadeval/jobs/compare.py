@@ -277,7 +277,7 @@ def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], Rows] | N
 
     Each mask's rows have its name as variant; of a variant they are those of the frames on which
     all results have its mask. Where the variants of one result are compared, each is a result.
-    None where there is none.
+    None without any.
     """
     finals = {side.label: score.finals(side.rows(side.parts[0], "frames")) for side in sides}
     alone = all(rows.distinct("variant") == [label] for label, rows in finals.items())

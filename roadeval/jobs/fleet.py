@@ -29,8 +29,8 @@ from roadeval.jobs.fleet_work import (
     ending_the_run,
     failed,
     replay_drive,
-    standing,
     train_fold,
+    valid_record,
 )
 from roadeval.jobs.identity import software
 from roadeval.results.facts import FleetFacts, Member
@@ -124,7 +124,7 @@ def replay_fleet(
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
-    The folder is the state: a drive whose record stands there, made of the same log, settings,
+    The folder is the state: a drive whose record is there, made of the same log, settings,
     model and version, is not replayed again.
 
     Parameters
@@ -280,7 +280,7 @@ class FleetRun:
         waiting = []
         for task in tasks:
             ours = task.entry.path is not None and not attempts(task).exists()
-            record = standing(task) if ours else None
+            record = valid_record(task) if ours else None
             if record is None:
                 waiting.append(task)
             else:

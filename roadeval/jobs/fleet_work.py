@@ -54,7 +54,7 @@ TRAINING_DRIVES: Final = 20
 Their training frames are held decoded."""
 FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 CHANGE_TIMES: Final = os.name == "posix"
-"""Whether ``st_ctime`` tells when a file was changed, which nobody can set."""
+"""Whether ``st_ctime`` is the time of a file's last change, which no program can set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,15 +102,15 @@ class Done:
 
 
 def replay_drive(task: DriveTask) -> Done:
-    """Replay a drive and write its record, unless that stands there already.
+    """Replay a drive and write its record, unless it is there already.
 
     While another command works on the same drive, this one waits for it.
 
     Raises
     ------
     FleetError
-        If the fleet's disk fails, or the worker has other software: whatever is wrong with the
-        drive itself is in its record.
+        If the fleet's disk fails, or the worker has other software: any problem of the drive
+        itself is in its record.
     """
     _check(task.software, task.config)
     model = task.config.training.model
@@ -118,7 +118,7 @@ def replay_drive(task: DriveTask) -> Done:
         raise FleetError(f"{model}: has changed since the command began; give it again")
     own = [record_path(task.folder, task.entry.id), frames_path(task.folder, task.entry.id)]
     with ending_the_run(task.folder), alone(*own):
-        record, repeated = standing(task), True
+        record, repeated = valid_record(task), True
         if record is None:
             record, repeated = _made(task)
             record.write(task.folder)
@@ -126,7 +126,7 @@ def replay_drive(task: DriveTask) -> Done:
         return done(record, repeated=repeated)
 
 
-def standing(task: DriveTask) -> Record | None:
+def valid_record(task: DriveTask) -> Record | None:
     """Return the record of a drive that needs not be replayed: it is whole, and nothing changed."""
     record = _usable(task)
     if record is None:
@@ -148,7 +148,7 @@ def _usable(task: DriveTask) -> Record | None:
 
 
 def done(record: Record, *, repeated: bool = False) -> Done:
-    """Return what the fleet's command is told of a record."""
+    """Return what a record says to the fleet's command."""
     status, reason, frames = (record.value(name) for name in ("status", "reason", "evaluated"))
     names = TABLES["scores"].names
     rows = (dict(zip(names, row, strict=True)) for row in record.rows["scores"])
@@ -176,7 +176,7 @@ def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
 
 
 def attempts(task: DriveTask) -> Path:
-    """Return the file that tells how often a drive was begun since it was last done."""
+    """Return the file that counts how often a drive was begun since it was last done."""
     return record_path(task.folder, task.entry.id).with_suffix(".begun")
 
 
@@ -187,14 +187,14 @@ def _begun(task: DriveTask) -> int:
         return 0
 
 
-# --- What tells that something has changed --------------------------------------------------------
+# --- How changes are noticed ----------------------------------------------------------------------
 
 
 def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
-    """Return what tells at little cost whether a drive's log, or masks beside it, have changed.
+    """Return what shows at little cost whether a drive's log, or masks beside it, have changed.
 
     Plain data. Where ``content`` differs it has; where nothing differs it has not, if that is
-    ``sure``; else only reading all tells. None where it cannot be looked at.
+    ``sure``; else all must be read. None where it cannot be looked at.
     """
     try:
         beside = [own for own in (config.truth, *config.masks.values()) if own.path]
@@ -211,7 +211,7 @@ def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
         sure = CHANGE_TIMES or (not masks and None not in content.values())
         return {"content": content, "times": times, "sure": sure}
     except (OSError, RoadevalError):
-        return None  # what is wrong turns out where it is read
+        return None  # the error is reported where it is read
 
 
 def _files(path: Path) -> list[Path]:

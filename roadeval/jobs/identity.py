@@ -1,4 +1,4 @@
-"""What decides what a run finds, and what tells whether it has changed."""
+"""Digests of everything that the results of a run depend on."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OPENCV: Final = (
     *("opencv-python-headless", "opencv-python"),
     *("opencv-contrib-python-headless", "opencv-contrib-python"),
 )
-"""The packages that bring OpenCV; where none did, it tells its version itself."""
+"""The packages that bring OpenCV; without one, its own version is taken."""
 COMPUTING: Final = (
     *("numpy", "scipy", "scikit-learn", *OPENCV, "onnxruntime"),
     *("av", "isal", "mcap", "pillow", "simplejpeg"),
@@ -55,8 +55,8 @@ def software(config: RunConfig) -> dict[str, str]:
     """Return the versions of all that computes: roadeval, Python, packages, and others' stages.
 
     Of a stage that is not roadeval's own it is the digest of its code, see
-    `roadeval.runtime.discovery.code_of`. Not told are the processor, and how packages were
-    compiled.
+    `roadeval.runtime.discovery.code_of`. The processor, and how packages were compiled,
+    are not included.
     """
     python = ".".join(platform.python_version_tuple()[:2])
     own = {name: code.digest for name, code in config.others_code().items()}
@@ -66,8 +66,8 @@ def software(config: RunConfig) -> dict[str, str]:
 def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
     """Return a digest of the log, the settings, the model file and the software, in hexadecimal.
 
-    Equal for the same input, wherever log, model and masks lie. ``masks`` are the digests of those
-    that lie beside the log, by their variant.
+    Equal for the same input, in any place of log, model and masks. ``masks`` are the digests of
+    those that lie beside the log, by their variant.
 
     Raises
     ------

@@ -120,22 +120,22 @@ class CancelledReplayError(RoadevalError):
 
 @dataclass(slots=True)
 class _Running:
-    """A replay in its thread: what it has told, and why it failed."""
+    """A replay in its thread: how far it is, and why it failed."""
 
     recording: Path
     name: str
     stop: Event = field(default_factory=Event)
-    told: str = "it begins"
+    progress: str = "it begins"
     failure: str = ""
     thread: Thread | None = None
 
     @property
     def state(self) -> str:
-        """Where it stands, in a sentence."""
-        return f"Replaying {self.name}: {self.told} \N{HORIZONTAL ELLIPSIS}"
+        """How far it is, in a sentence."""
+        return f"Replaying {self.name}: {self.progress} \N{HORIZONTAL ELLIPSIS}"
 
-    def tell(self, progress: Progress) -> None:
-        """Take down how far it is.
+    def report(self, progress: Progress) -> None:
+        """Note how far it is.
 
         Raises
         ------
@@ -145,7 +145,7 @@ class _Running:
         if self.stop.is_set():
             raise CancelledReplayError(f"the replay of {self.name} was cancelled")
         of = "" if progress.total is None else f" of {progress.total}"
-        self.told = f"{progress.stage} {progress.done}{of}"
+        self.progress = f"{progress.stage} {progress.done}{of}"
 
 
 class Replayer:
@@ -170,7 +170,7 @@ class Replayer:
         Returns
         -------
         str
-            Where the replay stands; empty once the recording is there.
+            How far the replay is; empty once the recording is there.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Replayer:
 
         def run() -> None:
             try:
-                replay(running.tell)
+                replay(running.report)
             except RoadevalError as error:
                 running.failure = str(error)
             except Exception as error:

@@ -113,7 +113,7 @@ def findings_of(
 
 
 def _beside(folder: Path) -> Path:
-    """Return where the report of a folder lies; its other files may be somebody else's."""
+    """Return where the report of a folder lies; its other files may come from someone else."""
     path = folder / "report.pdf"
     if leads_outside(path, folder):
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")

@@ -40,9 +40,9 @@ OUTCOMES: Final = 6
 LAYERS: Final = 2
 """Variants of which such a frame shows the errors, and all layers, on paper."""
 PICTURED: Final = 24
-"""Frames of a page with pictures, where nobody says how many."""
+"""Frames of a page with pictures, by default."""
 BYTES: Final = 9_900_000
-"""Of a page, at most, where nobody says how many frames have pictures."""
+"""Of a page, at most, where the number of frames with pictures is not given."""
 FEWEST: Final = 8
 """Frames that have pictures even if not every variant's layers have room for it."""
 SHADOW: Final = 1 / 3

@@ -96,7 +96,7 @@ class DriveResult:
             return self.path if self.pictured else None
         written = self.facts.run.get("output", {}).get("save")
         path = Path(written or Path("recordings", f"{self.name}.rrd"))
-        # A summary from elsewhere may name a share of somebody's server, which Windows would ask.
+        # A summary from elsewhere may name a network share, which Windows would contact.
         if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None
         try:
@@ -178,7 +178,7 @@ class DriveResult:
 
     @cached_property
     def _both(self) -> list[int]:
-        """The frames that stand in the tables of frames and of regions."""
+        """The frames in both tables, of frames and of regions."""
         frames, regions = (self._tables.rows(name)["frame"] for name in ("frames", "regions"))
         both: list[int] = np.intersect1d(frames, regions).tolist()
         return both

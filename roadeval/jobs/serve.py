@@ -45,7 +45,7 @@ def serve(
     trust_sources: bool = False,
     commands: MakeCommands | None = None,
 ) -> None:
-    """Serve results as pages on 127.0.0.1 until the process is told to end, as by Ctrl-C.
+    """Serve results as pages on 127.0.0.1 until the process is interrupted, as by Ctrl-C.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from roadeval.results.tables import TableFacts
 from roadeval.version import VERSION
 
 JOURNEY: Final = 3
-"""So many training frames that show places of a drive tell that it is the same journey."""
+"""With so many training frames that show places of a drive it is taken for the same journey."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 

@@ -61,7 +61,7 @@ def codec(spec: LayerSpec, width: int, height: int) -> Codec:
 
 @dataclass(frozen=True)
 class Codec:
-    """Encodes and decodes images of one kind, and tells the viewer how to show them.
+    """Encodes and decodes images of one kind, and describes to the viewer how to show them.
 
     This one is for the camera's images, JPEG or PNG as the log has them.
     """
@@ -180,7 +180,7 @@ class ScalarCodec(_LayerCodec):
     component = "EncodedDepthImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """Return the colour map; to the viewer grey levels are fractions, whatever the unit."""
+        """Return the colour map; to the viewer grey levels are fractions, in any unit."""
         import rerun as rr
 
         return [

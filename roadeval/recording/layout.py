@@ -67,7 +67,7 @@ class DamagedError(RecordingError):
 
     def __init__(self, path: object, part: str) -> None:
         super().__init__(
-            f"{path}: the recording is damaged inside, at {part}; make it anew, or read the "
+            f"{path}: the recording is damaged inside, at {part}; make it again, or read the "
             "results folder of its run"
         )
 

@@ -1,4 +1,4 @@
-"""Writes a recording while frames arrive. It can be opened in whatever state a run leaves it."""
+"""Writes a recording while frames arrive. It can be opened in any state that a run leaves."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class EncodedFrame:
     scalars: Mapping[str, float] = field(default_factory=dict)
     counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     states: Mapping[str, str] = field(default_factory=dict)
-    """Every state, empty where there is none."""
+    """Every state, empty if undefined."""
     notes: tuple[tuple[str, str], ...] = ()
     """Sentences, each with its level."""
     tables: Mapping[str, str] = field(default_factory=dict)

@@ -287,7 +287,7 @@ class PayloadCache:
 def around(frame: int, pages: Iterable[Page]) -> tuple[frozenset[int], dict[int, pa.ListScalar]]:
     """Return all frames of the pages, and by frame the bytes of those around one frame.
 
-    The page with the frame is kept whatever its size, then those after it as far as they fit in
+    The page with the frame is kept at any size, then those after it as far as they fit in
     `READ_AHEAD`, then the nearest before it. No more are held at any time.
     """
     frames: set[int] = set()

@@ -50,7 +50,7 @@ _LEAST_PICTURE: Final = 200
 _ROWS: Final = 2
 """Most variants that have a row: more would leave every picture too small to read."""
 _OUTCOMES: Final = 3
-"""Most variants whose errors stand on top."""
+"""Most variants whose errors are at the top."""
 
 Cell = tuple[LayerSpec, ...]
 """Layers that share a picture."""
@@ -209,7 +209,7 @@ def outcome(layout: Layout, variant: VariantLayout) -> BlueprintPart:
 
 
 def is_overlay(spec: LayerSpec) -> bool:
-    """Return whether a layer is drawn over the camera's image; others stand alone."""
+    """Return whether a layer is drawn over the camera's image; others are shown alone."""
     return spec.kind in (LayerKind.MASK, LayerKind.LABELS)
 
 
@@ -403,7 +403,7 @@ def results_in_words(layout: Layout, summary: Mapping[str, Any]) -> str:
 def _table(
     title: str, note: str, columns: Mapping[str, str], found: Mapping[str, Any]
 ) -> Iterator[str]:
-    """Yield a table in percent, a row a variant and stage; nothing where there is none."""
+    """Yield a table in percent, a row a variant and stage; nothing without rows."""
     if found:
         yield from ("", f"## {title}", "", note, "")
         yield f"| variant | stage | {' | '.join(columns.values())} |"

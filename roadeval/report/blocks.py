@@ -37,7 +37,7 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """Its name for whoever draws it, as ``heading``."""
+        """Its name in templates, as ``heading``."""
         return type(self).__name__.lower()
 
     def as_json(self) -> dict[str, Any]:
@@ -287,7 +287,7 @@ class Picture(Block):
 
 @dataclass(frozen=True, slots=True)
 class PictureRow(Block):
-    """Pictures that stand beside each other under a title."""
+    """Pictures side by side under a title."""
 
     title: str
     pictures: Sequence[Picture]
@@ -304,7 +304,7 @@ class Strip(Block):
     """Of each variant's final mask; None without truth."""
     rows: Sequence[PictureRow]
     command: str = ""
-    """Opens it in the viewer; empty where there is none."""
+    """Opens it in the viewer; empty without a recording."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The paper's figures 2, 3a and 3b as files, drawn by Matplotlib. No screen is needed.
 
-Equal figures give equal files, byte for byte. Importing this takes a third of a second: whoever
-draws does it then.
+Equal figures give equal files, byte for byte. Importing this takes a third of a second, so import
+it only to draw.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from roadeval.data.words import first_of, percent, plain_points
 from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
 from roadeval.evaluation.score import TESTED
-from roadeval.results.sentences import sentence, stands
+from roadeval.results.sentences import is_significant, sentence
 from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
@@ -86,7 +86,7 @@ def where(comparison: Comparison) -> list[str]:
 
 def _by_region(comparison: Comparison, result: str, variant: str) -> str:
     rows = [r for r in comparison.regions if (r.result, r.variant) == (result, variant)]
-    sure = [r for r in rows if stands(r.difference.p_holm, r.difference.confidence)]
+    sure = [r for r in rows if is_significant(r.difference.p_holm, r.difference.confidence)]
     parts = []
     for word, sign in (("better", -1), ("worse", 1)):
         names = [r.title for r in sure if sign * r.difference.mean > 0]

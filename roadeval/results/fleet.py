@@ -1,6 +1,6 @@
 """A fleet's folder: the tables and facts of many drives, and the record of each.
 
-A record is written last. A drive is done where its record stands, was made of the same log,
+A record is written last. A drive is done if its record is there, was made of the same log,
 settings, model and version, and its other files are there.
 """
 
@@ -76,7 +76,7 @@ _KEPT: Final = ("drive", "asked", "stamp", "rows")
 """Parts of a record's file that ``digest`` covers."""
 
 Cells = Sequence[Any]
-"""A row's values in the order of its table's columns; None where there is none."""
+"""A row's values in the order of its table's columns; None if it is undefined."""
 
 
 def record_path(folder: Path, drive: str) -> Path:
@@ -252,7 +252,7 @@ def _finite(cell: Any) -> Any:
 
 
 def read_record(folder: Path, drive: str) -> Record | None:
-    """Read the record of a drive; None where there is none that is whole and of this version."""
+    """Read the record of a drive; None without one that is whole and of this version."""
     try:
         content = read_json(read_bounded(record_path(folder, drive)))
     except (FileNotFoundError, NotADirectoryError):
@@ -336,7 +336,7 @@ class FleetWriter:
         with writing(self.folder, ResultsError):
             check_output(self.folder, folder=True)
             if is_fleet(self.folder):
-                with suppress(ValueError):  # damage: it is written anew
+                with suppress(ValueError):  # damage: it is written again
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
             elif (

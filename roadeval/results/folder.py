@@ -192,7 +192,7 @@ class ResultsFolder:
         Raises
         ------
         ResultsError
-            If it is damaged, or not the one of which the summary tells.
+            If it is damaged, or not the one that the summary states.
         """
         return read_table(name, self._folder / f"{name}.csv", self.facts.tables)
 

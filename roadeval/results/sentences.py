@@ -23,10 +23,10 @@ from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, Eva
 from roadeval.evaluation.stats import Difference
 
 PROBABLY: Final = 0.2
-"""The greatest p-value of a difference that is called probable: where there is none, one drive in
-ten shows so large a one in that direction."""
+"""The greatest p-value of a difference that is called probable: without an effect, one drive in ten
+shows so large a difference in that direction."""
 MARK: Final = "*"
-"""On a difference that stands when all that are told together are corrected for."""
+"""Marks a difference that is significant after correction for all that are stated together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which never looks at the image"
 
@@ -107,8 +107,8 @@ def sentence(found: Difference, what: str, rate: str, settings: EvaluationSettin
         Degree.FEW: found.none_because,
         Degree.SURE: f"{like} by {size(least)} to {size(most)} pp",
         Degree.LITTLE: f"{like} by no more than {size(max(-low, high))} pp either way",
-        Degree.PROBABLE: f"{like} it probably does, too: {ends}",
-        Degree.UNKNOWN: f"whether it does {like}, one cannot tell: {ends}",
+        Degree.PROBABLE: f"probably also {like}: {ends}",
+        Degree.UNKNOWN: f"{like} the effect is unclear: {ends}",
     }[told]
     return f"{fact}; {doubt}{_family(found)}."
 
@@ -137,14 +137,14 @@ def _family(found: Difference) -> str:
 # --- Marks in tables ------------------------------------------------------------------------------
 
 
-def stands(p_holm: float | None, confidence: float) -> bool:
-    """Return whether a difference stands after Holm's correction."""
+def is_significant(p_holm: float | None, confidence: float) -> bool:
+    """Return whether a difference is significant after Holm's correction."""
     return p_holm is not None and p_holm < 1 - confidence
 
 
 def marked_interval(found: Difference) -> str:
     """Return the interval of a difference, with a mark where it excludes 0 after correction."""
-    mark = f" {MARK}" if stands(found.p_holm, found.confidence) else ""
+    mark = f" {MARK}" if is_significant(found.p_holm, found.confidence) else ""
     return interval(found.low, found.high) + mark
 
 
@@ -158,8 +158,8 @@ def correction(differences: Iterable[Difference]) -> str:
     many = f"{counts[0]} differences" if len(counts) == 1 else "differences"
     families = "" if len(counts) == 1 else f" against one base ({' and '.join(map(str, counts))})"
     return (
-        f"{MARK} stands after Holm's correction for the {many} of ERR of final masks{families}; "
-        "others are not corrected."
+        f"{MARK} significant after Holm's correction for the {many} of ERR of final "
+        f"masks{families}; others are not corrected."
     )
 
 
@@ -173,8 +173,8 @@ def verdict(
 ) -> str:
     """Return the verdict on a drive or a fleet.
 
-    Of a filter: what it changes, and whether the filtered variant beats the baseline. Where there
-    is no pair to tell that from: whether the variant with the lowest error rate does.
+    Of a filter: what it changes, and whether the filtered variant beats the baseline. Without
+    such a pair: whether the variant with the lowest error rate does.
 
     Parameters
     ----------

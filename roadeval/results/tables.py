@@ -37,7 +37,7 @@ BATCH: Final = 50_000
 FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 2}
 """Of a fleet's folder and its tables; the version rises where a column changes its meaning."""
 AGAIN: Final = "run the fleet's command again"
-_ANEW: Final = "make the results anew with roadeval replay"
+_ANEW: Final = "make the results again with roadeval replay"
 _WORDS: Final = (Kind.NAME, Kind.TEXT)
 
 
@@ -75,7 +75,7 @@ def read_table(
     Returns
     -------
     DataFrame
-        Words are text, whatever they look like; rates are float64, all other numbers int64.
+        Words are text, even if they look like numbers; rates are float64, all other numbers int64.
 
     Raises
     ------

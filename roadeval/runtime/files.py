@@ -1,6 +1,6 @@
 """Files and folders that are replaced as one, by one run at a time.
 
-Each is written under a name of its own and takes its place when it is complete, so whatever has an
+Each is written under a name of its own and takes its place when it is complete, so a file with an
 output's name is whole. A run claims its outputs before it computes; what killed runs have left of
 an output is removed then.
 """

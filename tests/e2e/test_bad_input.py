@@ -133,7 +133,7 @@ def test_a_table_cut_at_the_end_of_a_line_gives_one_line_and_no_numbers(words, s
     assert (run.returncode, run.stdout) == (1, "")
     assert run.stderr == (
         "roadeval: error: cut/frames.csv: does not agree with its summary (133 of 140 rows); "
-        "make the results anew with roadeval replay\n"
+        "make the results again with roadeval replay\n"
     )
 
 

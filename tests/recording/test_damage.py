@@ -93,7 +93,7 @@ def spoilt(recording, tmp_path):
 
 @pytest.mark.parametrize("path", [at.LAYOUT, at.PROPERTIES, at.SUMS])
 def test_a_recording_cannot_be_opened_where_what_it_is_is_damaged(path, spoilt):
-    with pytest.raises(DamagedError, match=f"damaged inside, at {path}; make it anew"):
+    with pytest.raises(DamagedError, match=f"damaged inside, at {path}; make it again"):
         Recording(spoilt(path))
 
 

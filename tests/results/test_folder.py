@@ -275,7 +275,7 @@ def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, ta
         ResultsFolder(tmp_path).table(table)
     assert str(caught.value) == (
         f"{path}: does not agree with its summary ({len(lines) - 2} of {len(lines) - 1} rows); "
-        "make the results anew with roadeval replay"
+        "make the results again with roadeval replay"
     )
 
 

@@ -47,7 +47,7 @@ OVER = Difference(
         (
             a_difference(-3.3, -8, 1.4, p=0.15, units=91),
             Degree.PROBABLE,
-            f"{HERE} lowers ERR by 3.3 pp; on frames like these it probably does, too: between "
+            f"{HERE} lowers ERR by 3.3 pp; probably also on frames like these: between "
             "-8.0 and +1.4 pp.",
         ),
         (
@@ -59,7 +59,7 @@ OVER = Difference(
         (
             UNSURE,
             Degree.UNKNOWN,
-            f"{HERE} lowers ERR by 3.3 pp; whether it does on frames like these, one cannot tell: "
+            f"{HERE} lowers ERR by 3.3 pp; on frames like these the effect is unclear: "
             "between -20.0 and +3.4 pp.",
         ),
         (
@@ -120,8 +120,8 @@ def test_what_is_negligible_is_a_setting():
         ([1], "* excludes 0; it is the only one, so nothing is corrected."),
         (
             [3, None, 3, 4],
-            "* stands after Holm's correction for the differences of ERR of final masks against "
-            "one base (3 and 4); others are not corrected.",
+            "* significant after Holm's correction for the differences of ERR of final masks "
+            "against one base (3 and 4); others are not corrected.",
         ),
     ],
 )

@@ -191,7 +191,7 @@ class Comparison:
     """The confidence of the intervals, and what is negligible."""
 
     def finals(self) -> list[Change]:
-        """Return the final masks; without the baseline's, which tells nothing of a method."""
+        """Return the final masks; without the baseline's, which says nothing of a method."""
         finals = [change for change in self.changes if change.final]
         return [change for change in finals if change.variant != BASELINE] or finals
 
@@ -374,7 +374,7 @@ _Masks = defaultdict[Name, list[_OnDrive]]
 
 
 def _add_levels(masks: _Masks, part: Part, group: str, rows: Rows) -> int:
-    """Add a result's own rates on a drive, whatever the base has; return how many frames it has."""
+    """Add a result's own rates on a drive; return how many frames it has."""
     last = stages_of(rows)
     for variant, stage, places in rows.masks():
         own, final = counts_of(rows.take(places)), stage == last[variant]

@@ -20,12 +20,12 @@ limit. The interval is in doubt about frames, not about what the training's seed
 must leave room for that: of 20 ordered pairs of five seeds on a drive of CamVid (0006R0) two trip
 +0.5 pp, and none trips it surely; without room, at +0 pp, seven still do. Only the
 change of a mean of the frames' rates has an interval: of ACC, ERR, FNR and FPR, and not of what
-mirrors them. A level is that of these very frames, and an interval around it would tell of frames
-that nobody evaluated.
+mirrors them. A level is that of these very frames, and an interval around it would describe frames
+that were not evaluated.
 
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
 is undefined, where a change is asked for between different drives or scales, where certainty is
-asked for and there is no interval, and where too few frames tell. They must be at least as many as
+asked for and there is no interval, and where frames are too few. They must be at least as many as
 an interval needs (``evaluation.least_frames``, 10 by default), and for a change at least half of
 the frames of the shorter result; where several drives are compared, half of the scored drives of
 the smaller one.
@@ -86,7 +86,7 @@ class Condition:
         Raises
         ------
         ConditionError
-            If it does not follow the grammar, or asks for certainty where there is none.
+            If it does not follow the grammar, or asks for certainty that cannot be had.
         """
         match = _GRAMMAR.fullmatch(text)
         if match is None:
@@ -157,7 +157,7 @@ class Judgement:
     """What was judged: the change, or the level."""
     low: float | None
     high: float | None
-    """The interval of the change, None where there is none."""
+    """The interval of the change, None without one."""
     holds: bool
 
 

@@ -218,7 +218,7 @@ class MaskPair:
 def common_masks(base: Rows, new: Rows, variant: str | None = None) -> list[MaskPair]:
     """Match the masks of two results of a drive, and their frames by stamp; in the base's order.
 
-    Final masks are matched with final masks, whatever their stage is called, others by their stage.
+    Final masks are matched with final masks, under any stage's name, others by their stage.
     With ``variant`` the base's masks are taken for this variant's.
     """
     last, last_new = stages_of(base), stages_of(new)

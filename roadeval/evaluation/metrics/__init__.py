@@ -41,7 +41,7 @@ SHORT: Final = _read(METRICS, Shown.EVERYWHERE)
 FULL: Final = _read(METRICS, Shown.IN_FULL)
 """The rates of a mask where there is room for all."""
 SHORT_OVERLAP: Final = _read(OVERLAP, Shown.EVERYWHERE)
-"""Of the metrics that stand in no table, those that go with `SHORT`."""
+"""Of the metrics without a column in tables, those that go with `SHORT`."""
 COMPARED: Final = tuple(name for name in METRICS if name in FULL)
 """The metrics whose paired differences are given, in the order of the columns."""
 
@@ -52,7 +52,7 @@ def of(counts: Counts) -> dict[str, float]:
 
 
 def overlap(counts: Counts) -> dict[str, float]:
-    """Compute the metrics that stand in no table."""
+    """Compute the metrics without a column in tables."""
     return {name: metric.function(counts) for name, metric in OVERLAP.items()}
 
 

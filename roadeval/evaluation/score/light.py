@@ -1,7 +1,7 @@
 """The light that a frame was taken in, measured from its image alone.
 
 It asks whether a method fails at dusk, in the sun or among shadows, on drives that nobody has
-tagged. The measures of one frame depend on what stands in it; a drive's means tell the light.
+tagged. The measures of one frame depend on what is in it; a drive's means show the light.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ GREY: Final = 0.25
 """The greatest ``|2 ln G - ln R - ln B|`` of what may be road: leaves and paint say more about
 themselves than about the light."""
 LEAST: Final = 20
-"""Fewer grey pixels, dark or lit, tell no colour of the light."""
+"""Fewer grey pixels, dark or lit, do not show the colour of the light."""
 _LUMA: Final = np.array([0.299, 0.587, 0.114], np.float32)
 """Of R, G and B, as in ITU-R BT.601, which JPEG uses."""
 

@@ -5,7 +5,7 @@ frame. Which coefficient and which share of the slow part is not known, so a gri
 each is weighted by how well it explains the series, every coefficient from 0 to 1 being as likely
 before. Given both, the error of the mean is Student's; the mean's distribution is the mixture.
 
-What explains a series are its slowest cosine coefficients, as in [1]_: they tell how the mean of
+What explains a series are its slowest cosine coefficients, as in [1]_: they show how the mean of
 such a stretch varies, whatever happens from frame to frame. They do not hold the mean, so it need
 not be subtracted, and are all but uncorrelated under every model of the grid.
 
@@ -101,7 +101,7 @@ class MeanDistribution:
 
 
 def mean_distribution(series: Series) -> MeanDistribution:
-    """Compute what a stationary series tells of its mean.
+    """Estimate the mean of a stationary series, and its uncertainty.
 
     Parameters
     ----------

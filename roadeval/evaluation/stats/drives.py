@@ -67,7 +67,7 @@ class DriveMean:
 
 
 def group_means(drives: Iterable[DriveMean]) -> Values:
-    """Return the mean of each group's drives, ``(g,)``, whatever order the drives come in."""
+    """Return the mean of each group's drives, ``(g,)``, for any order of the drives."""
     known = sorted(
         (each for each in drives if not np.isnan(each.mean)),
         key=lambda each: (each.group, each.drive),
@@ -83,7 +83,7 @@ def group_means(drives: Iterable[DriveMean]) -> Values:
 def over_drives(
     drives: Sequence[DriveMean], confidence: float, *, higher_is_better: bool = False
 ) -> Difference:
-    """Average the differences of drives, in whatever order they come, with an interval.
+    """Average the differences of drives, in any order, with an interval.
 
     Examples
     --------

@@ -225,7 +225,7 @@ def series(name: str, look: Look, x: Any, y: Any) -> Series:
 
 MEAN: Final = "mean over drives"
 NAMED: Final = 60
-"""More drives than this stand without their names, but for the extremes."""
+"""Of more drives than this only the extremes are named."""
 EXTREMES: Final = 3
 """Drives named at either end, where not all are."""
 WIDEST: Final = 0.9

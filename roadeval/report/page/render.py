@@ -88,7 +88,7 @@ def page(document: Document, place: Place = INSIDE) -> bytes:
     document
         What is shown.
     place
-        Where it finds its parts; where those are beside it, somebody else puts them there.
+        Where it finds its parts; the caller writes those that are beside it.
     """
     found = sections(document.blocks)
     return _rendered(
@@ -235,7 +235,7 @@ class Section:
     name: str
     """Of the place, for links; no two are equal."""
     title: str
-    """Of the heading; empty for what stands before the first one."""
+    """Of the heading; empty before the first one."""
     blocks: list[tuple[Block, str]] = field(default_factory=list)
     """What follows, with the names of the headings among them."""
 
@@ -246,7 +246,7 @@ class Section:
 
 
 def sections(blocks: Iterable[Block]) -> list[Section]:
-    """Return the sections of a document; blocks that were only kept together stand for themselves.
+    """Return the sections of a document; blocks that are kept together are taken apart.
 
     >>> [section.name for section in sections([Heading("The frames"), Heading("The frames")])]
     ['the-frames', 'the-frames-2']
@@ -285,7 +285,7 @@ def _name(text: str, taken: set[str]) -> str:
 
 
 class Beside(StrEnum):
-    """What lies in a folder beside a page: nothing, its pictures, or its script and style, too."""
+    """The files in a folder beside a page: none, its pictures, or its script and style, too."""
 
     NOTHING = "nothing"
     PICTURES = "pictures"

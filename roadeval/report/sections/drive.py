@@ -47,7 +47,7 @@ from roadeval.results.sentences import CLAIMED, correction, marked_interval
 PAPER_WINDOW: Final = 10
 """Frames in a row of the paper's figures (over_drive 5)."""
 RATES: Final = 4
-"""Rates that share a table where the variants stand side by side."""
+"""Rates that share a table where the variants are side by side."""
 NO_NUMBERS: Final = (
     "The paper's text gives no number for its figures 3a and 3b, and their curves are lost, so "
     "nothing can be held against it number by number. Its claims can be checked."
@@ -168,7 +168,7 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
     yield _differences(findings, pair)
     change = pair.differences["ERR"]
     if not defined(change.mean):
-        yield Text("ERR is undefined on every frame, so nothing tells what the filter does to it.")
+        yield Text("ERR is undefined on every frame, so the effect of the filter on it is unknown.")
         return
     yield Text(_method(change), "note")
     yield Text(frames_changed(pair))
@@ -208,8 +208,8 @@ def _method(change: Difference) -> str:
         return f"No interval for ERR: {change.none_because}."
     return (
         f"{percent(change.confidence, 0)} % intervals. Neighbouring frames resemble each other, "
-        "and the intervals are the wider for it; effective says how many independent frames would "
-        "tell as much. All of this concerns this drive only."
+        "and the intervals are the wider for it; effective is the number of independent frames "
+        "that would say as much. All of this is about this drive only."
     )
 
 

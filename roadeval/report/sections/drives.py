@@ -16,7 +16,7 @@ from roadeval.report.charts.standard import MEAN, ForestRow, caption, forest
 from roadeval.report.findings import FleetFindings, Row, WorstPicture
 from roadeval.results.facts import OverDrives, StratumFacts
 from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
-from roadeval.results.sentences import MARK, stands
+from roadeval.results.sentences import MARK, is_significant
 from roadeval.runtime.text import elided
 
 NAMED: Final = 12
@@ -270,8 +270,8 @@ class Part:
 
     @property
     def is_marked(self) -> bool:
-        """Whether the difference stands after correction."""
-        return stands(self.difference.p_holm, self.difference.confidence)
+        """Whether the difference is significant after correction."""
+        return is_significant(self.difference.p_holm, self.difference.confidence)
 
 
 def strata_table(rows: Sequence[Part]) -> Iterator[Block]:
@@ -307,7 +307,7 @@ def _legend(rows: Sequence[Part], left_out: int) -> str:
     legend = "Percentage points, means over drives."
     if counts:
         legend += (
-            f" {MARK} stands after Holm's correction for the {max(counts)} parts that were "
+            f" {MARK} significant after Holm's correction for the {max(counts)} parts that were "
             "tested together."
         )
     elif all(row.difference.low is None for row in rows):

@@ -52,7 +52,7 @@ def worst_frames(findings: Findings) -> Iterator[Block]:
     rule = f"Highest ERR of {first}; of neighbouring frames only the worst."
     rows = (row for frame in findings.worst for row in frame.layers if row)
     if stepped := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
-        rule += f" Below the errors stand the steps of {listing(stepped)}, from left to right."
+        rule += f" Below the errors are the steps of {listing(stepped)}, from left to right."
     head = [Heading("The worst frames"), Text(rule, "note")]
     if findings.commands and not findings.viewable:
         head.append(Text(NO_COMMAND, "note"))
@@ -152,7 +152,7 @@ class BrowsedFrames:
     charts: Sequence[Chart]
     """Rates along the drive."""
     inspect: Callable[[int], str] | None
-    """Return the command that opens a frame; None where there is none."""
+    """Return the command that opens a frame; None without one."""
     masks: Sequence[str] = ()
     """Names of the pictures of final masks, which are compared where there is no truth."""
     left_out: Sequence[str] = ()
@@ -221,7 +221,7 @@ def _first(browsed: BrowsedFrames) -> int | None:
 
 
 def _compared(browsed: BrowsedFrames) -> tuple[str, str]:
-    """Return the two pictures that tell most: the errors of two variants, or else their masks."""
+    """Return the two pictures to compare first: the errors of two variants, or else their masks."""
     errors = [f"{name}: errors" for name in browsed.variants if name != BASELINE]
     first, *others = errors or [*browsed.masks] or ["camera"]
     return first, next(iter(others), "camera")

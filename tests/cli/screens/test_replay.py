@@ -101,7 +101,7 @@ def test_a_difference_that_does_not_stand_bears_no_mark():
     unsure = {"filtered": by_rate(difference(0.0065, -0.001, 0.012, 0.08))}
     shown = lines(summary(against_blind=unsure))
     assert "filtered - blind +0.65 -0.10 to +1.20 +0.10 -0.20" in shown
-    assert "stands after Holm's correction for the 2 differences of ERR" in " ".join(shown)
+    assert "significant after Holm's correction for the 2 differences of ERR" in " ".join(shown)
 
 
 def test_the_verdict_comes_before_the_tables():
