@@ -18,10 +18,10 @@ from benchmarks.timing import Cost, Meter
 from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.data import FrameResult, Packed
-from roadeval.jobs import summary
-from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run import prepare
+from roadeval.jobs.run import summary
+from roadeval.jobs.run.prepared import prepare
+from roadeval.jobs.run.processing import process
 from roadeval.recording import RecordRule, png, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows

@@ -24,16 +24,16 @@ from roadeval.version import VERSION
 if TYPE_CHECKING:
     from roadeval.config import RunConfig, config_toml, configure, load_config
     from roadeval.errors import RoadevalError
-    from roadeval.jobs.compare import compare
-    from roadeval.jobs.fleet import FleetOutcome, FleetProgress, replay_fleet
-    from roadeval.jobs.frame import run_frame
     from roadeval.jobs.log_files import demo, info, pack
     from roadeval.jobs.progress import Progress
-    from roadeval.jobs.replay import Outcome, replay
-    from roadeval.jobs.report import write_report
-    from roadeval.jobs.result import Result
-    from roadeval.jobs.serve import serve
-    from roadeval.jobs.train import train
+    from roadeval.jobs.results.compare import compare
+    from roadeval.jobs.results.report import write_report
+    from roadeval.jobs.results.result import Result
+    from roadeval.jobs.run.fleet import FleetOutcome, FleetProgress, replay_fleet
+    from roadeval.jobs.run.frame import run_frame
+    from roadeval.jobs.run.replay import Outcome, replay
+    from roadeval.jobs.run.train import train
+    from roadeval.jobs.serve.pages import serve
     from roadeval.recording import Recording
     from roadeval.training import Model, load_model, save_model
 

@@ -11,7 +11,7 @@ from roadeval.cli import console, messages
 from roadeval.jobs.progress import Progress
 
 if TYPE_CHECKING:
-    from roadeval.jobs.fleet import FleetProgress
+    from roadeval.jobs.run.fleet import FleetProgress
 
 LINE_PERIOD_S: Final = 10.0
 """At most one plain line in this time, so that a log file of a long run stays short."""

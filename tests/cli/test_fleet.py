@@ -13,6 +13,6 @@ def test_what_failed_is_tried_again_only_where_that_is_asked_for(words, again, m
         given.update(options)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("roadeval.jobs.fleet.replay_fleet", stopped)
+    monkeypatch.setattr("roadeval.jobs.run.fleet.replay_fleet", stopped)
     assert main(["fleet", "drives", "-o", "out", "--quiet", *words]) == 130
     assert given["retry_failed"] is again

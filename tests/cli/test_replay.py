@@ -9,7 +9,7 @@ from roadeval.cli.app import main
 from roadeval.cli.options import OPTIONS, with_flags
 from roadeval.config import PRESETS
 from roadeval.jobs.progress import Progress
-from roadeval.jobs.replay import Outcome
+from roadeval.jobs.run.replay import Outcome
 from roadeval.results.facts import DriveFacts, FrameAccount
 from tests.results.making import facts_of
 
@@ -28,7 +28,7 @@ def asked(monkeypatch):
         on_progress(Progress(3, 3, "replaying"))
         return Outcome(None, None, FACTS, asked["warnings"], asked["losses"], ())
 
-    monkeypatch.setattr("roadeval.jobs.replay.replay", replay)
+    monkeypatch.setattr("roadeval.jobs.run.replay.replay", replay)
     return asked
 
 

@@ -17,8 +17,8 @@ from roadeval import logs
 from roadeval.cli.app import main
 from roadeval.cli.screens.fleet import problems
 from roadeval.errors import RoadevalError
-from roadeval.jobs.fleet_work import train_fold
-from roadeval.jobs.replayed import recording_of
+from roadeval.jobs.run.fleet_work import train_fold
+from roadeval.jobs.serve.replayed import recording_of
 from roadeval.logs import LogWriter
 from roadeval.results.fleet import record_path, recording_path
 from tests.e2e.commands import here

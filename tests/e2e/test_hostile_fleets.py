@@ -15,7 +15,7 @@ import pytest
 from pyarrow import parquet
 
 import roadeval
-from roadeval.jobs.serve import serving
+from roadeval.jobs.serve.pages import serving
 from roadeval.recording import viewer
 from roadeval.results.facts import digest_of
 from roadeval.runtime.files import claimed

@@ -9,8 +9,8 @@ import pytest
 from roadeval import Recording
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
-from roadeval.jobs import inspect as inspecting
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.results import inspect as inspecting
+from roadeval.jobs.results.result import DriveResult
 from roadeval.recording import viewer
 from tests.e2e.commands import CLASSES, here, replay, roadeval
 from tests.fixtures.make import make

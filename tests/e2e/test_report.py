@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.results.result import DriveResult
 from roadeval.logs import LogWriter
 from tests.e2e.commands import here, roadeval
 from tests.report.making import text

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from roadeval.jobs.summary import versions
+from roadeval.jobs.run.summary import versions
 
 _NAMES: Final = "|".join(versions())
 

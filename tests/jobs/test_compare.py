@@ -7,8 +7,8 @@ import pytest
 
 from roadeval import compare
 from roadeval.errors import RoadevalError
-from roadeval.jobs.compare import as_json
-from roadeval.jobs.result import asked
+from roadeval.jobs.results.compare import as_json
+from roadeval.jobs.results.result import asked
 from roadeval.results.fleet import FleetFolder, frames_path
 from tests.results.fleet.making import RUN, fleet_of
 

@@ -13,7 +13,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.jobs import identity
+from roadeval.jobs.run import identity
 from roadeval.pipeline import stages
 from tests.e2e.test_fleet import Here, ThreadTasks, run, tables, write
 
@@ -76,9 +76,9 @@ def test_a_log_that_has_changed_and_kept_its_size_and_time_is_replayed(logs, tmp
 
 
 def test_where_no_change_of_a_file_is_noted_its_checksums_tell(logs, tmp_path, monkeypatch):
-    times = "roadeval.jobs.fleet_work._times"
+    times = "roadeval.jobs.run.fleet_work._times"
     monkeypatch.setattr(times, lambda file: [file.stat().st_size])
-    monkeypatch.setattr("roadeval.jobs.fleet_work.CHANGE_TIMES", False)
+    monkeypatch.setattr("roadeval.jobs.run.fleet_work.CHANGE_TIMES", False)
     mine = shutil.copytree(logs, tmp_path / "logs")
     run(mine, tmp_path / "f")
     assert run(mine, tmp_path / "f")[1] == []

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 import roadeval
-from roadeval.jobs import identity
+from roadeval.jobs.run import identity
 from roadeval.logs import open_log
 from tests.jobs.making import settings, write_log
 

@@ -10,7 +10,7 @@ from pypdf import PdfReader
 
 import roadeval
 from roadeval.config import network_variant
-from roadeval.jobs import identity
+from roadeval.jobs.run import identity
 from roadeval.logs import open_log
 from tests.jobs.making import settings, write_log
 from tests.networks.making import network, red_network

@@ -11,10 +11,10 @@ import pytest
 import roadeval
 from roadeval import RoadevalError
 from roadeval.config import OutputSettings
-from roadeval.jobs import inspect
 from roadeval.jobs.outputs import Outputs, holding
-from roadeval.jobs.report import write_report
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.results import inspect
+from roadeval.jobs.results.report import write_report
+from roadeval.jobs.results.result import DriveResult
 from roadeval.logs import Log
 from tests.faults import making
 from tests.jobs.making import write_log
@@ -165,7 +165,7 @@ def attempted(drive, made, monkeypatch):
         raise AssertionError("it has begun")
 
     monkeypatch.setattr(Log, "select", computed)
-    monkeypatch.setattr("roadeval.jobs.report.collect", computed)
+    monkeypatch.setattr("roadeval.jobs.results.report.collect", computed)
     monkeypatch.setattr("roadeval.logs.pack", computed)
     monkeypatch.setattr("roadeval.jobs.log_files.put", computed)
     monkeypatch.setattr("roadeval.recording.viewer.screenshot", computed)

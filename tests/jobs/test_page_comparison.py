@@ -2,7 +2,7 @@
 
 from roadeval.evaluation.comparison import Side, compare
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.jobs.compare import Compared, browsed
+from roadeval.jobs.results.compare import Compared, browsed
 from tests.evaluation.making import a_part
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.progress import Progress
-from roadeval.jobs.replayed import Replayer
+from roadeval.jobs.serve.replayed import Replayer
 
 
 class Slow:

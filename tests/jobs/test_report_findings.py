@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from roadeval.evaluation.score import Effect
-from roadeval.jobs import report
+from roadeval.jobs.results import report
 from tests.evaluation.making import a_table, rows_of
 from tests.report.making import some_findings
 

@@ -5,10 +5,11 @@ import re
 import pytest
 
 import roadeval
-from roadeval.jobs import compare, report_frames
-from roadeval.jobs.report import page_of
-from roadeval.jobs.report_frames import FEWEST, bytes_of, strips_of
-from roadeval.jobs.result import DriveResult, Result
+from roadeval.jobs.results import compare
+from roadeval.jobs.results import frames as report_frames
+from roadeval.jobs.results.frames import FEWEST, bytes_of, strips_of
+from roadeval.jobs.results.report import page_of
+from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import FrameBrowser
 from tests.jobs.making import settings, write_log
 

@@ -68,7 +68,7 @@ def test_a_run_without_the_library_says_what_it_costs(unbuilt, tmp_path, capsys)
 
 def test_whoever_only_reads_results_loads_no_kernel():
     code = (
-        "import sys, roadeval.jobs.compare, roadeval.jobs.report; "
+        "import sys, roadeval.jobs.results.compare, roadeval.jobs.results.report; "
         "print('roadeval.kernels.compiled' in sys.modules)"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -125,7 +125,7 @@ def test_a_package_by_itself_imports_no_library(name):
 def test_results_are_compared_without_rerun_and_without_matplotlib():
     libraries = "{'rerun', 'matplotlib'}"
     assert not run(
-        f"import sys, roadeval.jobs.compare; print({libraries} & {{*sys.modules}} or '')"
+        f"import sys, roadeval.jobs.results.compare; print({libraries} & {{*sys.modules}} or '')"
     )
 
 

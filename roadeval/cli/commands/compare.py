@@ -84,8 +84,8 @@ def compare(
     are appended to it as Markdown.
     """
     from roadeval.cli.screens import compare as screen
-    from roadeval.jobs import compare as comparing
     from roadeval.jobs.outputs import holding
+    from roadeval.jobs.results import compare as comparing
 
     size = arguments.paper_of(paper)
     with holding(*(output or ()), *filter(None, [junit]), inputs=results):

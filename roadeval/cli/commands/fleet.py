@@ -56,7 +56,7 @@ def fleet(
     """
     config = arguments.configuration(given)
     from roadeval.cli.screens import fleet as screen
-    from roadeval.jobs.fleet import replay_fleet as run
+    from roadeval.jobs.run.fleet import replay_fleet as run
 
     with progress.watched(quiet) as watch:
         found = run(

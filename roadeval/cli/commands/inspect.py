@@ -12,7 +12,7 @@ from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.results.result import Result
 
 Listed = Annotated[bool, typer.Option("--list", help="Print the worst frames with reasons.")]
 Frame = Annotated[int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")]
@@ -70,7 +70,7 @@ def inspect(
         raise typer.BadParameter("give --frame or --worst, not both")
     if listed and (frame is not None or screenshot is not None):
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.results.result import Result
 
     opened = Result(recording, trust_sources=trust_sources)
     if opened.fleet:
@@ -108,7 +108,7 @@ class _Asked:
 def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bool) -> None:
     """Print the worst frames, for people or as JSON."""
     from roadeval.cli.screens import inspect as screen
-    from roadeval.jobs import inspect as job
+    from roadeval.jobs.results import inspect as job
     from roadeval.results.facts import json_text, plain
 
     found = job.worst_frames(opened, count or job.LISTED, variant)
@@ -120,13 +120,13 @@ def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bo
 
 def _show(opened: Result, asked: _Asked) -> None:
     """Open the viewer at a frame, or draw the frame into a file."""
-    from roadeval.jobs import inspect as job
-    from roadeval.jobs.result import DriveResult
+    from roadeval.jobs.results import inspect as job
+    from roadeval.jobs.results.result import DriveResult
 
     frame, drive, of, why = asked.frame, opened.drive, "", ""
     warnings: tuple[str, ...] = ()
     if opened.fleet:
-        from roadeval.jobs.replayed import recording_of
+        from roadeval.jobs.serve.replayed import recording_of
 
         name = asked.drive
         if name is None:

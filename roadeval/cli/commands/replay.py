@@ -31,7 +31,7 @@ def replay(
     """
     config = arguments.configuration(given)
     from roadeval.cli.screens import replay as screen
-    from roadeval.jobs.replay import replay as run
+    from roadeval.jobs.run.replay import replay as run
 
     _spare_pandas(config)
     with progress.watched(quiet) as watch:

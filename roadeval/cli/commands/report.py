@@ -12,7 +12,7 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.results.result import Result
     from roadeval.report.findings import Commands
 
 
@@ -61,8 +61,8 @@ def report(
     from the recording alone, or from a results folder, then without pictures. A page is one file
     that needs no network and no server; of a fleet its pictures lie in a folder beside it.
     """
-    from roadeval.jobs.report import PageSettings, is_page, write_report
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.results.report import PageSettings, is_page, write_report
+    from roadeval.jobs.results.result import Result
 
     size = arguments.paper_of(paper)
     if (pictures is not None or assets) and not (output and is_page(output)):

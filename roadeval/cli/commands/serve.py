@@ -30,7 +30,7 @@ def serve(
     Every frame has its pictures, and a button that opens the viewer there. The address that is
     printed holds a token; without it nothing is answered. Ctrl-C ends the server and the viewer.
     """
-    from roadeval.jobs import serve as job
+    from roadeval.jobs.serve import pages as job
 
     job.serve(results, _tell, trust_sources=trust_sources, commands=commands_of)
     return ExitCode.DONE

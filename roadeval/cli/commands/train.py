@@ -48,7 +48,7 @@ def train(
     Replay never evaluates the training frames, on any drive.
     """
     config = arguments.configuration(given)
-    from roadeval.jobs.train import train as run
+    from roadeval.jobs.run.train import train as run
 
     with progress.watched(quiet) as watch:
         model = run(paths, output, config, on_progress=watch)

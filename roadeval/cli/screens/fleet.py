@@ -16,7 +16,7 @@ from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roadeval.jobs.fleet import FleetOutcome
+    from roadeval.jobs.run.fleet import FleetOutcome
 
 TESTED: Final = "ERR"
 RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}

@@ -12,7 +12,7 @@ from roadeval.report.blocks import Table
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roadeval.jobs.inspect import WorstFrame
+    from roadeval.jobs.results.inspect import WorstFrame
 
 
 def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:

@@ -20,7 +20,7 @@ from roadeval.results.sentences import correction, marked_interval
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roadeval.jobs.replay import Outcome
+    from roadeval.jobs.run.replay import Outcome
 
 RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
 """The rates of every stage, with the titles of their columns."""

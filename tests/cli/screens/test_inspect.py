@@ -5,7 +5,7 @@ import io
 from rich.console import Console
 
 from roadeval.cli.screens import inspect
-from roadeval.jobs.inspect import WorstFrame
+from roadeval.jobs.results.inspect import WorstFrame
 
 FRAME = WorstFrame(
     rank=1,

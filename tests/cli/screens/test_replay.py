@@ -9,7 +9,7 @@ from rich.console import Console
 
 from roadeval.cli.screens import replay as outcome
 from roadeval.evaluation.stats import Difference
-from roadeval.jobs.replay import Outcome
+from roadeval.jobs.run.replay import Outcome
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 
 RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")

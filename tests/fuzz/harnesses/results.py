@@ -10,8 +10,8 @@ from typing import Any
 
 from roadeval.config import load_config
 from roadeval.errors import RoadevalError
-from roadeval.jobs.report import collect
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.results.report import collect
+from roadeval.jobs.results.result import DriveResult
 from roadeval.recording import Recording
 from tests.compatibility.make import RECORDING, RESULTS, unpack, versions
 from tests.fuzz.harness import Harness, scratch

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.jobs.report import collect_fleet, write_report
-from roadeval.jobs.result import Result
+from roadeval.jobs.results.report import collect_fleet, write_report
+from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf

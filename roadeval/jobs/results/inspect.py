@@ -14,7 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.result import DriveResult, Result
+from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.schema import LIGHT
 

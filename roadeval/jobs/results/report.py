@@ -16,8 +16,8 @@ from roadeval.evaluation import score
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.report_frames import FramePicker, browsed, evenly, strips_of
-from roadeval.jobs.result import DriveResult, Result
+from roadeval.jobs.results.frames import FramePicker, browsed, evenly, strips_of
+from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Document, ImageFile
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import (
@@ -130,7 +130,7 @@ def page_of(
 ) -> Document:
     """Return the page of a result as a document, with so many pictured frames.
 
-    Of a drive by default as many as `roadeval.jobs.report_frames.strips_of` says.
+    Of a drive by default as many as `roadeval.jobs.results.frames.strips_of` says.
     """
     findings = findings_of(result, commands, pictures or PICTURED_OF_FLEET)
     if result.drive is None:

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 
 from roadeval import logs
 from roadeval.data import FrameResult, Role
-from roadeval.jobs import frame as one_frame
 from roadeval.jobs.progress import OnProgress, Progress
-from roadeval.jobs.run import Run
+from roadeval.jobs.run import frame as one_frame
+from roadeval.jobs.run.prepared import Run
 from roadeval.pipeline.stage import StageError, View
 from roadeval.results.rows import csv_lines, frame_rows
 from roadeval.results.sentences import notes_of

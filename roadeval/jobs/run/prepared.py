@@ -13,10 +13,10 @@ from roadeval.config import RunConfig, Variant
 from roadeval.data import VariantLayout
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import BlindPrior, Scoreboard
-from roadeval.jobs import frame
-from roadeval.jobs.failures import Failures
-from roadeval.jobs.identity import identity
 from roadeval.jobs.progress import OnProgress, Progress
+from roadeval.jobs.run import frame
+from roadeval.jobs.run.failures import Failures
+from roadeval.jobs.run.identity import identity
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError
 from roadeval.recording import Layout

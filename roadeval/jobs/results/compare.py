@@ -26,8 +26,8 @@ from roadeval.evaluation.comparison import (
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import TESTED
 from roadeval.evaluation.settings import NOTEWORTHY
-from roadeval.jobs.report_frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
-from roadeval.jobs.result import DriveResult, Result
+from roadeval.jobs.results.frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
+from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Strip
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_frames, over_windows
@@ -334,7 +334,7 @@ def browsed(
         Returns the command that opens a frame.
     taken
         Returns the bytes of a page with these frames and none of their pictures: of those as many
-        are there as keep it below `roadeval.jobs.report_frames.BYTES`.
+        are there as keep it below `roadeval.jobs.results.frames.BYTES`.
     """
     if (found := compared_masks(compared.sides)) is None:
         return None

@@ -22,9 +22,9 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.regions import ALL
 from roadeval.fleet.entry import DriveEntry, FleetError, in_order
 from roadeval.fleet.remote import staged, stamp
-from roadeval.jobs.fleet_frames import FrameGatherer
-from roadeval.jobs.identity import asked, content_of, software
-from roadeval.jobs.replay import replay
+from roadeval.jobs.run.fleet_frames import FrameGatherer
+from roadeval.jobs.run.identity import asked, content_of, software
+from roadeval.jobs.run.replay import replay
 from roadeval.logs import METADATA, identity_of
 from roadeval.recording import RecordingError
 from roadeval.results.facts import json_text
@@ -67,7 +67,7 @@ class DriveTask:
     config: RunConfig
     """Of this drive, its model included."""
     software: Mapping[str, str]
-    """That of the program that asks, see `roadeval.jobs.identity.software`."""
+    """That of the program that asks, see `roadeval.jobs.run.identity.software`."""
     model: str = ""
     """SHA-256 of the model file; empty where the drive trains its own."""
     fold: int | None = None

@@ -19,7 +19,7 @@ from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.fleet.folds import deal, groups_of, shuffled
 from roadeval.fleet.sources import find_drives
-from roadeval.jobs.fleet_work import (
+from roadeval.jobs.run.fleet_work import (
     Done,
     DriveTask,
     FoldModel,
@@ -32,7 +32,7 @@ from roadeval.jobs.fleet_work import (
     train_fold,
     valid_record,
 )
-from roadeval.jobs.identity import software
+from roadeval.jobs.run.identity import software
 from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter, recording_path
 from roadeval.results.over_drives import check_conditions

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
-from roadeval.jobs.identity import computing
-from roadeval.jobs.run import Run
+from roadeval.jobs.run.identity import computing
+from roadeval.jobs.run.prepared import Run
 from roadeval.results.facts import (
     DriveFacts,
     Facts,

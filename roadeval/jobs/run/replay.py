@@ -12,13 +12,13 @@ from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult
 from roadeval.evaluation.comparison import Condition
-from roadeval.jobs import summary
-from roadeval.jobs.examples import ExampleFrames
-from roadeval.jobs.identity import deciding
 from roadeval.jobs.outputs import Outputs
-from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.run import Run, prepare
+from roadeval.jobs.run import summary
+from roadeval.jobs.run.examples import ExampleFrames
+from roadeval.jobs.run.identity import deciding
+from roadeval.jobs.run.prepared import Run, prepare
+from roadeval.jobs.run.processing import process
 from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts

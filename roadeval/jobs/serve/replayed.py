@@ -13,9 +13,9 @@ from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import is_url, shown
 from roadeval.fleet.remote import staged
-from roadeval.jobs.fleet_work import model_path
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.replay import replay
+from roadeval.jobs.run.fleet_work import model_path
+from roadeval.jobs.run.replay import replay
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.folder import RUN
 from roadeval.results.schema import FAILED

@@ -13,12 +13,12 @@ from threading import Lock
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.jobs.inspect import WorstFrame, worst_frames
 from roadeval.jobs.progress import OnProgress
-from roadeval.jobs.replayed import CancelledReplayError, Replayer, recording_of
-from roadeval.jobs.report import PICTURED_OF_FLEET, findings_of
-from roadeval.jobs.report_frames import FramePicker, browsed
-from roadeval.jobs.result import DriveResult, Result
+from roadeval.jobs.results.frames import FramePicker, browsed
+from roadeval.jobs.results.inspect import WorstFrame, worst_frames
+from roadeval.jobs.results.report import PICTURED_OF_FLEET, findings_of
+from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.serve.replayed import CancelledReplayError, Replayer, recording_of
 from roadeval.recording.viewer import WindowViewer
 from roadeval.report.blocks import Document, Heading, LinkList, Strip
 from roadeval.report.document import page_document

@@ -22,7 +22,7 @@ from roadeval.data import (
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import NOTEWORTHY
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.results.result import DriveResult
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison

@@ -1,0 +1,1 @@
+"""Results opened: reported, compared, inspected."""

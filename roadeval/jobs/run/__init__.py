@@ -1,0 +1,1 @@
+"""Runs: a log or many replayed, and models trained."""

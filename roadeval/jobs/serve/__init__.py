@@ -1,0 +1,1 @@
+"""Results served as pages."""
