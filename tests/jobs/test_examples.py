@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import FINAL_STAGE, FrameResult, Role
-from roadeval.jobs.run.examples import SHOWN, ExampleFrames
+from roadeval.jobs.run.replay import SHOWN, ExampleFrames
 from tests.evaluation.making import a_frame, a_variant
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -15,10 +16,9 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run import frame
-from roadeval.jobs.run.failures import Failures
 from roadeval.jobs.run.identity import identity
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError
+from roadeval.pipeline.stage import MisfitError, StageError
 from roadeval.recording import Layout
 from roadeval.results.rows import Key
 from roadeval.results.schema import STREAMED, TABLES
@@ -27,6 +27,30 @@ from roadeval.training import Model, TrainingSettings, learning
 from roadeval.training.model import ModelError
 from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
+
+KEPT: Final = 5
+"""Tracebacks that are kept: those of the first errors that say different things."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failures:
+    """The frames on which a stage has failed so far; any thread may add to them."""
+
+    reasons: dict[int, str] = field(default_factory=dict)
+    """By the frame's number: which stage failed, and why."""
+    tracebacks: dict[str, str] = field(default_factory=dict)
+    """By such a reason."""
+
+    def add(self, number: int, error: StageError) -> None:
+        """Note that a stage failed on a frame. The error itself would hold the frame's images."""
+        self.reasons[number] = str(error)
+        if len(self.tracebacks) < KEPT and str(error) not in self.tracebacks:
+            self.tracebacks[str(error)] = "".join(traceback.format_exception(error))
+
+    def sentences(self) -> tuple[str, ...]:
+        """Return a sentence for each frame, in the frames' order."""
+        return tuple(f"frame {number}: {self.reasons[number]}" for number in sorted(self.reasons))
+
 
 SPARSE: Final = 5
 """Where there are more frames than so many for each label, a note says so."""

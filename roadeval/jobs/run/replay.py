@@ -6,16 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from roadeval import logs
 from roadeval.config import RunConfig, run_toml
-from roadeval.data import FrameResult
+from roadeval.data import FrameResult, Role
 from roadeval.evaluation.comparison import Condition
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
-from roadeval.jobs.run.examples import ExampleFrames
 from roadeval.jobs.run.identity import deciding
 from roadeval.jobs.run.prepared import Run, prepare
 from roadeval.jobs.run.processing import process
@@ -218,3 +217,25 @@ def _superseded(left: Path | None) -> tuple[str, ...]:
     with suppress(OSError):
         left.unlink()
     return (f"removed {left}, the partial recording of an earlier run: this one is whole",)
+
+
+SHOWN: Final = 4
+
+
+class ExampleFrames:
+    """Keeps a few frames that are spread evenly over a drive of ``total`` frames."""
+
+    def __init__(self, total: int) -> None:
+        self._due = [total * (2 * i + 1) / (2 * SHOWN) for i in range(SHOWN)]
+        self.kept: Final[list[ExampleFrame]] = []
+
+    def offer(self, position: int, result: FrameResult) -> None:
+        """Keep the frame at ``position`` (from 1) if one is due and it is not a training frame."""
+        if not self._due or position < self._due[0]:
+            return
+        if result.role in (Role.TRAINING, Role.COPY, Role.GAP):
+            return
+        self._due.pop(0)
+        frame = result.frame
+        masks = {v.variant: v.final() for v in result.variants}
+        self.kept.append(ExampleFrame(frame.number, frame.image, frame.truth, masks).small())
