@@ -1,5 +1,7 @@
 """Rows that are made of sums, and what a drive's row and case say of it."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 
@@ -21,8 +23,18 @@ def test_a_drive_that_lost_a_part_of_its_log_has_exit_code_3(losses, code):
     assert drive_row(facts, "street", "street.mcap")["exit_code"] == code
 
 
-@pytest.mark.parametrize(("status", "parts"), [("scored", []), ("unscored", ["skipped"])])
-def test_the_case_of_a_drive_without_a_score_is_skipped(status, parts):
+@pytest.mark.parametrize(
+    ("status", "kind", "said"),
+    [
+        ("scored", "", ""),
+        ("unscored", "skipped", "no truth"),
+        ("failed", "error", "no truth"),
+        ("damaged", "system-err", "2 frames"),
+    ],
+)
+def test_the_case_of_a_drive_says_why_it_has_no_score_and_what_was_lost(status, kind, said):
     row = {"drive": "a", "seconds": 1.0, "status": status, "reason": "no truth", "verdict": ""}
-    xml = junit_xml("fleet", drive_cases([row | {"losses": None}]))
-    assert [part for part in ("error", "skipped") if f"<{part}" in xml.decode()] == parts
+    xml = junit_xml("fleet", drive_cases([row | {"losses": "2 frames"}]))
+    (case,) = ElementTree.fromstring(xml)
+    assert [part.tag for part in case] == [kind] * bool(kind)
+    assert "".join(part.get("message") or part.text for part in case) == said
