@@ -1,1 +1,1 @@
-"""The public functions, one file a command."""
+"""The public functions behind the commands."""
