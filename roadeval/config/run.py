@@ -278,7 +278,7 @@ class RunConfig(LogConfig):
         return [own.path for own in self.drives if not any(map(own.holds_for, there))]
 
     def ignored(self) -> tuple[str, ...]:
-        """Return a warning for each setting of a variant's preset that the run does not follow."""
+        """Return a note for each setting of a variant's preset that the run does not follow."""
         return tuple(
             f"{variant.name}: preset {variant.preset} asks for {section}.{key} = {value}, but all "
             f"variants of a run are trained and scored alike ({getattr(own, key)})"

@@ -77,6 +77,8 @@ class Variant:
     name: str
     pipeline: Pipeline
     preset: str = "paper"
+    of_pair: bool = False
+    """Whether it is a pipeline whose filter was taken out, beside the one that has it."""
 
     @classmethod
     def of(cls, name: str, tables: Mapping[str, Any], where: str = "") -> Variant:
@@ -108,7 +110,7 @@ class Variant:
         found = self.pipeline.stages()
         if filters := [stage.title for stage in found if stage.is_filter]:
             return f"with {', '.join(filters)}"
-        if any(stage.fit is not None and stage.name in stages.STAGES for stage in found):
+        if self.of_pair:
             return "without the filter"
         return ", ".join(stage.title for stage in found if stage.name != FINAL_STAGE)
 
@@ -123,8 +125,9 @@ def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, 
     ConfigError
         If an extra variant's name is taken, reserved, or no plain word.
     """
-    variants = [Variant(FILTERED, pipeline)] if pipeline.has_filter else []
-    variants.append(Variant(UNFILTERED, pipeline.without_filter()))
+    pair = pipeline.has_filter
+    variants = [Variant(FILTERED, pipeline)] if pair else []
+    variants.append(Variant(UNFILTERED, pipeline.without_filter(), of_pair=pair))
     for variant in extra:
         check_variant_name(variant.name, {v.name for v in variants})
         variants.append(variant)

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from roadeval.data.words import first_of, percent, plain_points
 from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
 from roadeval.evaluation.score import TESTED
-from roadeval.results.sentences import is_significant, sentence
+from roadeval.results.sentences import is_significant, levels, sentence
 from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
@@ -68,7 +68,9 @@ def verdict(comparison: Comparison) -> str:
 def _sentence(change: Change, base: str, comparison: Comparison, *, several: bool) -> str:
     what = f"{change.result} instead of {base}"
     rate = f"{TESTED} of {change.stage}"
-    told = sentence(change.difference[TESTED], what, rate, comparison.settings)
+    found = change.difference[TESTED]
+    ends = levels(found, change.base, change.new)
+    told = sentence(found, what, rate, comparison.settings, levels=ends)
     if change.result == change.variant or not several:
         return told
     return f"{change.variant}: {told[0].lower()}{told[1:]}"

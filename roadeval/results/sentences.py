@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from enum import Enum, auto
 from statistics import median
 from typing import Any, Final
@@ -25,6 +26,11 @@ from roadeval.evaluation.stats import Difference
 PROBABLY: Final = 0.2
 """The greatest p-value of a difference that is called probable: without an effect, one drive in ten
 shows so large a difference in that direction."""
+WIDE: Final = 0.2
+"""Of an interval that is so wide, the reason is given instead of the ends."""
+FINE: Final = 0.005
+"""Levels that differ by less are given with two digits."""
+ROUNDING: Final = 5e-4
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are stated together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
@@ -66,7 +72,15 @@ def degree(found: Difference, settings: EvaluationSettings) -> Degree:
     return Degree.PROBABLE if p <= PROBABLY else Degree.UNKNOWN
 
 
-def sentence(found: Difference, what: str, rate: str, settings: EvaluationSettings) -> str:
+def sentence(
+    found: Difference,
+    what: str,
+    rate: str,
+    settings: EvaluationSettings,
+    *,
+    levels: tuple[float, float] | None = None,
+    windows: str = "",
+) -> str:
     """Return what a difference says of these frames or drives, and then of others like them.
 
     Parameters
@@ -79,6 +93,10 @@ def sentence(found: Difference, what: str, rate: str, settings: EvaluationSettin
         What changes, as ``ERR of post``.
     settings
         What is negligible.
+    levels
+        The rate without and with it; given only where they are of the same frames or drives.
+    windows
+        In how many windows it is lower, in brackets.
 
     Examples
     --------
@@ -89,28 +107,54 @@ def sentence(found: Difference, what: str, rate: str, settings: EvaluationSettin
     unit = found.unit[:-1]
     if not found.units:
         return f"Nothing to compare: {rate} is undefined on every {unit}."
-    here, like = _here(found), f"on {found.unit} like these"
-    told = degree(found, settings)
-    if told is Degree.SAME:
+    here = _here(found)
+    if degree(found, settings) is Degree.SAME:
         return f"{here} {what} leaves {rate} of every {unit} as it is."
+    by = f"by {_size(found.mean, _digits(found))} pp"
+    if levels is not None:
+        before, after = (_size(level, 1 if abs(found.mean) >= FINE else 2) for level in levels)
+        by = f"from {before} to {after} %"
+    verb = "raises" if found.mean > 0 else "lowers"
+    fact = f"{here} {what} {verb} {rate} {by}{windows}{_counted(found)}"
+    return f"{fact}; {_doubt(found, settings)}."
+
+
+def levels(
+    found: Difference, base: Mapping[str, Any], new: Mapping[str, Any]
+) -> tuple[float, float] | None:
+    """Return the error rates without and with; None where not both are of the difference's frames.
+
+    ``base`` and ``new`` are rates by their names.
+    """
+    before, after = base.get(TESTED, math.nan), new.get(TESTED, math.nan)
+    same = defined(before) and defined(after) and abs(after - before - found.mean) < ROUNDING
+    return (before, after) if same else None
+
+
+def _doubt(found: Difference, settings: EvaluationSettings) -> str:
+    """Return what a difference says of other frames or drives, as a clause."""
+    like, digits = f"on {found.unit} like these", _digits(found)
     low, high = found.low or 0.0, found.high or 0.0
-    digits = 1 if max(abs(found.mean), -low, high) >= 0.01 else 2
-
-    def size(fraction: float) -> str:
-        return f"{in_percent(fraction):.{digits}f}"
-
-    fact = f"{here} {what} {'raises' if found.mean > 0 else 'lowers'} {rate} by "
-    fact += f"{size(abs(found.mean))} pp{_counted(found)}"
     ends = f"between {plain_points(low, digits)} and {plain_points(high, digits)} pp"
+    if high - low > WIDE and found.effective is not None:
+        ends = f"frames in a row are alike, so these {found.units} count as {found.effective:.0f}"
     least, most = (low, high) if found.mean > 0 else (-high, -low)
-    doubt = {
+    return {
         Degree.FEW: found.none_because,
-        Degree.SURE: f"{like} by {size(least)} to {size(most)} pp",
-        Degree.LITTLE: f"{like} by no more than {size(max(-low, high))} pp either way",
+        Degree.SAME: f"{like} nothing is known",
+        Degree.SURE: f"{like} by {_size(least, digits)} to {_size(most, digits)} pp",
+        Degree.LITTLE: f"{like} by no more than {_size(max(-low, high), digits)} pp either way",
         Degree.PROBABLE: f"probably also {like}: {ends}",
         Degree.UNKNOWN: f"{like} the effect is unclear: {ends}",
-    }[told]
-    return f"{fact}; {doubt}{_family(found)}."
+    }[degree(found, settings)] + _family(found, settings)
+
+
+def _digits(found: Difference) -> int:
+    return 1 if max(abs(found.mean), -(found.low or 0.0), found.high or 0.0) >= 0.01 else 2
+
+
+def _size(fraction: float, digits: int) -> str:
+    return f"{abs(in_percent(fraction)):.{digits}f}"
 
 
 def _here(found: Difference) -> str:
@@ -128,10 +172,10 @@ def _counted(found: Difference) -> str:
     return f" (worse on {found.worse}, better on {found.better})"
 
 
-def _family(found: Difference) -> str:
-    """Return how many differences a p-value was corrected for, where they were several."""
-    more = (found.comparisons or 1) > 1
-    return f" (corrected for {found.comparisons} comparisons)" if more else ""
+def _family(found: Difference, settings: EvaluationSettings) -> str:
+    """Return how many differences a p-value was corrected for, where that decided."""
+    decided = degree(replace(found, p_holm=None), settings) is not degree(found, settings)
+    return f" (corrected for {found.comparisons} comparisons)" if decided else ""
 
 
 # --- Marks in tables ------------------------------------------------------------------------------
@@ -149,9 +193,10 @@ def marked_interval(found: Difference) -> str:
 
 
 def correction(differences: Iterable[Difference]) -> str:
-    """Return what a mark on differences of ERR means; empty where none was corrected."""
-    counts = sorted({each.comparisons for each in differences if each.comparisons})
-    if not counts:
+    """Return what a mark on differences of ERR means; empty where none has one."""
+    shown = list(differences)
+    counts = sorted({each.comparisons for each in shown if each.comparisons})
+    if not any(is_significant(each.p_holm, each.confidence) for each in shown):
         return ""
     if counts == [1]:
         return f"{MARK} excludes 0; it is the only one, so nothing is corrected."
@@ -170,11 +215,12 @@ def verdict(
     totals: Mapping[str, Mapping[str, Any]],
     effects: Sequence[Effect],
     settings: EvaluationSettings,
+    claims: Mapping[str, Mapping[str, int]] | None = None,
 ) -> str:
-    """Return the verdict on a drive or a fleet.
+    """Return the verdict on a drive or a fleet, at most four sentences.
 
-    Of a filter: what it changes, and whether the filtered variant beats the baseline. Without
-    such a pair: whether the variant with the lowest error rate does.
+    Which variant is best, and whether it beats the baseline; what the filter changes; and what
+    costs the filtered variant most.
 
     Parameters
     ----------
@@ -184,41 +230,88 @@ def verdict(
         Of final masks at least.
     settings
         What is negligible.
+    claims
+        In how many windows each claim of the paper holds; of a drive.
     """
     if not totals:
         return NOTHING_SCORED
-    finals = [each for each in effects if each.final]
-    blind = {each.variant: each for each in finals if each.base == BASELINE}
-    filters = [each for each in finals if (each.base, each.variant) == (UNFILTERED, FILTERED)]
-    told = [(each, "the filter") for each in filters]
-    if blind:
-        best = blind[FILTERED] if told and FILTERED in blind else _lowest(blind.values())
-        told.append((best, f"{best.variant} instead of {BLIND},"))
-    return " ".join(
-        sentence(each.rates[TESTED], what, f"{TESTED} of {each.stage}", settings)
-        for each, what in told
-    ) or _alone(totals)
+    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
+    rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
+    finals = {(each.base, each.variant): each for each in effects if each.final}
+    parts = [_best(rates, finals, settings)]
+    if of_filter := finals.get((UNFILTERED, FILTERED)):
+        found = of_filter.rates[TESTED]
+        if not found.units:
+            return parts[0]
+        told = sentence(
+            found,
+            "the filter",
+            f"{TESTED} of {of_filter.stage}",
+            settings,
+            levels=levels(found, rates[UNFILTERED], rates[FILTERED]),
+            windows=_in_windows(claims),
+        )
+        if parts[0].endswith(again := f"{_doubt(found, settings)}."):
+            told = told.replace(again, "on others that is unclear, too.")
+        parts.append(told)
+    return " ".join(filter(None, [*parts, _costs_most(totals)]))
 
 
-def _lowest(effects: Iterable[Effect]) -> Effect:
-    """Return the variant with the lowest error rate; one that is undefined comes last.
+def _best(
+    rates: Mapping[str, Mapping[str, Any]],
+    finals: Mapping[tuple[str, str], Effect],
+    settings: EvaluationSettings,
+) -> str:
+    """Return which variant is wrong least, and whether it is better than the baseline.
 
     A variant that has no masks of some frames is not held against those that have.
     """
-    found = {each.variant: (each, each.rates[TESTED]) for each in effects}
-    most = max(difference.units for _, difference in found.values())
-    full = [(each, d.mean) for each, d in found.values() if d.units == most]
-    return min(full, key=lambda own: (math.isnan(own[1]), own[1]))[0]
+    own = {name: each for name, each in rates.items() if name != BASELINE}
+    blind = {
+        name: finals[BASELINE, name].rates[TESTED] for name in own if (BASELINE, name) in finals
+    }
+    most = max(each.get("frames", 0) for each in own.values())
+    full = [name for name, each in own.items() if each.get("frames", 0) == most]
+    best = min(full, key=lambda name: (math.isnan(error := in_percent(own[name][TESTED])), error))
+    if not defined(own[best][TESTED]):
+        return f"Nothing to compare: {TESTED} is undefined on every frame."
+    lead = f"Best here is {best}: " if len(own) > 1 else f"{best}: "
+    lead += f"{in_percent(own[best][TESTED]):.1f} % of the pixels are wrong"
+    if best not in blind:
+        return f"{lead}. No frame with truth was trained on, so {BASELINE} is unknown."
+    found = blind[best]
+    if not found.units or found.is_zero:
+        return f"{lead}, as many as with {BLIND}."
+    word = "worse" if found.mean > 0 else "better"
+    by = f"That is {_size(found.mean, _digits(found))} pp {word} than {BLIND}{_counted(found)}"
+    return f"{lead}. {by}; {_doubt(found, settings)}."
 
 
-def _alone(totals: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the error rates where nothing is there to compare them with."""
-    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
-    rates = ", ".join(
-        f"{in_percent(totals[variant][stage][TESTED]):.1f} % with {variant}"
-        for variant, stage in stages.items()
+def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:
+    """Return in how many windows the filter lowers the error rate, in brackets."""
+    found = (claims or {}).get("filter_ERR", {})
+    if not found.get("windows"):
+        return ""
+    return f" (lower in {found['held']} of {counted(found['windows'], 'window')})"
+
+
+def _costs_most(totals: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return which part of the filtered variant's error rate is largest; empty without a pair."""
+    own, without = totals.get(FILTERED, {}), totals.get(UNFILTERED, {})
+    *_, before, last = [None, *own] if len(own) > 1 else [None, None]
+    if before is None or last is None or before not in without:
+        return ""
+    plain, filtered, final = (
+        in_percent(each[TESTED]) for each in (without[before], own[before], own[last])
     )
-    return f"{TESTED} is {rates}; no frame with truth was trained on, so {BASELINE} is unknown."
+    if math.isnan(final) or not final:
+        return ""
+    costs = {before: plain, "filter": filtered - plain, last: final - filtered}
+    most = max(costs, key=lambda name: costs[name]).replace("filter", "the filter")
+    parts = (
+        f"{before} {plain:.1f}, filter {filtered - plain:+.1f}, {last} {final - filtered:+.1f} pp"
+    )
+    return f"Of {FILTERED}'s {final:.1f} % {most} costs most: {parts}."
 
 
 # --- Other seeds of the training -----------------------------------------------------------------
@@ -310,8 +403,8 @@ def notes(
     for name, rates in finals.items():
         if blind is not None and (excess := rates["ERR"] - blind["ERR"]) >= NOTEWORTHY:
             yield (
-                f"{name} is {percent(excess, 1)} pp worse than {BASELINE}, which never looks at "
-                f"the image (ERR {percent(blind['ERR'], 1)} %)."
+                f"{name} is {percent(excess, 1)} pp worse than {BASELINE} "
+                f"(ERR {percent(blind['ERR'], 1)} %)."
             )
 
 

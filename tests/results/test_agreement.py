@@ -10,7 +10,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount, Member, as_parts
 from roadeval.results.fleet import FleetWriter, Record
 from roadeval.results.rows import Key, cells, effect_rows, score_rows
-from roadeval.results.sentences import degree, sentence, verdict
+from roadeval.results.sentences import degree, levels, sentence, verdict
 from tests.evaluation.making import a_table, autoregression, compared_drive, rows_of
 
 SETTINGS = EvaluationSettings()
@@ -110,5 +110,8 @@ def test_the_sentence_of_a_replay_is_that_of_the_comparison_but_for_what_brings_
     rows = a_drive(CASES[2])
     effects, told = replayed(rows)
     (effect,) = (e for e in effects if (e.base, e.variant) == ("unfiltered", "filtered"))
-    said = sentence(effect.rates["ERR"], "the filter", "ERR of post", SETTINGS)
-    assert told.startswith(said)
+    found, totals = effect.rates["ERR"], score.totals(rows)
+    ends = levels(found, totals["unfiltered"]["post"], totals["filtered"]["post"])
+    assert ends is not None
+    said = sentence(found, "the filter", "ERR of post", SETTINGS, levels=ends)
+    assert told.endswith(said)

@@ -20,7 +20,8 @@ def test_the_verdict_is_the_sentence_on_the_final_mask_and_leaves_the_baseline_o
         a_change(a_difference(0, 0, 0), "blind"),
     )
     found = a_comparison(*rows)
-    told = sentence(WORSE, "new instead of base", "ERR of post", found.settings)
+    ends = 0.1, 0.1 + WORSE.mean
+    told = sentence(WORSE, "new instead of base", "ERR of post", found.settings, levels=ends)
     assert verdict(found) == told
 
 

@@ -38,7 +38,7 @@ def test_a_failure_is_noted_with_its_reason() -> None:
 
 def test_losing_to_blind_is_noted() -> None:
     assert tuple(notes({"net": with_error(14)}, with_error(7))) == (
-        "net is 7.0 pp worse than blind, which never looks at the image (ERR 7.0 %).",
+        "net is 7.0 pp worse than blind (ERR 7.0 %).",
     )
 
 

@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from roadeval.cli import console
 from roadeval.cli.screens import seeds, tables, thresholds
-from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.stats import Difference
@@ -56,13 +55,12 @@ def accounting(facts: Facts) -> str:
 
 def _show_scores(facts: Facts, out: Console) -> None:
     tables.show_table(scores(facts.totals), out)
-    out.print()
-    out.print(best(facts.totals))
     repeats = facts.seeds
     if pairs := dict(_pairs(facts)):
         out.print()
         tables.show_table(differences(pairs), out)
-        out.print(correction(by_rate["ERR"] for by_rate in pairs.values()))
+        if legend := correction(by_rate["ERR"] for by_rate in pairs.values()):
+            out.print(legend)
         for rate, told in seeds.differences(repeats).items():
             out.print(f"{FILTERED} - {UNFILTERED}, {rate}, pp, {told}")
     if repeats:
@@ -95,19 +93,10 @@ def scores(totals: Totals) -> Table:
     return Table(titles, rows, text_columns=(0, 1), breaks=breaks)
 
 
-def best(totals: Totals) -> str:
-    """Name the variant whose final mask has the lowest mean ERR, the baseline not excepted."""
-    winner = _lowest(totals)
-    if winner is None:
-        return "ERR is defined on no frame."
-    aside = ", which never looks at the image" if winner == BASELINE else ""
-    return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])} %"
-
-
 def _pairs(facts: Facts) -> Iterator[tuple[str, Mapping[str, Difference]]]:
     """Yield what is subtracted from what, of final masks, and the differences."""
     for each in facts.effects:
-        if each.final and (each.base == BASELINE or each.variant == FILTERED):
+        if each.final:
             yield f"{each.variant} - {each.base}", each.rates
 
 
@@ -129,13 +118,17 @@ def differences(pairs: Mapping[str, Mapping[str, Difference]]) -> Table:
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:
-    """Print where the outputs lie; a path is never broken, so that it can be copied."""
+    """Print where the outputs lie, and what to type next; no path is broken: it can be copied."""
     if outcome.recording:
         out.print(f"recording  {outcome.recording} ({size(outcome.recording)})", soft_wrap=True)
     if outcome.reports:
-        names = ", ".join(file.name for file in outcome.files)
-        out.print(f"results    {outcome.reports}{os.sep}", soft_wrap=True)
-        out.print(console.wrapped(names, out.width, indent=11), soft_wrap=True)
+        count = len(outcome.files)
+        out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
+    if place := outcome.recording or outcome.reports:
+        first = [f"rerun {place}"] if outcome.recording else []
+        worst = [f"roadeval inspect {place} --list"] if outcome.facts.totals else []
+        for command in (*first, *worst, f"roadeval report {place}"):
+            out.print(f"next       {command}", soft_wrap=True)
 
 
 def size(file: Path) -> str:

@@ -36,7 +36,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     return Facts(
         **found,
         **as_parts(effects),
-        verdict=verdict(found["totals"], effects, run.config.evaluation),
+        verdict=verdict(found["totals"], effects, run.config.evaluation, found["claims"]),
         drive=_drive(run),
         frames=_accounting(run),
         seeds={"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else {},
@@ -70,7 +70,6 @@ def warnings(run: Run) -> tuple[str, ...]:
         *run.frames.oddities,
         *_sizes(run),
         *_missing(run),
-        *run.config.ignored(),
         *_near_training(run),
         *_constant(run),
         *run.model.warnings,
@@ -200,7 +199,7 @@ def _drive(run: Run) -> DriveFacts:
         run.key.camera,
         *(run.selection.size or (0, 0)),
         rate_hz=run.selection.image.rate_hz,
-        topics=list(run.selection.reasons),
+        topics=[*run.selection.reasons, *run.config.ignored()],
     )
 
 

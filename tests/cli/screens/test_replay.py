@@ -71,23 +71,8 @@ def test_the_baseline_stands_in_the_table():
     assert "blind post 91 7.21 7.21 50.00 50.00 50.00" in lines(summary())
 
 
-def test_the_baseline_is_named_when_it_is_the_best():
-    assert outcome.best(TOTALS) == "Lowest ERR: blind, which never looks at the image, 7.21 %"
-
-
-def test_a_variant_is_named_when_it_is_the_best():
-    totals = TOTALS | {"blind": {"post": total(0.5)}}
-    assert outcome.best(totals) == "Lowest ERR: unfiltered, 8.47 %"
-
-
-def test_a_variant_without_masks_of_some_frames_wins_nothing():
-    totals = TOTALS | {"half": {"post": total(0.001) | {"frames": 40}}}
-    assert outcome.best(totals) == "Lowest ERR: blind, which never looks at the image, 7.21 %"
-
-
-def test_an_undefined_rate_wins_nothing_and_is_a_dash():
+def test_an_undefined_rate_is_a_dash():
     totals = {"filtered": {"post": total(math.nan)}, "unfiltered": {"post": total(0.3)}}
-    assert outcome.best(totals) == "Lowest ERR: unfiltered, 30.00 %"
     assert "filtered post 91 - - 50.00 50.00 50.00" in lines(summary(totals=totals))
 
 
@@ -102,6 +87,11 @@ def test_a_difference_that_does_not_stand_bears_no_mark():
     shown = lines(summary(against_blind=unsure))
     assert "filtered - blind +0.65 -0.10 to +1.20 +0.10 -0.20" in shown
     assert "significant after Holm's correction for the 2 differences of ERR" in " ".join(shown)
+
+
+def test_the_mark_is_explained_only_where_there_is_one():
+    unsure = {"filtered": by_rate(difference(0.0065, -0.001, 0.012, 0.08))}
+    assert "Holm" not in screen(summary(difference={}, against_blind=unsure))
 
 
 def test_the_verdict_comes_before_the_tables():
@@ -146,7 +136,9 @@ def test_it_fits_80_columns():
 
 def test_a_long_path_is_never_broken():
     folder = Path("/results", "a-long-name" * 10)
-    assert f"{folder}/\n" in screen(summary(), folder)
+    shown = screen(summary(), folder)
+    assert f"results    {folder}/ (" in shown
+    assert f"next       roadeval report {folder}\n" in shown
 
 
 @pytest.mark.parametrize(
