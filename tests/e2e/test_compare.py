@@ -134,9 +134,9 @@ def test_the_variants_of_one_recording_are_compared_with_each_other(demo):
     final = next(change for change in content["changes"] if change["final"])
     difference = demo.summary["difference"]["post"]["ERR"]["mean"]
     assert final["difference"]["ERR"]["mean"] == pytest.approx(difference)
-    # The same difference, the same family: the same sentence but for what brings it about.
+    # The same difference: the same fact but for what brings it about.
     told = content["verdict"].replace("filtered instead of unfiltered", "the filter")
-    assert demo.summary["verdict"].startswith(told)
+    assert told.partition(";")[0] in demo.summary["verdict"]
 
 
 @pytest.mark.parametrize("kept", [0, 0.5])
