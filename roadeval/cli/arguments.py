@@ -118,7 +118,8 @@ def configuration(given: Given) -> RunConfig:
     masks = {name: _masks(name, path) for name, path in given.get("masks", ())}
     with usage():
         config = config.override({**_tables(given), "masks": masks}).with_variants(variants)
-        config = config.override({"only": given["only"]} if "only" in given else {})
+        if "only" in given:
+            config = config.override({"only": given["only"]})
     config = config.with_drives(
         DriveSettings.of({**read_tables(file), "path": drive}, file)
         for drive, file in given.get("drives", ())

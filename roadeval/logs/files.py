@@ -185,10 +185,10 @@ def _empty_folder(path: Path) -> str:
     return f"{path}: a folder without *.mcap files"
 
 
-def listed(folder: Path, endings: Collection[str]) -> list[Path]:
+def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
     """Return the files of a folder that have one of these endings, in natural order.
 
-    Where there is none, the folders in it are searched.
+    With ``below`` also those of the folders in it.
 
     Raises
     ------
@@ -196,8 +196,8 @@ def listed(folder: Path, endings: Collection[str]) -> list[Path]:
         If there is no such folder, or no such file in it.
     """
     try:
-        found = [file for file in folder.iterdir() if file.suffix.lower() in endings]
-        found = found or [file for file in folder.rglob("*") if file.suffix.lower() in endings]
+        inside = folder.rglob("*") if below and folder.is_dir() else folder.iterdir()
+        found = [file for file in inside if file.suffix.lower() in endings]
     except NotADirectoryError as error:
         raise LogError(f"{folder}: a file, not a folder") from error
     except FileNotFoundError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -186,8 +185,11 @@ class Log:
             if found.truth is not None and masks.where == found.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
         except LogError as error:
-            reason = re.sub(r"`(labels|truth)\.", rf"`masks.{name}.\1.", str(error))
-            reason = reason.replace(f"masks.{name}.truth.", f"masks.{name}.")
+            reason = str(error)
+            if "`labels.road`" in reason and not settings.labels.road:
+                reason += "; or, for confidences, their threshold"
+            reason = reason.replace("`labels.", f"`masks.{name}.labels.")
+            reason = reason.replace("`truth.", f"`masks.{name}.")
             raise LogError(f"`masks` {name}: {reason}") from error
         return masks
 

@@ -132,7 +132,7 @@ def settle(
             own = MaskSettings(labels=config.labels if name == TRUTH else masks_only)
             reader = readers[chosen.name]
             labels[name] = in_log(reader, own, camera, reason, several=several)
-    no_truth = "" if truth.topic or config.truth.path else truth.why
+    no_truth = "" if truth.topic else truth.why
     return Selection(camera, why, labels, config.frames.scale, no_truth)
 
 

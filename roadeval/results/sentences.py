@@ -27,10 +27,11 @@ PROBABLY: Final = 0.2
 """The greatest p-value of a difference that is called probable: without an effect, one drive in ten
 shows so large a difference in that direction."""
 WIDE: Final = 0.2
-"""Of an interval that is so wide, the reason is given instead of the ends."""
+"""Where an interval is wider and holds 0, the reason is given instead of its ends."""
 FINE: Final = 0.005
 """Levels that differ by less are given with two digits."""
 ROUNDING: Final = 5e-4
+"""Levels whose difference is farther from the paired one are of other frames."""
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are stated together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
@@ -80,6 +81,7 @@ def sentence(
     *,
     levels: tuple[float, float] | None = None,
     windows: str = "",
+    said: str = "",
 ) -> str:
     """Return what a difference says of these frames or drives, and then of others like them.
 
@@ -97,6 +99,8 @@ def sentence(
         The rate without and with it; given only where they are of the same frames or drives.
     windows
         In how many windows it is lower, in brackets.
+    said
+        What a sentence before has said of others like them, which is not repeated.
 
     Examples
     --------
@@ -114,9 +118,11 @@ def sentence(
     if levels is not None:
         before, after = (_size(level, 1 if abs(found.mean) >= FINE else 2) for level in levels)
         by = f"from {before} to {after} %"
+    doubt = _doubt(found, settings)
+    if doubt == said and degree(found, settings) is Degree.UNKNOWN:
+        doubt = "on others that is unclear, too"
     verb = "raises" if found.mean > 0 else "lowers"
-    fact = f"{here} {what} {verb} {rate} {by}{windows}{_counted(found)}"
-    return f"{fact}; {_doubt(found, settings)}."
+    return f"{here} {what} {verb} {rate} {by}{windows}{_counted(found)}; {doubt}."
 
 
 def levels(
@@ -136,17 +142,17 @@ def _doubt(found: Difference, settings: EvaluationSettings) -> str:
     like, digits = f"on {found.unit} like these", _digits(found)
     low, high = found.low or 0.0, found.high or 0.0
     ends = f"between {plain_points(low, digits)} and {plain_points(high, digits)} pp"
+    why = ends
     if high - low > WIDE and found.effective is not None:
-        ends = f"frames in a row are alike, so these {found.units} count as {found.effective:.0f}"
+        alike = max(round(found.effective), 1)
+        why = f"frames in a row are alike, so these {found.units} count as {alike}"
     least, most = (low, high) if found.mean > 0 else (-high, -low)
     return {
-        Degree.FEW: found.none_because,
-        Degree.SAME: f"{like} nothing is known",
         Degree.SURE: f"{like} by {_size(least, digits)} to {_size(most, digits)} pp",
         Degree.LITTLE: f"{like} by no more than {_size(max(-low, high), digits)} pp either way",
         Degree.PROBABLE: f"probably also {like}: {ends}",
-        Degree.UNKNOWN: f"{like} the effect is unclear: {ends}",
-    }[degree(found, settings)] + _family(found, settings)
+        Degree.UNKNOWN: f"{like} the effect is unclear: {why}",
+    }.get(degree(found, settings), found.none_because) + _family(found, settings)
 
 
 def _digits(found: Difference) -> int:
@@ -238,53 +244,53 @@ def verdict(
     stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     finals = {(each.base, each.variant): each for each in effects if each.final}
-    parts = [_best(rates, finals, settings)]
-    if of_filter := finals.get((UNFILTERED, FILTERED)):
+    best = lowest({name: each for name, each in rates.items() if name != BASELINE})
+    if best is None:
+        return f"Nothing to compare: {TESTED} is undefined on every frame."
+    against = finals.get((BASELINE, best))
+    blind = None if against is None else against.rates[TESTED]
+    parts = [_best(best, rates, blind, settings)]
+    of_filter = finals.get((UNFILTERED, FILTERED))
+    if of_filter is not None and of_filter.rates[TESTED].units:
         found = of_filter.rates[TESTED]
-        if not found.units:
-            return parts[0]
-        told = sentence(
-            found,
-            "the filter",
-            f"{TESTED} of {of_filter.stage}",
-            settings,
-            levels=levels(found, rates[UNFILTERED], rates[FILTERED]),
-            windows=_in_windows(claims),
-        )
-        if parts[0].endswith(again := f"{_doubt(found, settings)}."):
-            told = told.replace(again, "on others that is unclear, too.")
-        parts.append(told)
+        ends = levels(found, rates[UNFILTERED], rates[FILTERED])
+        more = {"windows": _in_windows(claims), "said": _doubt(blind, settings) if blind else ""}
+        rate = f"{TESTED} of {of_filter.stage}"
+        parts.append(sentence(found, "the filter", rate, settings, levels=ends, **more))
     return " ".join(filter(None, [*parts, _costs_most(totals)]))
 
 
+def lowest(rates: Mapping[str, Mapping[str, Any]]) -> str | None:
+    """Return the variant with the lowest error rate, of those that have masks of all frames.
+
+    ``rates`` are those of final masks by variant, with their number of ``frames``. None if no error
+    rate is defined.
+    """
+    most = max((each.get("frames", 0) for each in rates.values()), default=0)
+    full = {
+        name: each[TESTED]
+        for name, each in rates.items()
+        if each.get("frames", 0) == most and defined(each[TESTED])
+    }
+    return min(full, key=full.__getitem__, default=None)
+
+
 def _best(
+    best: str,
     rates: Mapping[str, Mapping[str, Any]],
-    finals: Mapping[tuple[str, str], Effect],
+    blind: Difference | None,
     settings: EvaluationSettings,
 ) -> str:
-    """Return which variant is wrong least, and whether it is better than the baseline.
-
-    A variant that has no masks of some frames is not held against those that have.
-    """
-    own = {name: each for name, each in rates.items() if name != BASELINE}
-    blind = {
-        name: finals[BASELINE, name].rates[TESTED] for name in own if (BASELINE, name) in finals
-    }
-    most = max(each.get("frames", 0) for each in own.values())
-    full = [name for name, each in own.items() if each.get("frames", 0) == most]
-    best = min(full, key=lambda name: (math.isnan(error := in_percent(own[name][TESTED])), error))
-    if not defined(own[best][TESTED]):
-        return f"Nothing to compare: {TESTED} is undefined on every frame."
-    lead = f"Best here is {best}: " if len(own) > 1 else f"{best}: "
-    lead += f"{in_percent(own[best][TESTED]):.1f} % of the pixels are wrong"
-    if best not in blind:
+    """Return how wrong the best variant is, and whether it is better than the baseline."""
+    lead = f"Best here is {best}: " if len({*rates} - {BASELINE}) > 1 else f"{best}: "
+    lead += f"{in_percent(rates[best][TESTED]):.1f} % of the pixels are wrong"
+    if blind is None:
         return f"{lead}. No frame with truth was trained on, so {BASELINE} is unknown."
-    found = blind[best]
-    if not found.units or found.is_zero:
+    if not blind.units or blind.is_zero:
         return f"{lead}, as many as with {BLIND}."
-    word = "worse" if found.mean > 0 else "better"
-    by = f"That is {_size(found.mean, _digits(found))} pp {word} than {BLIND}{_counted(found)}"
-    return f"{lead}. {by}; {_doubt(found, settings)}."
+    word = "worse" if blind.mean > 0 else "better"
+    by = f"That is {_size(blind.mean, _digits(blind))} pp {word} than {BLIND}{_counted(blind)}"
+    return f"{lead}. {by}; {_doubt(blind, settings)}."
 
 
 def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:

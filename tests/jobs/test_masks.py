@@ -278,7 +278,8 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
     [
         (
             {"path": "classes"},
-            "holds the values 3 7: name those that mean road with `masks.net.labels.road`",
+            "`masks.net.labels.road`, and those to leave out with `masks.net.labels.ignore`; or, "
+            "for confidences, their threshold",
         ),
         ({"path": "npy", "threshold": 0.5}, "holds only 0 and 1, as masks do"),
         ({"path": "sixteen", "threshold": 0.5}, "holds no confidence above 0.0024: whole numbers"),

@@ -13,14 +13,8 @@ from roadeval.cli.options import Given, takes
 
 @takes(
     *("preset", "config", "variants", "drives", "training.frames"),
-    *(
-        "truth",
-        "topics.image",
-        "topics.truth",
-        "topics.sync_tolerance_ms",
-        "topics.resize_truth",
-        "labels",
-    ),
+    *("truth", "topics.image", "topics.truth", "labels"),
+    *("topics.sync_tolerance_ms", "topics.resize_truth"),
     *("frames.scale", "frames.keep_corrupt", "frames.max_pixels"),
     *("frames.start", "frames.end"),
 )

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Final
 
 from roadeval.cli.screens import seeds, tables, thresholds
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import defined, percent, points
+from roadeval.data.words import percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Table
 from roadeval.results.facts import Facts, FrameAccount, Totals
-from roadeval.results.sentences import correction, marked_interval
+from roadeval.results.sentences import correction, lowest, marked_interval
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,7 +79,7 @@ def _why_nothing(frames: FrameAccount) -> str:
 
 def scores(totals: Totals) -> Table:
     """Tabulate the rates of each variant and stage; the best final mask's are bold."""
-    winner = _lowest(totals)
+    winner = lowest({name: own[FINAL_STAGE] for name, own in totals.items() if FINAL_STAGE in own})
     rows: list[list[Cell]] = []
     breaks = []
     for variant, stages in totals.items():
@@ -135,15 +135,3 @@ def size(file: Path) -> str:
     """Write a file's size for a person."""
     bytes_ = file.stat().st_size
     return f"{bytes_ / 1e6:.1f} MB" if bytes_ >= 1e6 else f"{max(bytes_ / 1e3, 0.1):.1f} kB"
-
-
-def _lowest(totals: Totals) -> str | None:
-    """Return the variant of the lowest ERR, of those that have a mask of every frame."""
-    finals = {name: stages[FINAL_STAGE] for name, stages in totals.items() if FINAL_STAGE in stages}
-    most = max((each["frames"] for each in finals.values()), default=0)
-    errors = {
-        name: each["ERR"]
-        for name, each in finals.items()
-        if defined(each["ERR"]) and each["frames"] == most
-    }
-    return min(errors, key=errors.__getitem__, default=None)

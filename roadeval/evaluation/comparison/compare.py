@@ -186,7 +186,7 @@ class Comparison:
     disagreements: tuple[Disagreement, ...]
     """The frames of one drive on which final masks of one run disagree most."""
     notes: tuple[Note, ...]
-    """What was left out, and what makes the results less comparable than they look."""
+    """Warnings: what was left out, and why results are less comparable than they look."""
     settings: EvaluationSettings
     """The confidence of the intervals, and what is negligible."""
 

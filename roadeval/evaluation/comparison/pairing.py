@@ -36,7 +36,7 @@ class Part:
     rows: Callable[[str], Rows]
     """Returns its rows of ``frames``, ``regions``, ``disagreements`` or ``scores``."""
     group: str | None = None
-    """What it shares with other drives of the result, as a day or a route."""
+    """A name shared with other drives of the result, as of a day or a route."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Values by the tags' keys."""
 

@@ -61,7 +61,7 @@ class DriveMean:
     drive: str
     """Its identity."""
     group: str
-    """What it shares with other drives, as a day or a route; its own identity where it has none."""
+    """A name shared with other drives, as of a day or a route; its own identity without one."""
     mean: float
     """NaN if no frame has a difference: the drive is left out."""
 

@@ -72,7 +72,7 @@ class Compared:
 
     @property
     def warnings(self) -> list[str]:
-        """What was left out, and what makes the results less comparable than they look."""
+        """Warnings: what was left out, and why results are less comparable than they look."""
         return warnings(self.comparison)
 
     @property
@@ -265,7 +265,7 @@ class ComparedMask:
     """A final mask that is compared."""
 
     name: str
-    """What the page calls it."""
+    """Its name on the page."""
     result: str
     variant: str
     own: str

@@ -77,7 +77,7 @@ def warnings(run: Run) -> tuple[str, ...]:
 
 
 def _sparse(run: Run) -> Iterator[str]:
-    """Say what windows are where only labelled frames are read; warn where none was read."""
+    """Yield what windows are of where only labelled frames are read, and whether none was."""
     if run.config.frames.labelled:
         yield (
             "only frames with truth were read: windows are of frames that follow each other among "

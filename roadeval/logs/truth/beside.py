@@ -12,7 +12,7 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.files import IMAGES, listed, natural, of_ids, some
+from roadeval.logs.files import IMAGES, listed, of_ids, some
 from roadeval.logs.messages.pictures import Picture, RawPicture
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, Drawn, Size
@@ -55,10 +55,9 @@ def labels_in(path: Path, size: Size | None) -> LabelSet:
         known = ", ".join(sorted({each.name for own in _readers().values() for each in own}))
         raise LogError(f"{path}: no file of labels; known are folders of images, and {known}")
     endings = IMAGES | {NPY} | _readers().keys()
-    files = [path] if path.is_file() else listed(path, endings)
-    if (found := _labels_of(files, path, size)) is None and path.is_dir():
-        below = (file for file in path.rglob("*") if file.suffix.lower() in endings)
-        found = _labels_of(sorted(below, key=natural), path, size)
+    files = [path] if path.is_file() else listed(path, endings, below=True)
+    own = [file for file in files if path in (file, file.parent)]
+    found = _labels_of(own, path, size) or _labels_of(files, path, size)
     if found is None:
         raise LogError(f"{path}: no label in it that roadeval can read")
     return found
@@ -74,7 +73,7 @@ def _labels_of(files: Sequence[Path], path: Path, size: Size | None) -> LabelSet
                 return _drawn(own, format_, size)
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
     labels = tuple(map(file_label, of_ids(images)))
-    return LabelSet(labels, colour_names(path), by_color=True) if labels else None
+    return LabelSet(labels, colours=colour_names(path)) if labels else None
 
 
 @cache
@@ -175,7 +174,7 @@ def _label(drawn: Drawn, classes: dict[str, int]) -> NamedLabel:
 def _notes(
     drawn: Sequence[Drawn], labelled: Collection[Drawn], others: Sequence[str]
 ) -> tuple[str, ...]:
-    """Return what a user should know of the labels, a sentence each."""
+    """Return warnings about the labels, a sentence each."""
     notes = []
     if others:
         notes.append(f"{some(others)}: of another format than the other labels, not read")

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pictures import CompressedPicture, RawPicture
+from roadeval.logs.settings import Color
 from roadeval.logs.truth.named import NamedLabel
 from roadeval.runtime.documents import read_bounded
 from roadeval.runtime.files import check_input
@@ -22,8 +23,8 @@ _LONGEST_HEAD: Final = 1 << 16
 """Bytes in which the head of an NPY file of numbers ends."""
 
 
-def colour_names(folder: Path) -> dict[str, int]:
-    """Return the packed colours of the classes in CVAT's ``labelmap.txt``, in or above a folder."""
+def colour_names(folder: Path) -> dict[str, Color]:
+    """Return the colours of the classes in CVAT's ``labelmap.txt``, in or above a folder."""
     places = [each / "labelmap.txt" for each in (folder, folder.parent)]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
@@ -31,8 +32,8 @@ def colour_names(folder: Path) -> dict[str, int]:
     try:
         lines = read_bounded(found).decode().splitlines()
         pairs = [line.split(":")[:2] for line in lines if line.strip() and line[0] != "#"]
-        colours = {name: [int(level) for level in rgb.split(",")] for name, rgb in pairs}
-        return {name: r << 16 | g << 8 | b for name, (r, g, b) in colours.items()}
+        levels = {name: map(int, rgb.split(",")) for name, rgb in pairs}
+        return {name: (red, green, blue) for name, (red, green, blue) in levels.items()}
     except (OSError, ValueError) as error:
         raise LogError(f"{found}: not a list of names and colours: {error}") from error
 

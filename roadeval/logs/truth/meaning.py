@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -310,7 +310,7 @@ def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSet
         If a class has no such name, or the labels have no names.
     """
     names = [*_named(labels)]
-    if not origin.classes:
+    if not origin.colours:
         if names:
             raise LogError(
                 f"`labels.road` {names[0]}: {name} has no names of classes; give the value that "
@@ -321,10 +321,9 @@ def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSet
         return labels
     if len(names) < len({*labels.road, *labels.ignore}):
         raise LogError(f"{name}: give the classes as names or as values, not as both")
-    _check_names(labels, origin.classes, f"{name}, which has the classes {_listed(origin.classes)}")
+    _check_names(labels, origin.colours, f"{name}, which has the classes {_listed(origin.colours)}")
     road, ignore = (
-        tuple(_unpacked(origin.classes[str(each)]) for each in own)
-        for own in (labels.road, labels.ignore)
+        tuple(origin.colours[str(each)] for each in own) for own in (labels.road, labels.ignore)
     )
     return LabelSettings(road_colors=road, ignore_colors=ignore)
 
@@ -335,7 +334,7 @@ def _named(labels: LabelSettings) -> dict[str, int]:
     return {each: truth for each, truth in pairs if isinstance(each, str)}
 
 
-def _check_names(labels: LabelSettings, classes: Mapping[str, int], where: str) -> None:
+def _check_names(labels: LabelSettings, classes: Collection[str], where: str) -> None:
     for setting, given in (("road", labels.road), ("ignore", labels.ignore)):
         for each in given:
             if each not in classes:
@@ -366,10 +365,6 @@ def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
     """``(H, W)`` numbers for ``(H, W, 3)`` colours: red * 65536 + green * 256 + blue."""
     wide = colors.astype(np.uint32)
     return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
-
-
-def _unpacked(color: int) -> Color:
-    return color >> 16, color >> 8 & 255, color & 255
 
 
 def _packed(color: Color) -> int:

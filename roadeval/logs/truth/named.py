@@ -18,7 +18,7 @@ from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import IMAGES, bare, images_of, listed, ordered, some, time_in
 from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.settings import LabelPlace
+from roadeval.logs.settings import Color, LabelPlace
 from roadeval.runtime.text import visible
 
 _LAST_NUMBER: Final = re.compile(r"(\d+)\D*$")
@@ -47,12 +47,12 @@ class LabelSet:
     labels: Sequence[NamedLabel]
     classes: Mapping[str, int] = field(default_factory=dict)
     """Values of the classes by their names, where the format has names."""
-    by_color: bool = False
-    """Whether these values are packed colours: red * 65536 + green * 256 + blue."""
+    colours: Mapping[str, Color] = field(default_factory=dict)
+    """Colours of the classes by their names, where images have such a list."""
     occurring: Mapping[str, int] = field(default_factory=dict)
     """In how many labels each class occurs, if that is known without decoding them."""
     notes: tuple[str, ...] = ()
-    """What a user should know of the labels, a sentence each."""
+    """Warnings about the labels, a sentence each."""
 
 
 @dataclass(frozen=True, eq=False)

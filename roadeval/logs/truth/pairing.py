@@ -160,10 +160,10 @@ class Partners:
         return label if _closest(images, theirs, image) == image else None
 
 
-def frames_of(pairing: Pairing, near: int = 0) -> Iterator[int]:
+def frames_of(pairing: Pairing) -> Iterator[int]:
     """Yield the position of each label's image, in the order of the labels."""
     images, labels = pairing.images, pairing.labels
-    forth, back = Partners(pairing), Partners(replace(pairing, images=labels, labels=images), near)
+    forth, back = Partners(pairing), Partners(replace(pairing, images=labels, labels=images))
     for label in range(len(labels)):
         image = back.of(label)
         if image is not None and forth.of(image) == label:

@@ -42,8 +42,6 @@ from roadeval.logs.truth.pairing import (
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
-_CLASSES: Final = 64
-"""Values of more than so many kinds may be confidences."""
 _BYTE: Final = 255
 """Greatest code of a confidence map of 16 bits that was made for 8."""
 _ONES: Final = (1, 257)
@@ -66,7 +64,7 @@ class LabelSource:
     digest: Callable[[], str] | None = None
     """Computes the SHA-256 of what lies beside the log, in hexadecimal."""
     notes: tuple[str, ...] = ()
-    """What a user should know of labels beside the log, a sentence each."""
+    """Warnings about labels beside the log, a sentence each."""
 
     @property
     def is_confidence(self) -> bool:
@@ -188,8 +186,9 @@ def label_files(settings: LabelPlace) -> list[Path]:
     """
     named = (log_and_topic(settings.path)[0] or settings.path, settings.images)
     paths = [Path(each) for each in named if each is not None]
-    # A file of panoptic labels has a folder of its name beside it.
-    paths += [each.with_suffix("") for each in paths if each.with_suffix("").is_dir()]
+    # Panoptic labels have a folder of their file's name beside it.
+    beside = [each.with_suffix("") for each in paths if each.suffix == ".json"]
+    paths += [folder for folder in beside if folder.is_dir()]
     return [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
 
 

@@ -132,14 +132,14 @@ class FrameFacts:
     rates: Mapping[str, Mapping[str, float]]
     """Of each variant's final mask, as short tables show them; none without truth."""
     conditions: Sequence[str] = ()
-    """What is true of it, in words."""
+    """Its conditions in words, as ``much shadow``."""
     notes: Sequence[str] = ()
     """Sentences about it."""
 
 
 @dataclass(frozen=True, slots=True)
 class BrowsedFrames:
-    """What the browser is made of."""
+    """The parts of the browser of frames."""
 
     frames: Sequence[FrameFacts]
     """The frames of the drive, in order."""

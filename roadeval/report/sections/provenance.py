@@ -43,7 +43,7 @@ def section(findings: Findings) -> Iterator[Block]:
         first = {"preset": facts.run["preset"]} if "preset" in facts.run else {}
         shared = {name: facts.run[name] for name in TABLES if name in facts.run}
         own = {name: {**first, **each, **shared} for name, each in facts.settings.items()}
-        yield _settings(settings_rows(own))
+        yield from _settings(settings_rows(own))
 
 
 def of_drives(findings: FleetFindings) -> Iterator[Block]:
@@ -61,7 +61,7 @@ def of_drives(findings: FleetFindings) -> Iterator[Block]:
         "note",
     )
     own = {name: value for name, value in facts.run.items() if name not in OF_A_FLEET}
-    yield _settings([[name, value] for name, value in flattened(own)])
+    yield from _settings([[name, value] for name, value in flattened(own)])
 
 
 def _models(findings: FleetFindings) -> str:
@@ -91,13 +91,15 @@ def _methods(facts: Facts) -> Iterator[Block]:
             yield KeepTogether([Heading(f"{variant}: {stage}", 2), _words(["what", "value"], rows)])
 
 
-def _settings(rows: list[list[str]]) -> Block:
-    """Return settings in two columns."""
+def _settings(rows: list[list[str]]) -> Iterator[Block]:
+    """Yield settings in two columns, which may break across pages; without those that are unset."""
+    rows = [row for row in rows if row[1] != "none"]
     half = -(-len(rows) // 2)
     left, *right = [
         _words(["setting", "value"], part) for part in (rows[:half], rows[half:]) if part
     ]
-    return KeepTogether([Heading("Settings", 2), TwoColumns([left], right)])
+    yield Heading("Settings", 2)
+    yield TwoColumns([left], right)
 
 
 def _versions_and_seconds(facts: Facts) -> Iterator[Block]:

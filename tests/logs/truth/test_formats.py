@@ -162,11 +162,11 @@ def test_the_other_classes_are_said_to_be_non_road():
 
 def test_masks_of_labelmap_have_the_names_of_their_colours():
     origin = labels_in(LABELS / "masks" / "SegmentationClass", SIZE)
-    names = {color: name for name, color in origin.classes.items()}
+    names = {color: name for name, color in origin.colours.items()}
     for label, expected in zip(origin.labels, (WHOLE[0], painted("road", "blob")), strict=False):
         with Image.open(label.path) as image:
             pixels = np.asarray(image.convert("RGB")).tolist()
-        found = [[names[r << 16 | g << 8 | b] for r, g, b in row] for row in pixels]
+        found = [[names[r, g, b] for r, g, b in row] for row in pixels]
         np.testing.assert_array_equal(np.where(expected == "", "background", expected), found)
 
 

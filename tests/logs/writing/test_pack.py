@@ -108,6 +108,13 @@ def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
     assert not out.exists()
 
 
+def test_images_in_folders_below_are_not_packed(tmp_path: Path) -> None:
+    (tmp_path / "day" / "night").mkdir(parents=True)
+    (tmp_path / "day" / "night" / "1.png").write_bytes(png(grey(9)))
+    with pytest.raises(LogError, match="no image in it"):
+        pack(tmp_path / "day", tmp_path / "log.mcap")
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
