@@ -13,6 +13,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
+from roadeval.jobs.progress import Progress
 from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
 from roadeval.training import TrainingError
 from tests.e2e.commands import here
@@ -110,7 +111,23 @@ def test_no_frames_for_training_are_enough_for_what_learns_nothing(places, tmp_p
     assert done.summary["frames"]["evaluated"] == 6
     with pytest.raises(RoadevalError) as caught:
         replay(places, tmp_path, "6", training={"frames": 0})
-    assert "training.frames" in str(caught.value)
+    assert "`training.frames` is 0, and filtered, unfiltered must learn" in str(caught.value)
+
+
+@pytest.mark.parametrize(("labels", "noted"), [(5, True), (6, False)])
+def test_a_run_with_few_labels_says_so_at_its_start(places, tmp_path, labels, noted):
+    few = tmp_path / "few"
+    few.mkdir()
+    for label in sorted((places / "6").iterdir())[:labels]:
+        shutil.copy(label, few)
+    tables = {"truth": {"path": str(few)}, "masks": {"net": {"path": str(places / "net")}}}
+    config = roadeval.configure({**tables, "only": ["net"], "output": {"record": "none"}})
+    seen: list[Progress] = []
+    roadeval.replay(places / "drive.mcap", config, reports=tmp_path, on_progress=seen.append)
+    notes = [each.note for each in seen if each.note]
+    said = f"at most {labels} of {FRAMES} frames have road truth: `frames.labelled` reads these"
+    assert [each.startswith(said) for each in notes] == [True] * noted
+    assert bool(seen[0].note) is noted
 
 
 @pytest.mark.parametrize(("truth", "only"), [("6", ("net",)), ("21", ()), ("21", ("unfiltered",))])
@@ -196,6 +213,14 @@ def test_a_label_that_has_changed_replays_its_drive_of_a_fleet(fleet, tmp_path):
     (tmp_path / "labels" / "one" / "2.png").write_bytes(label.read_bytes())
     done, submitted = fleet(truth=truth)
     assert (done.replayed, submitted) == (1, ["one"])
+
+
+def test_a_label_that_only_looks_changed_replays_nothing(fleet, tmp_path):
+    tables = {"truth": {"path": str(tmp_path / "labels" / "{drive}")}, "training": {"frames": 3}}
+    assert fleet(**tables, masks={}, only=["unfiltered"])[0].counts == {"scored": 2}
+    os.utime(tmp_path / "labels" / "two" / "5.png")
+    done, submitted = fleet(**tables, masks={}, only=["unfiltered"])
+    assert (done.replayed, submitted) == (0, ["two"])
 
 
 def test_a_manifest_says_where_the_truth_of_a_drive_lies(fleet, tmp_path, monkeypatch):

@@ -166,6 +166,7 @@ def frames_of(pairing: Pairing) -> Iterator[int]:
     forth, back = Partners(pairing), Partners(replace(pairing, images=labels, labels=images))
     for label in range(len(labels)):
         image = back.of(label)
+        # Where many stamps are equal or out of order, two labels may find the same image.
         if image is not None and forth.of(image) == label:
             yield image
 

@@ -14,7 +14,7 @@ from pycocotools import mask as coco
 from skimage.draw import polygon2mask
 
 from roadeval.images import Limits
-from roadeval.logs import LabelSettings, LogError
+from roadeval.logs import LabelPlace, LabelSettings, LogError, label_files
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.drawn import UNLABELLED, Outline, Runs
 from roadeval.logs.truth.meaning import of_classes
@@ -158,6 +158,14 @@ def test_the_other_classes_are_said_to_be_non_road():
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
     meaning = of_classes(LabelSettings(road=("road",)), origin, "labels")
     assert meaning.words == "road is road; non-road is all else, car (3), ego (1)"
+
+
+def test_the_pictures_of_panoptic_labels_count_as_their_files(tmp_path):
+    (tmp_path / "pan").mkdir()
+    files = [tmp_path / "pan.json", tmp_path / "pan" / "0.png"]
+    for file in files:
+        file.touch()
+    assert label_files(LabelPlace(str(files[0]))) == files
 
 
 def test_masks_of_labelmap_have_the_names_of_their_colours():

@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from roadeval.logs.topics.reader import UNREADABLE
-from roadeval.logs.truth.pairing import Pairing, Partners
+from roadeval.logs.truth.pairing import Pairing, Partners, frames_of
 
 
 class Stamps:
@@ -78,3 +81,22 @@ def test_only_stamps_near_the_one_looked_for_are_read() -> None:
     images, labels = Stamps(range(0, 100_000, 10)), Stamps(range(0, 100_000, 10))
     assert Partners(Pairing(images, labels, 5)).of(7_000) == 7_000
     assert len(images.read) + len(labels.read) < 60
+
+
+@given(
+    st.lists(st.integers(0, 60), max_size=30).map(sorted),
+    st.lists(st.integers(0, 60), max_size=30).map(sorted),
+    st.integers(0, 6),
+)
+def test_the_frames_of_labels_are_those_that_find_a_label(images, labels, tolerance):
+    pairing = Pairing(Stamps(images), Stamps(labels), tolerance)
+    partners = Partners(pairing)
+    expected = [image for image in range(len(images)) if partners.of(image) is not None]
+    assert sorted(frames_of(pairing)) == expected
+
+
+def test_no_frame_is_given_twice_where_stamps_are_equal_and_out_of_order():
+    images = [*[1] * 7, *[2] * 5, *[3] * 3, 4, *[5] * 5, *[7] * 3]
+    labels = [0, 0, 1, 2, 5, 2, 5, 5, 5, 5, 6, 6, 7, 8, 8]
+    found = [*frames_of(Pairing(Stamps(images), Stamps(labels), 20))]
+    assert sorted({*found}) == sorted(found)
