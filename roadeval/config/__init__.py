@@ -27,27 +27,5 @@ if TYPE_CHECKING:
         with_masks,
     )
 
-__all__ = [
-    "OF_A_LOG",
-    "PRESETS",
-    "ConfigError",
-    "DriveSettings",
-    "ExecutionSettings",
-    "FleetSettings",
-    "OutputSettings",
-    "RunConfig",
-    "Variant",
-    "check_variant_name",
-    "config_toml",
-    "configure",
-    "in_file",
-    "load_config",
-    "log_config",
-    "network_variant",
-    "read_tables",
-    "run_toml",
-    "with_masks",
-]
-
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

@@ -21,15 +21,7 @@ _BOUNDS: Final = {"ge": "at least {}", "gt": "above {}", "le": "at most {}", "lt
 
 
 def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay") -> str:
-    """Write the TOML file that repeats a run, with every effective setting.
-
-    Parameters
-    ----------
-    config, drive, version
-        Of the run; the drive's name, or how many there are, is for people.
-    command
-        That takes the file.
-    """
+    """Write the TOML file that repeats a run, with every effective setting."""
     head = (
         f"# The configuration of a {command} of {visible(drive)} by roadeval {version}.\n"
         f"# To repeat the run, give this file to roadeval {command} as its configuration."

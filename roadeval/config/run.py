@@ -199,13 +199,9 @@ class RunConfig(LogConfig):
     def override(self, tables: Mapping[str, Any]) -> RunConfig:
         """Return the configuration with the values of some tables in place.
 
-        A `ConfigError` for a key or a value that cannot be used names it, and what is allowed.
-
-        Parameters
-        ----------
-        tables
-            In the shape of a TOML file, without ``preset``. A variant of a name that is there is
-            replaced.
+        A `ConfigError` for a key or a value that cannot be used names it, and what is allowed. The
+        tables have the shape of a TOML file, without ``preset``; a variant of a name that is there
+        is replaced.
         """
         pipeline = pipeline_of(self.pipeline, tables)
         check_tables(
@@ -325,8 +321,6 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
     ----------
     tables
         In the shape of a TOML file; ``preset`` names what they start from, ``paper`` by default.
-    where
-        The file, for messages.
 
     Raises
     ------

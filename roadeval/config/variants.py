@@ -118,12 +118,8 @@ class Variant:
 def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, ...]:
     """Return a run's variants: with the pipeline's filters, without them, and the extra ones.
 
-    A pipeline without a filter gives the unfiltered variant alone.
-
-    Raises
-    ------
-    ConfigError
-        If an extra variant's name is taken, reserved, or no plain word.
+    A pipeline without a filter gives the unfiltered variant alone. A `ConfigError` if an extra
+    variant's name is taken, reserved, or no plain word.
     """
     pair = pipeline.has_filter
     variants = [Variant(FILTERED, pipeline)] if pair else []
@@ -219,14 +215,8 @@ def network_variant(name: str, path: str) -> Variant:
     """Return the variant of a network: its mask, which phase 4 leaves as it is.
 
     A `ConfigError` if a TOML file cannot be used. The network itself is opened when it is run.
-
-    Parameters
-    ----------
-    name
-        Of the variant.
-    path
-        An ONNX file, or a TOML file with the settings of the stage ``net``, whose ``file`` is
-        found from the folder of the TOML file. Its table ``[post]`` asks for post-processing.
+    ``path`` is an ONNX file, or a TOML file with the settings of the stage ``net``, whose ``file``
+    is found from the folder of the TOML file. Its table ``[post]`` asks for post-processing.
     """
     tables: Mapping[str, Any] = {"file": path}
     if in_a_file := Path(path).suffix == ".toml":

@@ -136,10 +136,7 @@ class TruthBits:
     def bits_of(self, masks: Iterable[Packed]) -> Bits:
         """Stack the bits of masks of the truth's shape: ``(K, H, words)``.
 
-        Raises
-        ------
-        ValueError
-            If one has another shape.
+        A `ValueError` if one has another shape.
         """
         bits = []
         for mask in masks:

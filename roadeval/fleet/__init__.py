@@ -12,7 +12,5 @@ if TYPE_CHECKING:
     from roadeval.fleet.remote import staged, stamp
     from roadeval.fleet.sources import find_drives
 
-__all__ = ["DriveEntry", "FleetError", "find_drives", "shown", "staged", "stamp"]
-
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

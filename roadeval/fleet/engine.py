@@ -58,7 +58,8 @@ def started(
 ) -> Iterator[Engine]:
     """Start worker processes here, or connect to a scheduler, until the block ends.
 
-    Tasks that still run then are cancelled; workers that were started here end.
+    Tasks that still run then are cancelled; workers that were started here end. A `FleetError` if
+    the scheduler does not answer.
 
     Parameters
     ----------
@@ -69,11 +70,6 @@ def started(
         which costs its drive one attempt.
     scheduler
         Address of a Dask scheduler, ``tcp://host:8786``, or the file that it has written.
-
-    Raises
-    ------
-    FleetError
-        If the scheduler does not answer.
     """
     import dask
     import distributed

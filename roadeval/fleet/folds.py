@@ -55,27 +55,10 @@ def _content(file: Path) -> str:
 def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     """Split drives into folds; those of a group stay together.
 
-    The groups are shuffled by the digest of seed and name, which depends neither on their order
-    nor on the other groups, and distributed in turn: the numbers of groups differ by one at most.
-
-    Parameters
-    ----------
-    groups
-        The group of each drive; a single drive is its own group.
-    folds
-        2 at least.
-    seed
-        Of the shuffle.
-
-    Returns
-    -------
-    dict
-        The fold of each drive, from 0.
-
-    Raises
-    ------
-    FleetError
-        If there are fewer groups than folds.
+    The groups are shuffled by the digest of seed and name, which depends neither on their order nor
+    on the other groups, and distributed in turn: the numbers of groups differ by one at most.
+    ``groups`` has the group of each drive, of a single one itself. Returned is the fold of each
+    drive, from 0. A `FleetError` if there are fewer groups than folds.
 
     Examples
     --------

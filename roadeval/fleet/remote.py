@@ -83,19 +83,10 @@ _STATUSES: Final = {
 def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
     """Yield a drive as a file or folder of this machine.
 
-    A URL is copied into a folder of its own, which is removed when the block ends.
-
-    Parameters
-    ----------
-    source
-        A path or a URL. One that ends in ``/`` is a rosbag2 folder.
-    folder
-        Where copies are made; in the system's folder of temporary files by default.
-
-    Raises
-    ------
-    FleetError
-        If it cannot be read, its copy is not whole, or the disk is full.
+    A URL is copied into a folder of its own, which is removed when the block ends. A URL that ends
+    in ``/`` is a rosbag2 folder. Copies are made in ``folder``, by default the system's for
+    temporary files. A `FleetError` if it cannot be read, its copy is not whole, or the disk is
+    full.
     """
     if not is_url(source) or scheme_of(source) == "file":
         yield file_of(source) if is_url(source) else Path(source)

@@ -60,12 +60,8 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     logs and rosbag2 folders, a glob, a URL, or a manifest (``.toml``, ``.csv``). A folder's drives
     come in natural order, without hidden and incomplete files. All files of a rosbag2 folder
     together mean the folder. A drive that is named twice counts once, with what a manifest says of
-    it.
-
-    Raises
-    ------
-    RoadevalError
-        If a word leads to no drive, a manifest cannot be used, or a drive is described in two ways.
+    it. A `RoadevalError` if a word leads to no drive, a manifest cannot be used, or a drive is
+    described in two ways.
     """
     found = [entry for word in words for entry in _named(word)]
     if not found:
@@ -243,10 +239,8 @@ def is_manifest(path: Path) -> bool:
 def read_manifest(path: Path) -> list[ManifestEntry]:
     """Read the entries of a manifest.
 
-    Raises
-    ------
-    RoadevalError
-        If it cannot be read, names no drive, or has a key, a tag or a setting that cannot be used.
+    A `RoadevalError` if it cannot be read, names no drive, or has a key, a tag or a setting that
+    cannot be used.
     """
     rows = list(_rows_of_csv(path) if path.suffix.lower() == ".csv" else _rows_of_toml(path))
     if not rows:

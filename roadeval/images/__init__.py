@@ -28,21 +28,5 @@ if TYPE_CHECKING:
         format_of,
     )
 
-__all__ = [
-    "MAX_PIXELS",
-    "DamagedImageError",
-    "ImageError",
-    "ImageFormat",
-    "Limits",
-    "eight_bits",
-    "format_of",
-    "palette_indices",
-    "size_of",
-    "to_labels",
-    "to_png",
-    "to_rgb",
-    "without_colours",
-]
-
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

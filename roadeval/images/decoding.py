@@ -48,14 +48,8 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
     """Decode an image file to ``(H, W, 3)`` uint8 RGB.
 
     16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels, and
-    opacity is left out.
-
-    Raises
-    ------
-    DamagedImageError
-        If it is damaged, unless the limits allow that and something can be decoded.
-    ImageError
-        If it is of no known format, or too large.
+    opacity is left out. A `DamagedImageError` if it is damaged, unless the limits allow that and
+    something can be decoded. An `ImageError` if it is of no known format, or too large.
     """
     format_ = _known_format(data)
     if format_.plugin is None:

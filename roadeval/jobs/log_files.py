@@ -77,16 +77,6 @@ def demo(output: AnyPath) -> Path:
 
     100 frames of 640x480 pixels at 10 Hz of a synthetic road, with the truth of road and shadow.
 
-    Parameters
-    ----------
-    output
-        The log to write.
-
-    Returns
-    -------
-    Path
-        The log.
-
     Raises
     ------
     RoadevalError

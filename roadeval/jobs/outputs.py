@@ -73,13 +73,8 @@ def holding(
     """Hold the files that a command writes, and its results folder, if it writes one.
 
     What earlier runs have left of them is removed. Yields whether it is certain that no other run
-    writes them.
-
-    Raises
-    ------
-    RoadevalError
-        If one is an input or another output, cannot be written, or is being written by another
-        run.
+    writes them. A `RoadevalError` if one is an input or another output, cannot be written, or is
+    being written by another run.
     """
     paths = [Path(file) for file in files if file is not None]
     outputs = [*paths, *([folder] if folder else [])]

@@ -9,6 +9,7 @@ runs are trusted: they are those of `components` or `label_runs`, of an image of
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import isfunction
 from typing import Any, Final
 
 import numpy as np
@@ -34,34 +35,6 @@ from roadeval.data.arrays import (
     Words,
 )
 from roadeval.kernels import _loops, plain
-
-__all__ = [
-    "add_outcomes",
-    "components",
-    "count_bits",
-    "dilate",
-    "erode",
-    "fill_holes",
-    "filter_rows",
-    "geodesics",
-    "keep_region",
-    "label_rows",
-    "label_runs",
-    "look_up_colours",
-    "look_up_sum_min",
-    "mahalanobis",
-    "mask_rows",
-    "outcomes",
-    "paint",
-    "ring_sums",
-    "run_sums",
-    "transfer",
-    "tree_sum",
-]
-
-if lacking := [name for name in __all__ if not hasattr(_loops, name)]:
-    # A checkout that was updated, and not installed again since.
-    raise ImportError(f"the compiled loops are of an earlier state: no {', '.join(lacking)}")
 
 TABLED: Final = 256
 """As in ``c/compensation.c``: components of more pixels have a table of levels."""
@@ -324,3 +297,13 @@ def mask_rows(mask: Bits, width: int) -> Plane:
     lines = np.empty((len(mask), 1 + -(-width // 8)), np.uint8)
     _loops.mask_rows(mask, len(mask), width, lines)
     return lines
+
+
+LOOPS: Final = [
+    name
+    for name, each in vars().items()
+    if isfunction(each) and each.__module__ == __name__ and name[0] != "_"
+]
+if lacking := [name for name in LOOPS if not hasattr(_loops, name)]:
+    # A checkout that was updated, and not installed again since.
+    raise ImportError(f"the compiled loops are of an earlier state: no {', '.join(lacking)}")

@@ -309,10 +309,7 @@ def _step(to: Sums, cost: Sums, start: Sums, other: Sums, length: int) -> None:
 def outcomes(mask: Plane, truth: Plane) -> Plane:
     """Classify each pixel of a mask, ``(H, W)`` of 0 and 1, by a truth of 0, 1 and 255 for ignored.
 
-    Returns
-    -------
-    numpy.ndarray
-        ``(H, W)`` uint8: `TN`, `TP`, `FP`, `FN` or `IGNORED`.
+    Returned are the outcomes, ``(H, W)`` uint8: `TN`, `TP`, `FP`, `FN` or `IGNORED`.
     """
     # TN 0 and TP 1 where the two agree, FP 2 and FN 3 where not; beyond 4 what is ignored.
     return np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED))

@@ -36,39 +36,5 @@ if TYPE_CHECKING:
     from roadeval.logs.writing.sidecar import NoSidecar, SidecarWriter
     from roadeval.logs.writing.writer import LogWriter
 
-__all__ = [
-    "METADATA",
-    "Accounting",
-    "Damage",
-    "FrameError",
-    "FrameSettings",
-    "FrameStream",
-    "LabelPlace",
-    "LabelSettings",
-    "LabelSource",
-    "Log",
-    "LogConfig",
-    "LogDescription",
-    "LogError",
-    "LogWriter",
-    "LoggedFrame",
-    "MaskSettings",
-    "NoSidecar",
-    "PackResult",
-    "Selection",
-    "SidecarWriter",
-    "TopicInfo",
-    "TopicKind",
-    "TopicSettings",
-    "describe",
-    "files_of",
-    "identity_of",
-    "label_files",
-    "natural",
-    "open_log",
-    "pack",
-    "parse_time",
-]
-
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

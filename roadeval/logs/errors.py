@@ -24,10 +24,7 @@ class BadMessage(Exception):  # noqa: N818  (never leaves this room)
 class DamagedMessage(BadMessage):
     """A message whose picture is damaged, and may be decoded in part all the same.
 
-    Attributes
-    ----------
-    damage
-        What is wrong with it.
+    ``damage`` is what is wrong with it.
     """
 
     def __init__(self, damage: str) -> None:

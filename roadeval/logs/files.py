@@ -67,13 +67,9 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
 
     A file in a folder that is no MCAP file is left out, and returned as damage, and so is one that
-    is not there though the folder's `METADATA` lists it, or though those before and after it
-    are: a recorder numbers its files from 0.
-
-    Raises
-    ------
-    LogError
-        If there is none; the message names what there is instead, and how to convert it.
+    is not there though the folder's `METADATA` lists it, or though those before and after it are: a
+    recorder numbers its files from 0. A `LogError` if there is none; the message names what there
+    is instead, and how to convert it.
     """
     if not path.is_dir():
         _check(path)
@@ -188,12 +184,8 @@ def _empty_folder(path: Path) -> str:
 def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
     """Return the files of a folder that have one of these endings, in natural order.
 
-    With ``below`` also those of the folders in it.
-
-    Raises
-    ------
-    LogError
-        If there is no such folder, or no such file in it.
+    With ``below`` also those of the folders in it. A `LogError` if there is no such folder, or no
+    such file in it.
     """
     try:
         inside = folder.rglob("*") if below and folder.is_dir() else folder.iterdir()

@@ -100,10 +100,7 @@ class LoggedFrame:
     def decode(self) -> Frame:
         """Decode image and labels; any thread may do so, and mostly releases the interpreter lock.
 
-        Raises
-        ------
-        FrameError
-            If the image or a label of it cannot be decoded.
+        A `FrameError` if the image or a label of it cannot be decoded.
         """
         try:
             return at_scale(self._decode(), self.selection.scale)
@@ -184,10 +181,7 @@ class LoggedFrame:
 class FrameStream:
     """The frames of a selection, in the order of their log times.
 
-    Attributes
-    ----------
-    accounting
-        Counts of the frames so far.
+    ``accounting`` has the counts of the frames so far.
     """
 
     def __init__(self, selection: Selection, in_range: int, numbers: Sequence[int]) -> None:

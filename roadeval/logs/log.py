@@ -33,10 +33,7 @@ from roadeval.runtime.text import visible
 def open_log(path: str | Path, config: LogConfig | None = None) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
-    Raises
-    ------
-    LogError
-        If it is missing, unreadable, or no MCAP log.
+    A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     path = Path(path)
     files, damage = files_of(path)
@@ -131,12 +128,7 @@ class Log:
     def sha256(self) -> str:
         """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal.
 
-        The first time the whole log is read for it.
-
-        Raises
-        ------
-        LogError
-            If the disk fails.
+        The first time the whole log is read for it. A `LogError` if the disk fails.
         """
         digests = {container.path: hashlib.sha256() for container in self._containers}
         for container in self._containers:
@@ -150,18 +142,10 @@ class Log:
     def select(self, *, several: bool = False) -> Selection:
         """Settle what to replay: what is asked for, and the rest where the log leaves no doubt.
 
-        Another log that holds masks stays open as long as this one.
-
-        Parameters
-        ----------
-        several
-            Whether the labels are given for several logs at once, see `understand`.
-
-        Raises
-        ------
-        LogError
-            If a topic is missing or the choice is not plain, a label value does not occur or
-            cannot be understood, a label image has another size, or no mask belongs to a frame.
+        Another log that holds masks stays open as long as this one. ``several`` says that the
+        labels are given for several logs at once, see `understand`. A `LogError` if a topic is
+        missing or the choice is not plain, a label value does not occur or cannot be understood, a
+        label image has another size, or no mask belongs to a frame.
         """
         try:
             found = settle(self.topics, self._readers, self.config, several=several)
@@ -218,10 +202,7 @@ class Log:
     def frames(self, selection: Selection) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.
 
-        Raises
-        ------
-        LogError
-            If there is none in the range.
+        A `LogError` if there is none in the range.
         """
         asked, times = self.config.frames, selection.camera.images.log_times
         first, last = 0, len(times)
@@ -295,10 +276,7 @@ class LogDescription:
 def describe(path: str | Path, config: LogConfig | None = None) -> LogDescription:
     """Read a log whole, so that all damage is found, and describe it.
 
-    Raises
-    ------
-    LogError
-        If it is missing, unreadable, or no MCAP log.
+    A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     with open_log(path, config) as log:
         picks: tuple[str, ...] = ()

@@ -26,12 +26,8 @@ def parse_time(text: str, start_ns: int = 0) -> int:
 
     ``2.5`` and ``90`` are seconds after the log's first message, at ``start_ns``; a whole number
     from 1000000000 on is nanoseconds of the log's clock (below it lies the clock's first second);
-    ``12s`` and ``12ns`` say which they are; and there is ``2013-05-01T12:00:00.5Z`` (RFC 3339).
-
-    Raises
-    ------
-    LogError
-        If it is none of these.
+    ``12s`` and ``12ns`` say which they are; and there is ``2013-05-01T12:00:00.5Z`` (RFC 3339). A
+    `LogError` if it is none of these.
     """
     text = text.strip()
     if match := _RFC_3339.fullmatch(text):

@@ -2,5 +2,3 @@
 
 from roadeval.networks.network import FULL, Network, Road
 from roadeval.networks.settings import NetSettings, NetworkError
-
-__all__ = ["FULL", "NetSettings", "Network", "NetworkError", "Road"]

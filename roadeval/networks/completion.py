@@ -44,11 +44,8 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
 def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """Return settings without any missing value.
 
-    Raises
-    ------
-    NetworkError
-        If the network cannot be used, or a value cannot be read from its file: one line that asks
-        for it and lists the network's inputs and outputs.
+    A `NetworkError` if the network cannot be used, or a value cannot be read from its file: one
+    line that asks for it and lists the network's inputs and outputs.
     """
     settings = replace(settings, sha256=file.sha256)
     settings = _numbers(_input(settings, file), file)

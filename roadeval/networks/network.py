@@ -51,10 +51,8 @@ class Network:
     def of(cls, settings: NetSettings) -> Self:
         """Open the network of some settings.
 
-        Raises
-        ------
-        NetworkError
-            If it cannot be used, or settings are missing that its file does not hold either.
+        A `NetworkError` if it cannot be used, or settings are missing that its file does not hold
+        either.
         """
         file = load(settings)
         return cls(completed(settings, file), file)
@@ -64,12 +62,7 @@ class Network:
 
         The probability of road is computed on the network's own grid and interpolated linearly to
         the frame's size; classes are brought there by the nearest pixel. With several outputs it is
-        the greatest of theirs.
-
-        Raises
-        ------
-        NetworkError
-            If the network fails on it, or gives NaN.
+        the greatest of theirs. A `NetworkError` if the network fails on it, or gives NaN.
         """
         settings = self.settings
         assert settings.size is not None

@@ -107,10 +107,7 @@ class OnnxFile:
 def load(settings: NetSettings) -> OnnxFile:
     """Open the network of some settings; one whose file did not change stays open.
 
-    Raises
-    ------
-    NetworkError
-        If the file cannot be used, or is not the one whose SHA-256 the settings state.
+    A `NetworkError` if the file cannot be used, or is not the one whose SHA-256 the settings state.
     """
     if not settings.file:
         raise NetworkError("`net.file` names no network: give the path of an ONNX file")

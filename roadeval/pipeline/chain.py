@@ -183,11 +183,9 @@ class Chain:
     def repeated(self, view: View, outputs: Sequence[Output]) -> Iterator[tuple[str, Packed]]:
         """Yield the masks of this chain where another of the same stages has run already.
 
-        Parameters
-        ----------
-        view, outputs
-            The argument and the outputs of the other's `run`. They hold for this one, too, up to
-            the first stage that learns: from there on the masks are computed and yielded.
+        ``view`` and ``outputs`` are the argument and the outputs of the other's `run`. They hold
+        for this one, too, up to the first stage that learns: from there on the masks are computed
+        and yielded.
         """
         taken = list(takewhile(lambda step: step.stage.fit is None, self.steps))
         for output in outputs[: len(taken)]:

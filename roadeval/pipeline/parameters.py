@@ -17,6 +17,9 @@ def check_arrays(
 ) -> None:
     """Check what the functions of a stage assume about its parameters.
 
+    A `ValueError` if a field has another shape or type, or holds a number that is not finite, or is
+    beyond `GREATEST` in an array; a sentence that names the field.
+
     Parameters
     ----------
     parameters
@@ -26,12 +29,6 @@ def check_arrays(
     shapes
         The shape of each field. A letter stands for a length of one or more, the same wherever
         it occurs; ``()`` is a single number.
-
-    Raises
-    ------
-    ValueError
-        If a field has another shape or type, or holds a number that is not finite, or is beyond
-        `GREATEST` in an array; a sentence that names the field.
     """
     lengths: dict[int | str, int] = {}
     for name, shape in shapes.items():

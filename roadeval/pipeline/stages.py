@@ -148,6 +148,8 @@ class NoSettings:
 def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     """Return the stage of a function from an image to a road mask.
 
+    A `TypeError` if it has other arguments.
+
     Parameters
     ----------
     name
@@ -158,11 +160,6 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
         an instance of a dataclass. It returns ``(H, W)`` bool or whole numbers, nonzero where road
         is; or floats from 0 to 1, how probable road is, whose mask is what is above one half; or
         an `Output` without layers other than its mask.
-
-    Raises
-    ------
-    TypeError
-        If it has other arguments.
     """
     arguments = inspect.signature(function).parameters
     for argument, about in arguments.items():

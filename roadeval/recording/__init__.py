@@ -12,17 +12,5 @@ if TYPE_CHECKING:
     from roadeval.recording.recorder import EncodedFrame, NullRecorder, Recorder, recorder_for
     from roadeval.recording.recording import Recording
 
-__all__ = [
-    "DamagedError",
-    "EncodedFrame",
-    "Layout",
-    "NullRecorder",
-    "RecordRule",
-    "Recorder",
-    "Recording",
-    "RecordingError",
-    "recorder_for",
-]
-
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

@@ -226,13 +226,7 @@ class RecordRule:
 
     @classmethod
     def parse(cls, text: str) -> RecordRule:
-        """Read a rule from the text of a setting.
-
-        Raises
-        ------
-        RecordingError
-            If it is not a rule.
-        """
+        """Read a rule from the text of a setting; a `RecordingError` if it is not a rule."""
         match = _RULE.fullmatch(text)
         if match is None:
             raise RecordingError(

@@ -150,10 +150,7 @@ class WorstFrames:
     def offer(self, encoded: EncodedFrame) -> None:
         """Keep a frame's images if they are among the worst; of equals the earlier ones.
 
-        Raises
-        ------
-        RecordingError
-            If they cannot be written.
+        A `RecordingError` if they cannot be written.
         """
         number = encoded.number
         with self._explained():
@@ -171,12 +168,7 @@ class WorstFrames:
     def take(self) -> Iterator[EncodedFrame]:
         """Yield the frames in order, with their images alone, and forget each.
 
-        After an interrupt it can be called again.
-
-        Raises
-        ------
-        RecordingError
-            If they cannot be read.
+        After an interrupt it can be called again. A `RecordingError` if they cannot be read.
         """
         # Not in place: a worker thread may look at the heap.
         self._heap = sorted(self._heap, key=itemgetter(1))
@@ -256,13 +248,7 @@ class Recorder:
         self._worst = WorstFrames(images, rule.number)
 
     def __enter__(self) -> Self:
-        """Open the partial file.
-
-        Raises
-        ------
-        RecordingError
-            If it cannot be written.
-        """
+        """Open the partial file; a `RecordingError` if it cannot be written."""
         try:
             with writing(self.path, RecordingError):
                 self._file.begin()
@@ -302,14 +288,8 @@ class Recorder:
     def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> EncodedFrame:
         """Encode a frame; the heavy part of the work, in any thread.
 
-        Parameters
-        ----------
-        result
-            With its layers.
-        position
-            Among the frames read, from 0.
-        lines
-            The frame's lines of the tables in `Layout.tables`, by name.
+        ``position`` counts the frames read, from 0; ``lines`` are the frame's of the tables in
+        `Layout.tables`, by name.
         """
         kinds: Collection[LayerKind] = tuple(LayerKind)
         match self._rule.kind:
@@ -324,10 +304,7 @@ class Recorder:
     def write(self, encoded: EncodedFrame) -> None:
         """Append a frame. Frames come in order, from one thread.
 
-        Raises
-        ------
-        RecordingError
-            If the disk is full.
+        A `RecordingError` if the disk is full.
         """
         if not self._begun:
             self._begun = True
@@ -366,10 +343,7 @@ class Recorder:
     def flush(self) -> None:
         """Write everything that waits, after the last frame, to free its memory.
 
-        Raises
-        ------
-        RecordingError
-            If it cannot be written.
+        A `RecordingError` if it cannot be written.
         """
         self._write_worst()
         self._send_all()
@@ -383,15 +357,9 @@ class Recorder:
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results and close the file, which takes its name when the context ends.
 
-        Parameters
-        ----------
-        results
-            Texts to keep under ``/results`` by name, as ``summary`` (JSON) and ``windows`` (CSV).
-
-        Raises
-        ------
-        RecordingError
-            If the file lacks what was written to it, as on a full disk.
+        ``results`` are the texts to keep under ``/results`` by name, as ``summary`` (JSON) and
+        ``windows`` (CSV). A `RecordingError` if the file lacks what was written to it, as on a full
+        disk.
         """
         self._log_static(views.after_the_last_frame(self._layout, results))
         self.flush()

@@ -70,10 +70,7 @@ class Place(NamedTuple):
 class RrdFile:
     """An ``.rrd`` file by this program.
 
-    Raises
-    ------
-    RecordingError
-        If there is none, or it is not a recording by this program.
+    A `RecordingError` if there is none, or it is not a recording by this program.
     """
 
     def __init__(self, path: Path) -> None:
@@ -98,10 +95,7 @@ class RrdFile:
     def batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
         """Yield the rows of an entity that have a value, a batch a chunk.
 
-        Raises
-        ------
-        DamagedError
-            If they are not what was written.
+        A `DamagedError` if they are not what was written.
         """
         self._check(path)
         chunks = self.stream().filter(content=[path], components=[component], is_static=static)

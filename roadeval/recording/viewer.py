@@ -40,17 +40,8 @@ Answer = TypeVar("Answer")
 def show(recording: Path, frame: int | None = None) -> None:
     """Open a recording in the viewer, paused at a frame, and wait until its window is closed.
 
-    Parameters
-    ----------
-    recording
-        An ``.rrd`` file.
-    frame
-        Number of a frame in it; None for where the recording itself wants to begin.
-
-    Raises
-    ------
-    RecordingError
-        If there is no screen, or the viewer does not come up.
+    Without a frame it opens where the recording itself wants to begin. A `RecordingError` if there
+    is no screen, or the viewer does not come up.
     """
     if not has_screen():
         raise RecordingError(
@@ -78,10 +69,7 @@ class WindowViewer:
     def show(self, recording: Path, frame: int) -> None:
         """Show a frame of a recording.
 
-        Raises
-        ------
-        RecordingError
-            If there is no screen, or the viewer does not come up.
+        A `RecordingError` if there is no screen, or the viewer does not come up.
         """
         if not has_screen():
             raise RecordingError(
@@ -106,16 +94,9 @@ class WindowViewer:
 def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:
     """Write what the viewer's window shows as a PNG file, without a screen.
 
-    Returns
-    -------
-    int or None
-        The frame that the viewer shows, as it reports itself.
-
-    Raises
-    ------
-    RecordingError
-        If there is no graphics driver that works without a screen, the viewer does not draw, or
-        the picture cannot be written.
+    Returned is the frame that the viewer shows, as it reports itself. A `RecordingError` if there
+    is no graphics driver that works without a screen, the viewer does not draw, or the picture
+    cannot be written.
     """
     width, height = SIZE
     options = ["--headless", "--window-size", f"{width}x{height}"]
@@ -173,12 +154,8 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
 def asked(ask: Callable[[], Answer]) -> Answer:
     """Return the viewer's answer to a request, which is repeated after a timeout.
 
-    Rerun's own timeout is 15 seconds, in which a busy machine may not have drawn once.
-
-    Raises
-    ------
-    RecordingError
-        If it does not answer in time, or has ended.
+    Rerun's own timeout is 15 seconds, in which a busy machine may not have drawn once. A
+    `RecordingError` if it does not answer in time, or has ended.
     """
     deadline = time.monotonic() + _LOADING_S
     while True:
@@ -196,10 +173,7 @@ def asked(ask: Callable[[], Answer]) -> Answer:
 def go(client: ViewerClient, frame: int | None) -> int | None:
     """Move the viewer to a frame; return the frame that it then reports.
 
-    Raises
-    ------
-    RecordingError
-        If it does not answer, see `asked`.
+    A `RecordingError` if it does not answer, see `asked`.
     """
     if frame is not None:
         asked(lambda: client.set_time(at.FRAME, sequence=frame, play_state="paused"))

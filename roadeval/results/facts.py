@@ -121,10 +121,7 @@ class _Document:
     def parse(cls, text: str | bytes, where: object) -> Self:
         """Read a document, whose origin begins the message of an error.
 
-        Raises
-        ------
-        ResultsError
-            If it is damaged or of another format.
+        A `ResultsError` if it is damaged or of another format.
         """
         try:
             content = read_json(text, cls.VALUES)
@@ -157,10 +154,7 @@ class _Document:
     def evaluation(self) -> EvaluationSettings:
         """The settings of the evaluation; the defaults where the run states none.
 
-        Raises
-        ------
-        ResultsError
-            If they are damaged.
+        A `ResultsError` if they are damaged.
         """
         given = self.run.get("evaluation", {})
         known = {each.name for each in fields(EvaluationSettings)}

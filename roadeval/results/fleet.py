@@ -105,18 +105,8 @@ def recording_path(folder: Path, drive: str) -> Path:
 class FleetFolder:
     """Reads a fleet's folder, perhaps made on another machine, by anybody.
 
-    Parameters
-    ----------
-    folder
-        As ``roadeval fleet`` left it.
-    trust_sources
-        Whether logs, masks, models and recordings may be read that lie elsewhere, where the folder
-        names them.
-
-    Raises
-    ------
-    ResultsError
-        If it is no fleet's folder, or one of another version.
+    With ``trust_sources`` logs, masks, models and recordings may be read that lie elsewhere, where
+    the folder names them. A `ResultsError` if it is no fleet's folder, or one of another version.
     """
 
     def __init__(self, folder: Path, *, trust_sources: bool = False) -> None:
@@ -323,10 +313,7 @@ class FleetWriter:
     def begin(self) -> None:
         """Make the folder, or see that it is a fleet's of this version.
 
-        Raises
-        ------
-        ResultsError
-            If it is something else, or cannot be written to.
+        A `ResultsError` if it is something else, or cannot be written to.
         """
         if not is_utf8(str(self.folder)):
             raise ResultsError(
@@ -364,18 +351,10 @@ class FleetWriter:
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
-        Parameters
-        ----------
-        members
-            The drives in the tables' order; each has its record.
-        settings
-            The confidence of intervals, and what is negligible.
-        run, run_toml
-            The configuration of the fleet, as plain data and as the text of a TOML file.
-        conditions
-            Judged on each drive, see `roadeval.results.over_drives.judge_drives`.
-        asked
-            Digests of what each drive's record must have been made for; anything by default.
+        The members are in the tables' order; each has its record. ``run`` and ``run_toml`` are the
+        configuration of the fleet, as plain data and as a text. The conditions are judged on each
+        drive, see `roadeval.results.over_drives.judge_drives`. ``asked`` has the digests of what
+        each drive's record must have been made for; anything by default.
         """
         # Two commands may replay drives of one folder together.
         with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):

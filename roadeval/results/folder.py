@@ -56,11 +56,6 @@ class ResultsWriter:
     After `finish` it takes its name at the end of the context. Left by an exception, or without
     `finish`, it removes what was begun; earlier results stay.
 
-    Parameters
-    ----------
-    folder
-        The folder's name.
-
     Raises
     ------
     ResultsError
@@ -169,15 +164,8 @@ class _Growing:
 class ResultsFolder:
     """Reads a results folder.
 
-    Parameters
-    ----------
-    folder
-        As `ResultsWriter` left it.
-
-    Raises
-    ------
-    ResultsError
-        If it holds no results, or results of another format.
+    It is as `ResultsWriter` left it. A `ResultsError` if it holds no results, or results of another
+    format.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -187,12 +175,8 @@ class ResultsFolder:
     def table(self, name: str) -> pd.DataFrame:
         """Read a table by its name in `roadeval.results.schema.TABLES`.
 
-        One that was not written, there being nothing to count, is empty.
-
-        Raises
-        ------
-        ResultsError
-            If it is damaged, or not the one that the summary states.
+        One that was not written, there being nothing to count, is empty. A `ResultsError` if it is
+        damaged, or not the one that the summary states.
         """
         return read_table(name, self._folder / f"{name}.csv", self.facts.tables)
 

@@ -271,19 +271,9 @@ def judge_drives(
 ) -> Iterator[DriveJudgement]:
     """Judge conditions on each scored drive: on the rates of its own frames.
 
-    Parameters
-    ----------
-    scores
-        Rows of ``scores``.
-    conditions
-        On levels alone, see `check_conditions`.
-    least
-        Evaluated frames that it takes; a drive of fewer is not judged.
-
-    Raises
-    ------
-    ConditionError
-        If nothing scored is the mask that a condition names.
+    ``scores`` are rows of that table; the conditions are on levels alone, see `check_conditions`. A
+    drive with fewer than ``least`` evaluated frames is not judged. A `ConditionError` if nothing
+    scored is the mask that a condition names.
     """
     rows = [row for row in scores if row["region"] == ALL]
     for condition in conditions:
@@ -357,13 +347,8 @@ def drive_cases(
 ) -> Iterator[Case]:
     """Yield a case a drive, and a case a drive and condition.
 
-    Parameters
-    ----------
-    drives
-        Rows of ``drives``. One that failed is an error, one without a score is skipped.
-    conditions
-        Judged on drives: where a condition holds its case fails, where it was not judged its case
-        is skipped.
+    ``drives`` are rows of that table: one that failed is an error, one without a score is skipped.
+    Where a condition holds its case fails, where it was not judged its case is skipped.
     """
     for row in drives:
         kind, column = _OF_STATUS.get(row["status"], ("", ""))

@@ -214,12 +214,7 @@ def score_rows(
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of ``scores``: each mask on every labelled pixel, then region by region.
 
-    Parameters
-    ----------
-    facts
-        Of the drive.
-    regions
-        Frames, counts and rates by variant, stage and region.
+    ``regions`` has frames, counts and rates by variant, stage and region.
     """
     for variant, own in facts.totals.items():
         beyond = facts.beyond.get(variant, {})

@@ -61,6 +61,8 @@ def read_table(
 ) -> pd.DataFrame:
     """Read a table of a drive bit-exactly, and check that it is whole.
 
+    A `ResultsError` if the table is damaged, or is not the one that the summary states.
+
     Parameters
     ----------
     name
@@ -76,11 +78,6 @@ def read_table(
     -------
     DataFrame
         Words are text, even if they look like numbers; rates are float64, all other numbers int64.
-
-    Raises
-    ------
-    ResultsError
-        If the table is damaged, or is not the one that the summary states.
     """
     import pyarrow as pa
 
@@ -314,23 +311,9 @@ def read_parquet(
 ) -> pa.Table:
     """Read a table of a fleet's folder, which others may have damaged.
 
-    Parameters
-    ----------
-    path
-        The file.
-    name
-        The table's, in `roadeval.results.schema.TABLES`.
-    columns
-        Which are needed; all by default.
-    remedy
-        What the user can do where it is damaged.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it is not there.
-    ResultsError
-        If it cannot be read, or lacks a column, or one is of another type.
+    All columns are read by default; ``remedy`` is what the user can do where it is damaged. A
+    `FileNotFoundError` if it is not there. A `ResultsError` if it cannot be read, or lacks a
+    column, or one is of another type.
     """
     import pyarrow as pa
     from pyarrow import parquet

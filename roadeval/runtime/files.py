@@ -214,14 +214,8 @@ class NewFolder:
 
     On Linux it changes places with an old folder that holds nothing else, in one step. Otherwise
     its files are moved into the old folder: the seal is removed first and moved last, and
-    `claimed_folder` completes what a killed run had begun.
-
-    Parameters
-    ----------
-    path
-        Its name. Where it is a link, the target is replaced.
-    content
-        What is replaced in an old folder.
+    `claimed_folder` completes what a killed run had begun. Where ``path`` is a link, its target is
+    replaced; ``content`` says what, in an old folder.
     """
 
     def __init__(self, path: Path, content: Content) -> None:

@@ -81,12 +81,7 @@ _NO_BODY: Final = told(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "Nothing is taken he
 class LocalServer(ThreadingHTTPServer):
     """The server; several threads may call ``answer`` at once. An OSError if the port is taken.
 
-    Parameters
-    ----------
-    answer
-        Returns the response to a request.
-    port
-        0 for any that is free.
+    ``answer`` returns the response to a request; port 0 is any that is free.
     """
 
     daemon_threads = True

@@ -12,14 +12,5 @@ if TYPE_CHECKING:
     from roadeval.training.model import Model, load_model, save_model
     from roadeval.training.settings import TrainingSettings
 
-__all__ = [
-    "Model",
-    "TrainingError",
-    "TrainingSettings",
-    "fit",
-    "load_model",
-    "save_model",
-]
-
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

@@ -46,25 +46,18 @@ def fit(
 ) -> Model:
     """Train every variant that learns anything.
 
+    A `TrainingError` if there is no frame, or if the frames show road alone or no road at all and
+    some variant has something to learn.
+
     Parameters
     ----------
     frames
         The training frames; with truth, unless ``settings.source`` allows the patch.
-    pipelines
-        The variants to train, by name.
-    settings
-        Sampling, and where the labels come from.
     prior
         Kept in the model for the baseline, see `Model`.
     base
         What the variants have learnt from other drives. Stages that can learn further do so, the
         others stay as they are.
-
-    Raises
-    ------
-    TrainingError
-        If there is no frame, or if the frames show road alone or no road at all and some variant
-        has something to learn.
     """
     learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)

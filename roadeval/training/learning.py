@@ -49,15 +49,13 @@ def from_log(
 ) -> tuple[tuple[Model, ...], Schedule]:
     """Train on some frames of a log, with each seed of the settings.
 
+    A `TrainingError` if there is nothing to learn from, or nothing left to evaluate.
+
     Parameters
     ----------
     frames
         Returns the frames of the selected range, in order and from the first at each call. Only as
         many are decoded as are needed.
-    pipelines
-        What to train, by variant.
-    settings
-        How many frames, and the rest.
     on_frame
         Called with the number of training frames decoded so far.
     labelled
@@ -70,11 +68,6 @@ def from_log(
     -------
     models, schedule
         The model of each seed, the first with the warnings of all, and which frames are left out.
-
-    Raises
-    ------
-    TrainingError
-        If there is nothing to learn from, or nothing left to evaluate.
     """
     if base is not None:
         _require_adaptable(pipelines)
@@ -162,13 +155,9 @@ def from_drives(
 ) -> Model:
     """Train on frames of some drives, by the drives' paths.
 
-    ``warnings`` are put before those of the training itself.
-
-    Raises
-    ------
-    TrainingError
-        If some drives have truth and others have none, or none has although the settings insist
-        on it, or there is nothing to learn from.
+    ``warnings`` are put before those of the training itself. A `TrainingError` if some drives have
+    truth and others have none, or none has although the settings insist on it, or there is nothing
+    to learn from.
     """
     bare = [path for path, own in frames.items() if not any(f.truth is not None for f in own)]
     insists = settings.source == "truth" or len(bare) < len(frames)
@@ -217,14 +206,8 @@ def spread(
 ) -> Iterator[Frame]:
     """Decode ``count`` frames, spread evenly over those that there are.
 
-    Parameters
-    ----------
-    frames
-        Begins anew at each call: once to see which there are, once to read them.
-    count
-        At most so many.
-    labelled
-        Take labelled ones alone, if there is any.
+    ``frames`` begins anew at each call: once to see which there are, once to read them. Where
+    ``labelled``, those with truth alone are taken, if there is any.
     """
     seen = {frame.number: frame.labelled for frame in frames()}
     numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
@@ -298,21 +281,8 @@ def _from_the_first(
 ) -> Chosen:
     """Choose the first ``settings.frames`` frames; the gap lies after them.
 
-    Parameters
-    ----------
-    candidates
-        The frames that may train, in order. Only as many are taken as are needed.
-    settings
-        How many frames, and the gap.
-    on_frame
-        Called with the number of training frames decoded so far.
-    by_truth
-        Whether a frame must be left to evaluate.
-
-    Raises
-    ------
-    TrainingError
-        If none is left, or not one frame can be held in memory.
+    Only as many candidates are taken as are needed, in order. ``by_truth`` says that a frame must
+    be left to evaluate. A `TrainingError` if none is left, or not one frame can be held in memory.
     """
     gap = settings.gap or 0
     held, rest = _hold(candidates, settings.frames, on_frame)

@@ -306,10 +306,8 @@ def arrays_of(learnt: Any) -> dict[str, npt.NDArray[Any]]:
 def from_arrays(kind: type[Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
     """Return the dataclass whose arrays these are, see `arrays_of`.
 
-    Raises
-    ------
-    ValueError
-        If an array is missing, or is not known, or the dataclass refuses what it is given.
+    A `ValueError` if an array is missing, or is not known, or the dataclass refuses what it is
+    given.
     """
     parts = _parts(kind)
     names = {field.name for field in dataclasses.fields(kind)}

@@ -81,10 +81,7 @@ class Alike:
 class Likeness:
     """The pictures of training frames, to compare others with.
 
-    Parameters
-    ----------
-    fingerprints
-        ``(n, SIDE * SIDE)`` float16.
+    The fingerprints are ``(n, SIDE * SIDE)`` float16.
     """
 
     def __init__(self, fingerprints: npt.NDArray[np.float16]) -> None:

@@ -204,19 +204,9 @@ def variants_as_sides(
 ) -> list[Side]:
     """Return the variants of one result as results of their own, the base first.
 
-    Parameters
-    ----------
-    whole
-        The result.
-    there
-        Its variants.
-    chosen
-        Variants in order; all but the baseline by default, ``unfiltered`` first.
-
-    Raises
-    ------
-    ComparisonError
-        If a variant is not there, or fewer than two are.
+    ``there`` are all its variants, ``chosen`` those to compare, in order: all but the baseline by
+    default, ``unfiltered`` first. A `ComparisonError` if a variant is not there, or fewer than two
+    are.
     """
     pipelines = sorted((n for n in there if n != BASELINE), key=lambda name: name != UNFILTERED)
     names = list(chosen or pipelines)
@@ -239,10 +229,6 @@ def compare(
 
     Parameters
     ----------
-    sides
-        Two at least, the base first.
-    settings
-        Confidence and least number of frames of the intervals.
     across_variants
         Whether each side is one variant of the same result, to be matched with another one.
 

@@ -83,10 +83,8 @@ class Condition:
     def parse(cls, text: str) -> Condition:
         """Read a condition.
 
-        Raises
-        ------
-        ConditionError
-            If it does not follow the grammar, or asks for certainty that cannot be had.
+        A `ConditionError` if it does not follow the grammar, or asks for certainty that cannot be
+        had.
         """
         match = _GRAMMAR.fullmatch(text)
         if match is None:
@@ -115,10 +113,8 @@ class Condition:
     def judge(self, mask: Change) -> Judgement:
         """Judge the condition on what was found of the mask that it names.
 
-        Raises
-        ------
-        ConditionError
-            If the rate is undefined there, or its change has no interval and one is asked for.
+        A `ConditionError` if the rate is undefined there, or its change has no interval and one is
+        asked for.
         """
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         difference = mask.difference.get(self.rate) if self.is_change else None
@@ -166,11 +162,8 @@ def judge(
 ) -> tuple[Judgement, ...]:
     """Judge each condition, in order, on every result that it names a mask of.
 
-    Raises
-    ------
-    ConditionError
-        If a condition asks for what is not there, or for a change between different drives or
-        scales, or if there are too few frames.
+    A `ConditionError` if a condition asks for what is not there, or for a change between different
+    drives or scales, or if there are too few frames.
     """
     judgements = []
     for condition in conditions:

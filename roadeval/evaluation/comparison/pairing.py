@@ -126,13 +126,9 @@ class Note:
 def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[Note]]:
     """Match the drives of two results, each by its name, else by its log.
 
-    One name with two different logs is no match: the difference would be the scene's.
-
-    Returns
-    -------
-    pairs, left_out
-        The drives that both have scored, in the base's order; and notes on all others, one for
-        each result and reason.
+    One name with two different logs is no match: the difference would be the scene's. Returned are
+    the drives that both have scored, in the base's order, and notes on all others, one for each
+    result and reason.
     """
     there = {part.drive: part for part in new.parts}
     names = {part.drive for part in base.parts}

@@ -59,15 +59,8 @@ def overlap(counts: Counts) -> dict[str, float]:
 def table(counts: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
     """Compute the tabled metrics of many frames at once, exactly as `of` does.
 
-    Parameters
-    ----------
-    counts
-        ``(n, 4)``: TP, TN, FP, FN.
-
-    Returns
-    -------
-    array
-        ``(n, m)`` float64 in the order of `METRICS`; NaN where a metric is undefined.
+    ``counts`` are ``(n, 4)``: TP, TN, FP, FN. Returned is ``(n, m)`` float64 in the order of
+    `METRICS`; NaN where a metric is undefined.
     """
     columns = Counts(*counts.T)
     with np.errstate(invalid="ignore"):

@@ -33,12 +33,7 @@ class EdgesAndFlicker:
     ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
     ``L_t`` are the pixels that both truths label. ``truth_flicker`` is the truth's own: moving
     things must change, and only what exceeds that is flicker. Motion is not removed by optical
-    flow, as it is in [1]_.
-
-    Parameters
-    ----------
-    width
-        The tolerance of boundary F in pixels.
+    flow, as it is in [1]_. ``width`` is the tolerance of boundary F in pixels.
 
     References
     ----------

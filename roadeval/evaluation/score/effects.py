@@ -102,11 +102,8 @@ Section 5 claims so of the filter, section 4.3 of the SVM, section 4.4 of the po
 def evidence(windows: Iterable[Window], size: int) -> dict[str, dict[str, int]]:
     """Count the windows that bear out each claim whose masks the drive has; equal rates do not.
 
-    Returns
-    -------
-    dict
-        By claim: how many full ``windows``, of ``size`` frames in both masks, have both rates, and
-        in how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames.
+    By claim: how many full ``windows``, of ``size`` frames in both masks, have both rates, and in
+    how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames.
     """
     masks: dict[Name, dict[int, Window]] = {}
     for window in windows:

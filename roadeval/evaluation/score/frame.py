@@ -59,18 +59,8 @@ def score_frame(
 ) -> FrameResult:
     """Score one frame; one that is not `EVALUATED` is passed on without counts.
 
-    Parameters
-    ----------
-    frame
-        Must have a truth if its role is `EVALUATED`.
-    role
-        What the frame is used for.
-    variants
-        What each variant made of it. A variant's final mask is that of its last stage.
-    settings
-        What is counted, and how it is judged.
-    prior
-        The ``blind`` baseline, or None where no frame with truth was trained on.
+    A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
+    stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on.
     """
     if role is not Role.EVALUATED:
         return FrameResult(frame, role, variants)
@@ -113,11 +103,8 @@ def tally(
 ) -> tuple[Tally, ...]:
     """Count named masks in the regions ``found``, and check that no pixel was lost.
 
-    Raises
-    ------
-    CountsNotConservedError
-        If the counts of a mask do not add up to the labelled pixels, or its parts not to the
-        whole.
+    A `CountsNotConservedError` if the counts of a mask do not add up to the labelled pixels, or its
+    parts not to the whole.
     """
     counted = count(masks, truth, list(found.values()))
     check_conserved(names, counted, list(found), ones(truth.labelled))

@@ -69,14 +69,8 @@ class HeatMap:
 def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Transition, Change]:
     """Count what each stage changed in the mask before it, and each final mask in the others.
 
-    Parameters
-    ----------
-    names
-        Variant and stage of each mask, a variant's in the order they ran.
-    masks
-        ``(K, H, words)``.
-    truth
-        Ignored pixels are in no count.
+    ``names`` are variant and stage of each mask, a variant's in the order they ran; ``masks`` are
+    ``(K, H, words)``. Ignored pixels are in no count.
     """
     labelled = truth.labelled
     whole = ones(labelled)

@@ -215,10 +215,8 @@ def _apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) 
 def pairs(rows: Rows, treated: str, control: str) -> Rows:
     """Subtract the final masks' ERR frame by frame, ``treated`` minus ``control``.
 
-    Returns
-    -------
-    Rows
-        ``frame`` (rising), ``stamp_ns``, ``ERR``, and the net change of wrong pixels as ``wrong``.
+    The rows have ``frame`` (rising), ``stamp_ns``, ``ERR``, and the net change of wrong pixels as
+    ``wrong``.
     """
     last = finals(rows)
     mine, theirs = (last.of_variant(name) for name in (treated, control))
@@ -234,11 +232,8 @@ def pairs(rows: Rows, treated: str, control: str) -> Rows:
 def by_region(rows: Rows) -> dict[tuple[str, str], dict[str, float]]:
     """Pool the final masks' counts by region and variant, of frames or of drives.
 
-    Returns
-    -------
-    dict
-        By region and variant: the rates of short tables, and ``pixels`` and ``errors``: the
-        region's share of all labelled pixels, and of all wrong ones.
+    By region and variant: the rates of short tables, and ``pixels`` and ``errors``: the region's
+    share of all labelled pixels, and of all wrong ones.
     """
     last = finals(rows)
     sums: dict[tuple[str, str], Counts] = {}

@@ -79,14 +79,8 @@ class _Masks:
 class Scoreboard:
     """Scores frames against their truth and sums up the drive.
 
-    Parameters
-    ----------
-    settings
-        What is counted, and how it is judged.
-    variants
-        The names of all variants, in the order of the tables.
-    prior
-        The ``blind`` baseline, or None where no frame with truth was trained on.
+    ``variants`` are the names of all, in the order of the tables; ``prior`` is the ``blind``
+    baseline, or None where no frame with truth was trained on.
     """
 
     def __init__(

@@ -37,12 +37,8 @@ LEVELS: Final = 256
 def histogram(probability: Probability, truth: Truth) -> Histogram:
     """Count the labelled pixels by code: ``(2, 65536)`` uint32, non-road and road.
 
-    Parameters
-    ----------
-    probability
-        ``(H, W)`` uint16 codes.
-    truth
-        ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored.
+    ``probability`` is ``(H, W)`` uint16 codes, ``truth`` ``(H, W)`` uint8: 0 non-road, 1 road, 255
+    ignored.
     """
     counts = [np.bincount(probability[truth == each], minlength=CODES) for each in (NON_ROAD, ROAD)]
     return np.array(counts, np.uint32)

@@ -18,20 +18,3 @@ from roadeval.evaluation.stats.drives import (
     sign_flip_p,
     strata,
 )
-
-__all__ = [
-    "STUDENT_FROM",
-    "Difference",
-    "DriveMean",
-    "Stratum",
-    "benjamini_hochberg",
-    "group_means",
-    "holm",
-    "mean_distribution",
-    "over_drives",
-    "sign_flip_can_tell",
-    "sign_flip_interval",
-    "sign_flip_p",
-    "strata",
-    "within_drive",
-]

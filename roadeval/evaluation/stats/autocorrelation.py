@@ -103,10 +103,7 @@ class MeanDistribution:
 def mean_distribution(series: Series) -> MeanDistribution:
     """Estimate the mean of a stationary series, and its uncertainty.
 
-    Parameters
-    ----------
-    series
-        ``(n,)`` float64, n at least 4, not constant.
+    The series is ``(n,)`` float64, n at least 4, and not constant.
     """
     models = _models(len(series))
     spreads, weights, degrees = _explained(series, models)
@@ -161,14 +158,8 @@ def _cosine_variances(coefficient: Series, numbers: npt.NDArray[np.int64], n: in
     """Compute variances of the orthonormal cosine coefficients (DCT-II) of an autoregression.
 
     Exact for a stationary one of variance 1 and length ``n``: its spectrum, less what the two ends
-    cut off.
-
-    Parameters
-    ----------
-    coefficient
-        ``(g, 1)``, at least 0 and below 1.
-    numbers
-        ``(m,)``: which coefficients, from 1.
+    cut off. ``coefficient`` is ``(g, 1)``, at least 0 and below 1; ``numbers`` are ``(m,)``: which
+    coefficients, from 1.
     """
     r, angle = coefficient, np.pi * numbers / n
     gain = 1 - 2 * r * np.cos(angle) + r**2

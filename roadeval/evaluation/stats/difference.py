@@ -87,13 +87,8 @@ class Difference:
 def within_drive(rates: Series, base: Series, settings: EvaluationSettings) -> Difference:
     """Average paired differences of a drive's frames, ``rates - base``, with an interval.
 
-    Parameters
-    ----------
-    rates, base
-        ``(n,)`` float64, one a frame in the drive's order; NaN where a rate is undefined, which
-        leaves the frame out.
-    settings
-        The confidence, and the least number of frames.
+    Both are ``(n,)`` float64, one a frame in the drive's order; NaN where a rate is undefined,
+    which leaves the frame out.
     """
     differences = rates - base
     known = ~np.isnan(differences)
@@ -146,12 +141,8 @@ def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
 
     Of those whose corrected value is at most ``q``, a share of at most ``q`` is false on average:
     ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [1]_. That holds where the tests
-    are independent, as those of different drives are, or depend on each other positively.
-
-    Parameters
-    ----------
-    values
-        None for what was not tested, which is not counted and stays None.
+    are independent, as those of different drives are, or depend on each other positively. None is
+    what was not tested: it is not counted and stays None.
 
     References
     ----------

@@ -137,17 +137,8 @@ def sign_flip_p(values: Values, mean: float = 0.0) -> float:
     """Compute the two-sided p-value of the hypothesis that the mean is ``mean``.
 
     ``p = #{s : |sum s_i (x_i - mean)| >= |sum (x_i - mean)|} / 2^n``, exactly; the time doubles
-    with every second value.
-
-    Parameters
-    ----------
-    values
-        ``(n,)`` float64, n at least 1.
-
-    Returns
-    -------
-    float
-        A multiple of ``2^(1 - n)``, at most 1.
+    with every second value. ``values`` are ``(n,)`` float64, n at least 1; the p-value is a
+    multiple of ``2^(1 - n)``.
     """
     away = values - mean
     if away.sum() < 0:

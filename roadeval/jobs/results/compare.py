@@ -170,21 +170,9 @@ def write(
 ) -> Path:
     """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
 
-    Parameters
-    ----------
-    compared
-        The comparison.
-    path
-        The file.
-    paper
-        Of a PDF.
-    inspect
-        Returns the command that opens a frame of a recording, for the reader to type.
-
-    Raises
-    ------
-    RoadevalError
-        If the ending is another, or the file cannot be written.
+    ``paper`` is that of a PDF; ``inspect`` returns the command that opens a frame of a recording,
+    for the reader to type. A `RoadevalError` if the ending is another, or the file cannot be
+    written.
     """
     match path.suffix.lower():
         case ".pdf":
@@ -232,10 +220,7 @@ def _document(compared: Compared, inspect: Inspect | None) -> Document:
 def write_junit(compared: Compared, path: Path) -> Path:
     """Write what changed and the judged conditions as JUnit's XML.
 
-    Raises
-    ------
-    RoadevalError
-        If the file cannot be written.
+    A `RoadevalError` if the file cannot be written.
     """
     found = compared.comparison
     name = ", ".join(each.label for each in found.results)
@@ -324,17 +309,10 @@ def browsed(
 ) -> BrowsedFrames | None:
     """Collect the frames that all results have of a variant, all their masks side by side.
 
-    None where no variant is in all of them, or several drives are compared.
-
-    Parameters
-    ----------
-    compared
-        The comparison.
-    inspect
-        Returns the command that opens a frame.
-    taken
-        Returns the bytes of a page with these frames and none of their pictures: of those as many
-        are there as keep it below `roadeval.jobs.results.frames.BYTES`.
+    None where no variant is in all of them, or several drives are compared. ``inspect`` returns the
+    command that opens a frame. ``taken`` returns the bytes of a page with these frames and none of
+    their pictures: of those as many are there as keep it below
+    `roadeval.jobs.results.frames.BYTES`.
     """
     if (found := compared_masks(compared.sides)) is None:
         return None

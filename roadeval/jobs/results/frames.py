@@ -64,12 +64,7 @@ def rates_by_frame(
 ) -> Iterator[tuple[int, int, dict[str, dict[str, float]]]]:
     """Yield each frame's number and stamp, and the rates of its rows by variant.
 
-    Parameters
-    ----------
-    table
-        ``frame``, ``stamp_ns``, ``variant`` and the rates; one row a frame and variant.
-    names
-        Of the rates.
+    The table has ``frame``, ``stamp_ns``, ``variant`` and the rates; one row a frame and variant.
     """
     found: dict[tuple[int, int], dict[str, dict[str, float]]] = {}
     columns = [table[name].tolist() for name in ("frame", "stamp_ns", "variant", *names)]
@@ -95,12 +90,8 @@ def outcomes(
 class FramePicker:
     """Picks frames of a result and collects their pictures and facts.
 
-    Parameters
-    ----------
-    result
-        The result.
-    outcomes, layered
-        Variants whose errors, and whose layers are shown, at most; None for all.
+    ``outcomes`` and ``layered`` are how many variants' errors, and layers, are shown at most; None
+    for all.
     """
 
     def __init__(
@@ -314,10 +305,6 @@ def strips_of(
 
     Parameters
     ----------
-    result
-        Of a recording; a folder has no pictures.
-    inspect
-        Returns the command that opens a frame.
     count
         How many. By default as many of `PICTURED` as keep the page below `BYTES`; where that would
         be fewer than `FEWEST`, only the first variants have their layers.

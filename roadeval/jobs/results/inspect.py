@@ -54,19 +54,9 @@ def worst_frames(
 ) -> list[WorstFrame]:
     """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
 
-    Parameters
-    ----------
-    result
-        One result: of a fleet the frames of all drives are ranked together.
-    count
-        How many, at most; all that are known of a fleet by default.
-    variant
-        The first by default, as always in a fleet.
-
-    Raises
-    ------
-    RoadevalError
-        If nothing was scored, or ERR is undefined on every frame, or there is no such variant.
+    Of a fleet the frames of all drives are ranked together, all that are known by default, and
+    always of the first variant. A `RoadevalError` if nothing was scored, or ERR is undefined on
+    every frame, or there is no such variant.
     """
     if fleet := result.fleet:
         rows = fleet.table("worst").to_pylist()
@@ -133,10 +123,7 @@ def _scored(drive: DriveResult) -> list[str]:
 def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame:
     """Return the frame of a rank among the worst.
 
-    Raises
-    ------
-    RoadevalError
-        If fewer are known of a fleet, or as of `worst_frames`.
+    A `RoadevalError` if fewer are known of a fleet, or as of `worst_frames`.
     """
     found = worst_frames(result, rank, variant)
     if result.fleet and rank > len(found):
@@ -164,12 +151,8 @@ def without_pictures(drive: DriveResult, frame: int) -> str:
 def view(drive: DriveResult, frame: int | None, picture: Path | None = None) -> int | None:
     """Open the viewer at a frame, or draw it into a PNG file; return the frame that it drew.
 
-    Without a frame it opens at the first evaluated one that has pictures.
-
-    Raises
-    ------
-    RoadevalError
-        If there is no recording or no such frame in it, or the viewer cannot work here.
+    Without a frame it opens at the first evaluated one that has pictures. A `RoadevalError` if
+    there is no recording or no such frame in it, or the viewer cannot work here.
     """
     from roadeval.recording import viewer
 

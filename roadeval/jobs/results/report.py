@@ -73,17 +73,8 @@ def write_report(
     output
         By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
         in ``.html`` gives a page.
-    paper
-        A4 or Letter.
     commands
         What the reader may type for more; none by default.
-    as_page
-        What a page is made like.
-
-    Returns
-    -------
-    Path
-        The file written.
 
     Raises
     ------
@@ -310,19 +301,8 @@ def collect_fleet(
 ) -> FleetFindings:
     """Collect what the report of a fleet is made of.
 
-    Parameters
-    ----------
-    fleet
-        The fleet.
-    inspect
-        Returns the command that opens one of the worst frames, by its rank.
-    worst
-        How many of these are shown, at most.
-
-    Raises
-    ------
-    ResultsError
-        If a table cannot be read.
+    ``inspect`` returns the command that opens one of the ``worst`` frames, by its rank. A
+    `ResultsError` if a table cannot be read.
     """
     scores, regions = _scores(fleet)
     return FleetFindings(

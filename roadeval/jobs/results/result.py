@@ -46,15 +46,7 @@ NO_NUMBER: Final = ("output", "run", "fleet")
 class DriveResult:
     """The result of a replay, from an ``.rrd`` or a results folder.
 
-    Parameters
-    ----------
-    path
-        Either.
-
-    Raises
-    ------
-    RoadevalError
-        If it is neither, or by another program or format.
+    A `RoadevalError` if it is neither, or by another program or format.
     """
 
     def __init__(self, path: str | Path) -> None:

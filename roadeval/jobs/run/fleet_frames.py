@@ -43,13 +43,6 @@ class FrameGatherer:
     """Takes a drive's frames in order, and writes their rows; to be used as a context.
 
     Without `finish` the rows of an earlier replay stay.
-
-    Parameters
-    ----------
-    folder
-        Of the fleet.
-    drive
-        Its name there.
     """
 
     def __init__(self, folder: Path, drive: str) -> None:

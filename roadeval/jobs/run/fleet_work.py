@@ -104,13 +104,9 @@ class Done:
 def replay_drive(task: DriveTask) -> Done:
     """Replay a drive and write its record, unless it is there already.
 
-    While another command works on the same drive, this one waits for it.
-
-    Raises
-    ------
-    FleetError
-        If the fleet's disk fails, or the worker has other software: any problem of the drive
-        itself is in its record.
+    While another command works on the same drive, this one waits for it. A `FleetError` if the
+    fleet's disk fails, or the worker has other software: any problem of the drive itself is in its
+    record.
     """
     _check(task.software, task.config)
     model = task.config.training.model
@@ -422,12 +418,8 @@ class FoldModel:
 def train_fold(task: FoldTask) -> FoldModel:
     """Train the model of a fold, unless it is there and nothing has changed.
 
-    A drive without truth, or one that cannot be used, is passed by, and the next one is asked.
-
-    Raises
-    ------
-    FleetError
-        If the fleet's disk fails, or the worker has other software.
+    A drive without truth, or one that cannot be used, is passed by, and the next one is asked. A
+    `FleetError` if the fleet's disk fails, or the worker has other software.
     """
     _check(task.software, task.config)
     about = task.path.with_suffix(".json")

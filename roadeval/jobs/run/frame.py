@@ -107,13 +107,6 @@ def run_frame(
         as a network.
     config
         The configuration that the model was trained with; the preset ``paper`` by default.
-    variant
-        Which of its variants to run.
-
-    Returns
-    -------
-    VariantResult
-        The stages' layers, masks, facts and seconds.
 
     Examples
     --------

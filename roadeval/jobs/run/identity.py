@@ -67,12 +67,8 @@ def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None =
     """Return a digest of the log, the settings, the model file and the software, in hexadecimal.
 
     Equal for the same input, in any place of log, model and masks. ``masks`` are the digests of
-    those that lie beside the log, by their variant.
-
-    Raises
-    ------
-    RoadevalError
-        If the disk of one of them fails.
+    those that lie beside the log, by their variant. A `RoadevalError` if the disk of one of them
+    fails.
     """
     model = config.training.model
     digest = hashlib.sha256(Path(model).read_bytes()).hexdigest() if model else ""

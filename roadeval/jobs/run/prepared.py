@@ -131,10 +131,7 @@ class Run:
 def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     """Select the topics of a log, train or read the model, and bind the variants' chains.
 
-    Raises
-    ------
-    RoadevalError
-        If the log, the configuration or the training leave nothing to run.
+    A `RoadevalError` if the log, the configuration or the training leave nothing to run.
     """
     selection = log.select()
     again = partial(log.frames, selection)

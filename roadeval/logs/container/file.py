@@ -75,12 +75,7 @@ def containers_in(
 ) -> Iterator[Container]:
     """Open the log in a file, and those that follow it in the same file.
 
-    Parameters
-    ----------
-    stamp_of
-        Called only next to damage.
-    keep_corrupt
-        Whether to read data whose checksum is wrong.
+    ``stamp_of`` is called only next to damage; ``keep_corrupt`` reads data whose checksum is wrong.
     """
     rest = FileBytes(path.open("rb", buffering=BUFFER))
     while True:

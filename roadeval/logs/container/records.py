@@ -273,10 +273,7 @@ def walk(records: Bytes) -> Iterator[Record]:
 class ChunkReader:
     """Reads the chunks of a file, the last few from memory.
 
-    Parameters
-    ----------
-    keep_corrupt
-        Whether to read what is left of a chunk whose checksum is wrong.
+    With ``keep_corrupt`` what is left of a chunk is read whose checksum is wrong.
     """
 
     def __init__(self, source: FileBytes, *, keep_corrupt: bool = False) -> None:

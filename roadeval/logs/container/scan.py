@@ -339,10 +339,7 @@ def entries_of(values: array[int]) -> Entries:
 class RecordFinder:
     """Reads the record at a byte, if its parts agree, and finds the next one that does.
 
-    Parameters
-    ----------
-    channels
-        Numbers of the known channels; they grow while this object is used.
+    ``channels`` are the numbers of the known ones; they grow while this object is used.
     """
 
     def __init__(
@@ -473,11 +470,8 @@ class RecordFinder:
     def next(self, begin: int, doubted: Record) -> Record:
         """Find the next record that makes sense at or after ``begin``, or the end of the file.
 
-        Parameters
-        ----------
-        doubted
-            The record in which or behind which the damage is. What lies in a chunk are no records
-            of the file, and what lies in an attachment may be those of another log.
+        The damage is in or behind the record ``doubted``. What lies in a chunk are no records of
+        the file, and what lies in an attachment may be those of another log.
         """
         size, log_end = self._size, 0
         kinds = {doubted.opcode, *self._source[doubted.end : doubted.end + 1]}

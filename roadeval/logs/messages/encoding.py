@@ -132,13 +132,8 @@ class Encoding:
 def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Decode | None:
     """Return a decoder of the `mcap` project by a schema's text, or None if it has none.
 
-    Parameters
-    ----------
-    factory
-        A new ``DecoderFactory``: they remember schemas by number, and numbers repeat from file to
-        file.
-    encoding
-        The channel's message encoding.
+    ``factory`` is a new ``DecoderFactory``: they remember schemas by number, and numbers repeat
+    from file to file. ``encoding`` is the channel's message encoding.
     """
     if schema is None or not 0 < len(schema.data) <= LONGEST_TEXT:
         return None
@@ -153,12 +148,8 @@ def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Dec
 class FieldReader:
     """Reads one field after the other.
 
-    Parameters
-    ----------
-    order, start
-        Byte order as `struct` names it, and the position of the first field.
-    aligned, widest
-        Whether numbers stand at multiples of their size, and the largest such size.
+    ``order`` is the byte order as `struct` names it, ``start`` the position of the first field.
+    Where ``aligned``, numbers stand at multiples of their size, at most of ``widest``.
     """
 
     def __init__(

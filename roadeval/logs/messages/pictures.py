@@ -94,10 +94,7 @@ def codec_of(picture: Picture) -> str | None:
 def picture_in(message: Any) -> LoggedPicture:
     """Return the picture of a decoded message, by the names of its fields.
 
-    Raises
-    ------
-    BadMessage
-        If it lacks the fields of an image.
+    A `BadMessage` if it lacks the fields of an image.
     """
     try:
         stamp_ns, header = 0, getattr(message, "header", message)
@@ -167,13 +164,7 @@ def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
 
 
 def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
-    """Return what decodes the messages of a channel.
-
-    Raises
-    ------
-    BadMessage
-        If nothing decodes them.
-    """
+    """Return what decodes the messages of a channel; a `BadMessage` if nothing decodes them."""
     reader = _reader(channel, schema)
     if reader is None:
         name = schema.encoding if schema else "no"

@@ -84,13 +84,7 @@ FORMATS: Final = _formats()
 
 
 def format_of(picture: RawPicture) -> PixelFormat:
-    """Return the pixel format of a picture's encoding.
-
-    Raises
-    ------
-    BadMessage
-        If there is none.
-    """
+    """Return the pixel format of a picture's encoding; a `BadMessage` if there is none."""
     format_ = FORMATS.get(picture.encoding.lower())
     if format_ is None:
         raise BadMessage(f"its encoding {picture.encoding!r} is unknown")
@@ -100,12 +94,8 @@ def format_of(picture: RawPicture) -> PixelFormat:
 def rows_of(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Array:
     """Return the samples of a picture as rows, without padding, in this machine's byte order.
 
-    Raises
-    ------
-    BadMessage
-        If the data is shorter than its size says, or the size cannot be.
-    ImageError
-        If it is larger than the limits allow.
+    A `BadMessage` if the data is shorter than its size says, or the size cannot be. An `ImageError`
+    if it is larger than the limits allow.
     """
     width, height = picture.width, picture.height
     check_size(picture, format_, limits)
@@ -162,12 +152,9 @@ def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
 def to_rgb(picture: Picture, limits: Limits) -> Rgb:
     """Decode a picture to ``(H, W, 3)`` uint8 RGB.
 
-    16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels.
-
-    Raises
-    ------
-    BadMessage
-        If it cannot be decoded; a `DamagedMessage` if it is damaged and the limits forbid that.
+    16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels. A
+    `BadMessage` if it cannot be decoded; a `DamagedMessage` if it is damaged and the limits forbid
+    that.
     """
     with _bad_message():
         if isinstance(picture, RawPicture):
@@ -212,10 +199,7 @@ def raw_format(picture: RawPicture, limits: Limits) -> PixelFormat:
 def size_of(picture: Picture) -> tuple[int, int] | None:
     """Return width and height by what a picture's head says; None of video, which has none.
 
-    Raises
-    ------
-    BadMessage
-        If the head cannot be read.
+    A `BadMessage` if the head cannot be read.
     """
     if isinstance(picture, RawPicture):
         return picture.width, picture.height

@@ -36,12 +36,7 @@ class PictureSequence(Protocol):
 class Video:
     """The frames of a video topic, by position; fastest one after the other.
 
-    Parameters
-    ----------
-    packets
-        Its messages.
-    limits
-        On the frames' size; what is larger is not decoded.
+    A frame that is larger than the limits allow is not decoded.
     """
 
     def __init__(self, packets: PictureSequence, limits: Limits) -> None:
@@ -63,10 +58,7 @@ class Video:
     def picture(self, position: int) -> DecodedPicture:
         """Decode a frame, from the keyframe before it if need be.
 
-        Raises
-        ------
-        FrameError
-            If it, or one that it builds upon, cannot be decoded.
+        A `FrameError` if it, or one that it builds upon, cannot be decoded.
         """
         if position not in self._ready:
             self._go_to(position)

@@ -60,10 +60,8 @@ def words(name: str) -> frozenset[str]:
 def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicInfo, str]:
     """Choose the camera's topic; return it and why.
 
-    Raises
-    ------
-    LogError
-        If the one asked for is not there or no image, or if none or several are candidates.
+    A `LogError` if the one asked for is not there or no image, or if none or several are
+    candidates.
     """
     if asked is not None:
         return named(topics, asked, "`topics.image`"), "asked for"
@@ -85,14 +83,10 @@ def choose_truth(
 ) -> Choice:
     """Choose the topic of the road truth.
 
-    An image of single values is preferred; one of colours where those are asked for, or
-    where there is no other.
-
-    Raises
-    ------
-    LogError
-        If the one asked for is not there or no image, or if several are candidates; or if the
-        meaning of values is given, and the only label images are compressed with loss.
+    An image of single values is preferred; one of colours where those are asked for, or where there
+    is no other. A `LogError` if the one asked for is not there or no image, or if several are
+    candidates; or if the meaning of values is given, and the only label images are compressed with
+    loss.
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.truth`")
@@ -139,10 +133,7 @@ def choose_shadow(
 ) -> Choice:
     """Choose the topic of the true shadow.
 
-    Raises
-    ------
-    LogError
-        If the one asked for is not there or no image, or if several are candidates.
+    A `LogError` if the one asked for is not there or no image, or if several are candidates.
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.shadow`")
@@ -209,10 +200,7 @@ def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
 def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
     """Return the image topic that a setting names.
 
-    Raises
-    ------
-    LogError
-        If there is none of that name, or it carries no images; the valid ones are listed.
+    A `LogError` if there is none of that name, or it carries no images; the valid ones are listed.
     """
     for topic in topics:
         if topic.name == name and topic.is_image:

@@ -94,13 +94,7 @@ class TopicReader:
         return len(self.log_times)
 
     def message(self, position: int) -> Message:
-        """Read a message.
-
-        Raises
-        ------
-        FrameError
-            If it cannot be read.
-        """
+        """Read a message; a `FrameError` if it cannot be read."""
         message = self._read(position)
         if message is None and int(self._chunks[position]) != OUTSIDE:
             self._correct(position)
@@ -134,13 +128,7 @@ class TopicReader:
             self.log_times[listed[wrong]], self._offsets[listed[wrong]] = right
 
     def picture(self, position: int) -> LoggedPicture:
-        """Read the picture of a message.
-
-        Raises
-        ------
-        FrameError
-            If it cannot be read or decoded.
-        """
+        """Read the picture of a message; a `FrameError` if it cannot be read or decoded."""
         message = self.message(position)
         try:
             return self._decoder(position).picture(message.data)

@@ -37,19 +37,8 @@ def labels_in(path: Path, size: Size | None) -> LabelSet:
 
     In a folder, files of an annotation tool come before images: these may be the ones that were
     annotated. A folder without any of both, or with lists of names alone, is searched with all
-    below it.
-
-    Parameters
-    ----------
-    path
-        The folder or file.
-    size
-        Width and height of the log's images, if known: some formats have shares of it.
-
-    Raises
-    ------
-    LogError
-        If there is no label, or the file of labels cannot be read.
+    below it. ``size`` is the width and height of the log's images, if known: some formats have
+    shares of it. A `LogError` if there is no label, or the file of labels cannot be read.
     """
     if path.is_file() and path.suffix.lower() not in _readers():
         known = ", ".join(sorted({each.name for own in _readers().values() for each in own}))

@@ -127,10 +127,7 @@ class Drawing:
     ) -> npt.NDArray[np.uint16]:
         """Return the ``(H, W)`` values of the classes, 0 where no shape is.
 
-        Raises
-        ------
-        BadMessage
-            If a shape does not fit the image, or the size of that is not known.
+        A `BadMessage` if a shape does not fit the image, or the size of that is not known.
         """
         if self.size is None:
             raise BadMessage("neither the label nor the log says how large the image is")

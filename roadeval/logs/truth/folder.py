@@ -57,14 +57,9 @@ def npy_picture(data: bytes, limits: Limits) -> RawPicture:
     """Return the ``(H, W)`` array of an NPY file as a picture of one channel.
 
     Truth values and whole numbers keep their values, numbers with a fraction become float32.
-    Nothing in the file is run: an array of objects is refused by its head.
-
-    Raises
-    ------
-    BadMessage
-        If it is no NPY file, is cut off, or holds something else.
-    ImageError
-        If it is larger than the limits allow.
+    Nothing in the file is run: an array of objects is refused by its head. A `BadMessage` if it is
+    no NPY file, is cut off, or holds something else. An `ImageError` if it is larger than the
+    limits allow.
     """
     head = io.BytesIO(data[:_LONGEST_HEAD])
     try:

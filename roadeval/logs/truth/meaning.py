@@ -85,11 +85,8 @@ class ClassMap:
     def read(self, picture: Picture, limits: Limits) -> Labels:
         """Decode a label picture.
 
-        Raises
-        ------
-        BadMessage
-            If it cannot be decoded, or holds an unknown value, or colours instead of values; or
-            is compressed in a way that changes values, without a tolerance for that.
+        A `BadMessage` if it cannot be decoded, or holds an unknown value, or colours instead of
+        values; or is compressed in a way that changes values, without a tolerance for that.
         """
         if self.others != FRINGE and (name := lossy_format(picture)):
             raise BadMessage(f"a {name}, whose compression changes label values")
@@ -147,11 +144,8 @@ class Confidence:
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
 
-        Raises
-        ------
-        BadMessage
-            If it cannot be decoded, holds colours or a number beyond 0..1, or is compressed in a
-            way that changes values.
+        A `BadMessage` if it cannot be decoded, holds colours or a number beyond 0..1, or is
+        compressed in a way that changes values.
         """
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes confidences")
@@ -174,13 +168,8 @@ Meaning = ClassMap | Confidence
 def seen_in(picture: Picture, labels: LabelSettings, name: str, limits: Limits) -> set[int]:
     """Return the values, or packed colours, that occur in a label picture of a topic or folder.
 
-    Raises
-    ------
-    BadMessage
-        If it cannot be decoded.
-    LogError
-        If it holds colours, and values are looked for; or is compressed in a way that changes
-        values, without a tolerance for that.
+    A `BadMessage` if it cannot be decoded. A `LogError` if it holds colours, and values are looked
+    for; or is compressed in a way that changes values, without a tolerance for that.
     """
     if labels.tolerance is None and (format_ := lossy_format(picture)):
         raise LogError(f"{name} {lossy_labels(format_)}")
@@ -201,23 +190,16 @@ def understand(
 ) -> ClassMap:
     """Decide what the values of label pictures mean.
 
+    A `LogError` if a given value does not occur, or none is given and the values are class ids.
+
     Parameters
     ----------
-    labels
-        The meaning as the user gave it.
     seen
         The values, or packed colours, that occur in some of the pictures, once for each picture in
         which they do.
-    name
-        Of their topic or folder, for messages.
     several
         Whether the labels are given for several logs at once. Then a mask that needs no settings
         is understood by itself where none of the given values occurs in it.
-
-    Raises
-    ------
-    LogError
-        If a given value does not occur, or none is given and the values are class ids.
     """
     pictures = Counter(seen)
     values = sorted(pictures)
@@ -268,10 +250,7 @@ def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: boo
 def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     """Return the meaning of drawn labels, whose classes have names.
 
-    Raises
-    ------
-    LogError
-        If no class is named that means road, or one that does not occur.
+    A `LogError` if no class is named that means road, or one that does not occur.
     """
     classes = origin.classes
     # A class may be called 7.
@@ -304,10 +283,7 @@ def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
 def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSettings:
     """Replace the names of classes by their colours.
 
-    Raises
-    ------
-    LogError
-        If a class has no such name, or the labels have no names.
+    A `LogError` if a class has no such name, or the labels have no names.
     """
     names = [*_named(labels)]
     if not origin.colours:

@@ -117,10 +117,7 @@ class NamedLabels:
 def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits) -> NamedLabels:
     """Find the key of each label by its name, as the settings ask.
 
-    Raises
-    ------
-    LogError
-        If a name has no key, or two labels have the same.
+    A `LogError` if a name has no key, or two labels have the same.
     """
     labels = origin.labels
     named = None if settings.images is None else _images(Path(settings.images))

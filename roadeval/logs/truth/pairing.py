@@ -260,12 +260,8 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     """Pair by frame numbers.
 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
-    certain number, and no label.
-
-    Raises
-    ------
-    LogError
-        If no number is a frame's, or the numbers look shifted by one.
+    certain number, and no label. A `LogError` if no number is a frame's, or the numbers look
+    shifted by one.
     """
     first, frames = settings.first, len(images)
     if isinstance(labels, TopicReader):

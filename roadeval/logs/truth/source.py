@@ -123,10 +123,7 @@ def in_log(
 ) -> LabelSource:
     """Settle a label topic of the log itself, whose size was checked.
 
-    Raises
-    ------
-    LogError
-        If its values cannot be understood.
+    A `LogError` if its values cannot be understood.
     """
     meaning = _meaning(labels, settings, several=several)
     return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why)
@@ -143,10 +140,7 @@ def beside_log(
 ) -> LabelSource:
     """Settle labels that have names, or those of a topic of another ``log``.
 
-    Raises
-    ------
-    LogError
-        If none belongs to a frame, they cannot be understood, or are of another size.
+    A `LogError` if none belongs to a frame, they cannot be understood, or are of another size.
     """
     if not isinstance(labels, TopicReader):
         by, count, where = labels.by, f"{len(labels)} labels", labels.name

@@ -157,10 +157,7 @@ def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
 def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
     """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
 
-    Raises
-    ------
-    LogError
-        If it cannot be read, or holds no video.
+    A `LogError` if it cannot be read, or holds no video.
     """
     import av
     import cv2

@@ -33,10 +33,7 @@ class SidecarWriter(LogWriter):
     def write(self, result: FrameResult) -> None:
         """Write a frame's results; frames come in the order of their log times.
 
-        Raises
-        ------
-        LogError
-            If the disk is full.
+        A `LogError` if the disk is full.
         """
         stamp, log_time = result.frame.stamp_ns, result.frame.log_time_ns
         for variant in result.variants:

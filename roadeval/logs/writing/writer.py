@@ -24,18 +24,9 @@ FRAME_ID: Final = "camera"
 class LogWriter:
     """Writes images to an MCAP file with Foxglove's protobuf schemas.
 
-    The same calls give the same bytes. The file appears under its name when it is complete:
-    at the end of the ``with`` statement, and never if that ends by an exception.
-
-    Parameters
-    ----------
-    path
-        The file to write; an existing one is replaced. Its folder is made if it does not exist.
-
-    Raises
-    ------
-    LogError
-        If it cannot be written.
+    The same calls give the same bytes. The file appears under its name when it is complete: at the
+    end of the ``with`` statement, and never if that ends by an exception. An existing file is
+    replaced, and the folder is made if it does not exist. A `LogError` if it cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -61,19 +52,8 @@ class LogWriter:
     ) -> None:
         """Write an image file as it is.
 
-        Parameters
-        ----------
-        topic, stamp_ns
-            Topic and header stamp.
-        data, format
-            The file's bytes, and ``jpeg``, ``png`` or ``webp``.
-        log_time_ns
-            Log time; the stamp by default.
-
-        Raises
-        ------
-        LogError
-            If the disk is full, or the format is another.
+        ``format`` is ``jpeg``, ``png`` or ``webp``; the log time is the stamp by default. A
+        `LogError` if the disk is full, or the format is another.
         """
         from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
@@ -105,10 +85,7 @@ class LogWriter:
     ) -> None:
         """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
 
-        Raises
-        ------
-        LogError
-            If the disk is full.
+        A `LogError` if the disk is full.
         """
         import cv2
 
@@ -128,10 +105,7 @@ class LogWriter:
     ) -> None:
         """Write a message in JSON, with its schema's name and text (JSON Schema).
 
-        Raises
-        ------
-        LogError
-            If the disk is full.
+        A `LogError` if the disk is full.
         """
         name, text = schema
         channel = self._channel(topic, "json", (name, "jsonschema"), text.encode)
@@ -158,10 +132,7 @@ class LogWriter:
     def finish(self) -> None:
         """Write the end of the file; `close` gives it its name.
 
-        Raises
-        ------
-        LogError
-            If the disk is full.
+        A `LogError` if the disk is full.
         """
         if not self._file.closed:
             with self._explained():
@@ -169,13 +140,7 @@ class LogWriter:
                 self._file.close()
 
     def close(self) -> None:
-        """Complete the file and give it its name.
-
-        Raises
-        ------
-        LogError
-            If the disk is full.
-        """
+        """Complete the file and give it its name; a `LogError` if the disk is full."""
         try:
             self.finish()
             with self._explained():

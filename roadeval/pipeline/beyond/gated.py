@@ -290,23 +290,11 @@ def logistic(mapped: Floats, road: npt.NDArray[np.bool_], penalty: float) -> tup
 
     scikit-learn's gives the same weights, and its import alone takes a second.
 
-    The weights w of standardised columns z and the offset b minimise the mean of
-    ``ln(1 + exp(-s (w . z + b)))``, s being 1 for road and -1 for the rest, plus
-    ``penalty / 2 |w|^2``; returned are those of the columns as they are.
-
-    Parameters
-    ----------
-    mapped
-        ``(n, K)``.
-    road
-        ``(n,)``: both classes occur.
-    penalty
-        Above 0.
-
-    Returns
-    -------
-    weights, offset
-        ``(K,)`` float64, and a number.
+    The weights w of standardised columns z and the offset b minimise the mean of ``ln(1 + exp(-s (w
+    . z + b)))``, s being 1 for road and -1 for the rest, plus ``penalty / 2 |w|^2``; returned are
+    those of the columns as they are. ``mapped`` is ``(n, K)``, ``road`` ``(n,)``, of which both
+    classes occur; ``penalty`` is above 0. Returned are the weights, ``(K,)`` float64, and the
+    offset.
     """
     mean, deviation = mapped.mean(axis=0), np.maximum(mapped.std(axis=0), 1e-6)
     columns = np.column_stack([(mapped - mean) / deviation, np.ones(len(mapped))])

@@ -168,16 +168,10 @@ def guided(values: Values, working: Rgb, image: Rgb) -> Values:
 
     An image that is smaller than the working image gives no edges; the values are smoothed.
 
-    In a window with means ``m`` of brightness and ``q`` of the values,
-    ``a = (mean(I p) - m q) / (var(I) + CONTRAST^2)`` and ``b = q - a m``. The result may lie beyond
-    the range of the values.
-
-    Parameters
-    ----------
-    values
-        ``(h, w)`` float32.
-    working, image
-        The working image, ``(h, w, 3)``, and the camera's, ``(H, W, 3)`` uint8 RGB.
+    In a window with means ``m`` of brightness and ``q`` of the values, ``a = (mean(I p) - m q) /
+    (var(I) + CONTRAST^2)`` and ``b = q - a m``. The result may lie beyond the range of the values.
+    ``values`` are ``(h, w)`` float32, as the working image is ``(h, w, 3)``; the camera's is ``(H,
+    W, 3)`` uint8 RGB.
     """
     grey = _brightness(working)
     level, value = _mean(grey), _mean(values)
