@@ -10,7 +10,7 @@ from pathlib import Path
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import DriveEntry, FleetError
-from roadeval.logs import files_of, identity_of
+from roadeval.logs import files_of
 
 
 def groups_of(entries: Sequence[DriveEntry]) -> dict[str, str]:
@@ -46,9 +46,6 @@ def _alike(entries: Sequence[DriveEntry]) -> list[list[DriveEntry]]:
 
 def _content(file: Path) -> str:
     with file.open("rb") as opened:
-        if found := identity_of(opened):
-            return found
-        opened.seek(0)
         return hashlib.file_digest(opened, "sha256").hexdigest()
 
 

@@ -105,11 +105,11 @@ def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
         yield copy
 
 
-def stamp(url: str) -> Mapping[str, Mapping[str, Any]]:
-    """Return size, tag and time of the files of a drive, by name, to notice that it has changed.
+def stamp(url: str) -> Mapping[str, tuple[int, str | None]]:
+    """Return size and tag of the files of a drive, by name, to notice that it has changed.
 
-    Plain data: ``size``, ``etag`` and ``last_modified``, the last two None where the server does
-    not state them. A `FleetError` if it is not there, or cannot be asked.
+    The tag is None where the server states none. A `FleetError` if it is not there, or cannot be
+    asked.
     """
     return {_file_name(each): _facts(_place(each)) for each in _files(url)}
 
@@ -188,16 +188,14 @@ def _heads_a_bag(place: _Place, key: PurePosixPath) -> bool:
     return is_heading(bytes(place.ask(next, iter(result.stream(HEAD)), b""))[:HEAD])
 
 
-def _facts(place: _Place) -> dict[str, Any]:
+def _facts(place: _Place) -> tuple[int, str | None]:
     import obstore
 
     try:
         meta = place.ask(obstore.head, place.store, place.key)
     except FleetError:  # a signed URL may be good for reading alone
         meta = place.ask(obstore.get, place.store, place.key).meta
-    known = meta["last_modified"].timestamp() > 0
-    modified = meta["last_modified"].isoformat() if known else None
-    return {"size": meta["size"], "etag": meta["e_tag"], "last_modified": modified}
+    return meta["size"], meta["e_tag"]
 
 
 def _copy(url: str, stage: Path) -> Path:

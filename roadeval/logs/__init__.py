@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from roadeval.logs.errors import FrameError, LogError
     from roadeval.logs.files import METADATA, files_of, natural
     from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame
-    from roadeval.logs.identity import identity_of
     from roadeval.logs.log import Log, LogDescription, describe, open_log
     from roadeval.logs.messages.encoding import TopicKind
     from roadeval.logs.selection import Selection

@@ -53,9 +53,10 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _content(self, kind: str, *, body: bool) -> None:
         start = self._start(kind)
-        headers = {"ETag": f'"{hashlib.md5(CONTENT).hexdigest()}"'}
-        if kind != "dateless":
-            headers["Last-Modified"] = "Wed, 21 Oct 2015 07:28:00 GMT"
+        headers = {
+            "ETag": f'"{hashlib.md5(CONTENT).hexdigest()}"',
+            "Last-Modified": "Wed, 21 Oct 2015 07:28:00 GMT",
+        }
         if start:
             headers["Content-Range"] = f"bytes {start}-{len(CONTENT) - 1}/{len(CONTENT)}"
         self._head(206 if start else 200, len(CONTENT) - start, **headers)

@@ -200,16 +200,13 @@ def test_a_drive_is_never_in_memory_as_a_whole(server, tmp_path, monkeypatch):
 
 
 def test_a_stamp_of_a_url_asks_for_its_head_alone(server):
-    facts = stamp(server.url("whole/a.mcap"))["a.mcap"]
-    assert facts["size"] == len(CONTENT)
-    assert facts["last_modified"] == "2015-10-21T07:28:00+00:00"
-    assert len(facts["etag"]) == 34
+    size, tag = stamp(server.url("whole/a.mcap"))["a.mcap"]
+    assert (size, len(tag)) == (len(CONTENT), 34)
     assert [method for method, _, _ in server.asked] == ["HEAD"]
-    assert stamp(server.url("dateless/a.mcap"))["a.mcap"]["last_modified"] is None
 
 
 def test_a_stamp_is_found_where_only_reading_is_allowed(server):
-    assert stamp(server.url("signed/a.mcap"))["a.mcap"]["size"] == len(CONTENT)
+    assert stamp(server.url("signed/a.mcap"))["a.mcap"][0] == len(CONTENT)
     with pytest.raises(RoadevalError, match=r"404/a\.mcap: there is no such file"):
         stamp(server.url("404/a.mcap?sig=geheim"))
 

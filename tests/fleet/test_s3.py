@@ -115,10 +115,10 @@ def test_a_stamp_tells_whether_an_object_has_changed(filled, s3):
 
     before = stamp("s3://bucket/top.mcap")
     assert before == stamp("s3://bucket/top.mcap")
-    assert before["top.mcap"]["size"] == len(LOG)
+    assert before["top.mcap"][0] == len(LOG)
     store = S3Store("bucket", client_options={"allow_http": "true"})
     obstore.put(store, "top.mcap", LOG[:-1] + b"x")
-    assert stamp("s3://bucket/top.mcap")["top.mcap"]["etag"] != before["top.mcap"]["etag"]
+    assert stamp("s3://bucket/top.mcap")["top.mcap"][1] != before["top.mcap"][1]
     assert list(stamp("s3://bucket/d/run/")) == ["bag_0.mcap", "bag_1.mcap", "bag_2.mcap"]
 
 

@@ -75,17 +75,6 @@ def test_a_log_that_has_changed_and_kept_its_size_and_time_is_replayed(logs, tmp
     assert tables(tmp_path / "f") == tables(tmp_path / "g")
 
 
-def test_where_no_change_of_a_file_is_noted_its_checksums_tell(logs, tmp_path, monkeypatch):
-    times = "roadeval.jobs.run.fleet_work._times"
-    monkeypatch.setattr(times, lambda file: [file.stat().st_size])
-    monkeypatch.setattr("roadeval.jobs.run.fleet_work.CHANGE_TIMES", False)
-    mine = shutil.copytree(logs, tmp_path / "logs")
-    run(mine, tmp_path / "f")
-    assert run(mine, tmp_path / "f")[1] == []
-    rewritten(mine / "a.mcap", lambda content: content.replace(b"roadeval", b"ROADEVAL", 1))
-    assert run(mine, tmp_path / "f")[0].replayed == 1
-
-
 def test_a_log_that_was_only_touched_is_read_and_not_replayed(logs, tmp_path):
     mine = shutil.copytree(logs, tmp_path / "logs")
     run(mine, tmp_path / "f")

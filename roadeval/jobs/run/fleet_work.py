@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
-import os
+import secrets
 import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,12 +20,12 @@ from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
 from roadeval.data import Frame
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.regions import ALL
-from roadeval.fleet.entry import DriveEntry, FleetError, in_order
+from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.fleet.remote import staged, stamp
 from roadeval.jobs.run.fleet_frames import FrameGatherer
 from roadeval.jobs.run.identity import asked, content_of, software
 from roadeval.jobs.run.replay import replay
-from roadeval.logs import METADATA, identity_of
+from roadeval.logs import METADATA
 from roadeval.recording import RecordingError
 from roadeval.results.facts import json_text
 from roadeval.results.fleet import (
@@ -53,8 +53,6 @@ TRAINING_DRIVES: Final = 20
 """Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups in turn.
 Their training frames are held decoded."""
 FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
-CHANGE_TIMES: Final = os.name == "posix"
-"""Whether ``st_ctime`` is the time of a file's last change, which no program can set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +126,7 @@ def valid_record(task: DriveTask) -> Record | None:
     if record is None:
         return None
     now = seen(task.entry, task.config)
-    sure = record.failed or (now is not None and now["sure"])
-    return record if sure and record.stamp == now else None
+    return record if record.stamp == now and (record.failed or now is not None) else None
 
 
 def _usable(task: DriveTask) -> Record | None:
@@ -187,42 +184,35 @@ def _begun(task: DriveTask) -> int:
 
 
 def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
-    """Return what shows at little cost whether a drive's log, or masks beside it, have changed.
+    """Return what shows at little cost that a drive's log, or masks beside it, did not change.
 
-    Plain data. Where ``content`` differs it has; where nothing differs it has not, if that is
-    ``sure``; else all must be read. None where it cannot be looked at.
+    Plain data by file: what differs may have changed, and is read whole then. None where it cannot
+    be looked at: the error is reported where it is read.
     """
+    beside = [own for own in (config.truth, *config.masks.values()) if own.path]
     try:
-        beside = [own for own in (config.truth, *config.masks.values()) if own.path]
-        masks = [file for own in beside for file in logs.label_files(own)]
-        times: dict[str, Any] = {str(file): _times(file) for file in masks}
+        files = [file for own in beside for file in logs.label_files(own)]
         if entry.path is None:
-            facts = stamp(entry.source)
-            tags = {name: each["etag"] for name, each in facts.items()}
-            sizes = {name: each["size"] for name, each in facts.items()}
-            return {"content": sizes, "times": times | tags, "sure": None not in tags.values()}
-        files = _files(entry.path)
-        content = {file.name: _content(file) for file in files}
-        times |= {str(file): _times(file) for file in files}
-        sure = CHANGE_TIMES or (not masks and None not in content.values())
-        return {"content": content, "times": times, "sure": sure}
+            found: dict[str, Any] = {
+                # Without a tag nothing shows: it is equal to no other.
+                name: [size, tag or secrets.token_hex()]
+                for name, (size, tag) in stamp(entry.source).items()
+            }
+        elif entry.path.is_dir():
+            found = {METADATA: _note(entry.path)}
+            files += sorted(entry.path.glob("*.mcap"))
+        else:
+            found = {}
+            files.append(entry.path)
+        return found | {str(file): _times(file) for file in files}
     except (OSError, RoadevalError):
-        return None  # the error is reported where it is read
+        return None
 
 
-def _files(path: Path) -> list[Path]:
-    """Return the files that make a log, of a folder with what a recorder noted of them."""
-    if not path.is_dir():
-        return [path]
-    note = path / METADATA
-    return [*sorted(path.glob("*.mcap"), key=in_order), *([note] if note.exists() else [])]
-
-
-def _content(file: Path) -> str | None:
-    if file.name == METADATA:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
-    with file.open("rb", buffering=0) as opened:
-        return identity_of(opened)
+def _note(folder: Path) -> str | None:
+    """Return what a recorder noted of the files in a folder; None without a note."""
+    note = folder / METADATA
+    return note.read_text(errors="replace") if note.exists() else None
 
 
 def _times(file: Path) -> list[int]:
@@ -268,11 +258,7 @@ def _made(task: DriveTask) -> tuple[Record, bool]:
 
 def _is_same(task: DriveTask, path: Path, earlier: Record, now: Mapping[str, Any] | None) -> bool:
     """Return whether an earlier record is of the same content, which is read whole."""
-    if earlier.failed or None in (earlier.stamp, now):
-        return False
-    assert earlier.stamp is not None
-    assert now is not None
-    if earlier.stamp["content"] != now["content"]:
+    if earlier.failed or (earlier.stamp or {}).get(METADATA) != (now or {}).get(METADATA):
         return False
     return bool(content_of(path, task.config, task.model) == earlier.value("identity"))
 
@@ -428,10 +414,7 @@ def train_fold(task: FoldTask) -> FoldModel:
         parts = [asked(task.config, ""), looks]
         parts += [[entry.id, asked(own, "")] for entry, own in task.candidates]
         wanted = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
-        sure = all(look is None or look["sure"] for look in looks)
-        if sure and (model := _trained_before(task, about, wanted)):
-            return model
-        return _trained(task, about, wanted)
+        return _trained_before(task, about, wanted) or _trained(task, about, wanted)
 
 
 def _trained_before(task: FoldTask, about: Path, wanted: str) -> FoldModel | None:
