@@ -218,6 +218,8 @@ class ImageGrid(Block):
     columns: int
     skip: int = 0
     """Places of the first row that stay free."""
+    caption: str = ""
+    """Printed below all of them."""
 
 
 # --- Arrangement ----------------------------------------------------------------------------------
@@ -228,6 +230,16 @@ class KeepTogether(Block):
     """Blocks with no page break between them."""
 
     blocks: Sequence[Block]
+
+
+@dataclass(frozen=True, slots=True)
+class Details(Block):
+    """Blocks that a page shows after a click on their title."""
+
+    title: str
+    blocks: Sequence[Block]
+    on_paper: bool = True
+    """Whether paper has them, below their title as a heading."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,11 +256,6 @@ class TableOfContents(Block):
     """The document's headings with their pages: of the first level, or down to a depth."""
 
     depth: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class PageBreak(Block):
-    """The end of a page."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,10 +97,8 @@ class Findings:
     """The recording's own, about its origin."""
     windows: Rows
     """As ``windows.csv``, or longer windows for a long drive."""
-    window_size: int
-    """Evaluated frames in a window."""
     paired: Sequence[PairedComparison]
-    """Filtered against unfiltered first, if both were run; then against the baseline."""
+    """Each variant against unfiltered, if it was run; then each against the baseline."""
     regions: Mapping[tuple[str, str], Mapping[str, float]]
     """See `roadeval.evaluation.score.by_region`."""
     overlap: Mapping[str, Mapping[str, Mapping[str, float]]]

@@ -100,7 +100,7 @@ def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(drive, watched)
     assert tab.locator(".frames th[aria-sort]").get_attribute("aria-sort") == "ascending"
 
 
-def test_frames_are_filtered_by_variant_rate_condition_and_note(drive, watched):
+def test_frames_are_filtered_by_variant_rate_and_condition(drive, watched):
     tab = watched(drive.as_uri()).tab
     everything = tab.locator(".frames tbody tr").count()
     tab.select_option("[name=variant]", "unfiltered")
@@ -115,9 +115,6 @@ def test_frames_are_filtered_by_variant_rate_condition_and_note(drive, watched):
     notes = shown(tab, ".frames tbody td:last-child")
     assert 0 < len(notes) < everything
     assert all("the filter helps" in note for note in notes)
-    tab.click(".filters [type=reset]")
-    tab.fill("[name=note]", "raised ERR")
-    assert all("raised ERR" in note for note in shown(tab, ".frames tbody td:last-child"))
 
 
 def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(drive, watched):
@@ -134,6 +131,67 @@ def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(dri
     assert frame(tab) == first
     assert len(shown(tab, ".strip .two")) == 1
     assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(first)
+
+
+def test_a_frame_without_pictures_offers_the_nearest_and_its_note(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    rows = tab.locator(".frames tbody tr")
+    has = {int(row.get_attribute("data-frame")): row for row in rows.all()}
+    pictured = {number for number, row in has.items() if row.get_attribute("class") == "pictured"}
+    lacking = [number for number in has if number not in pictured]
+    number = max(lacking, key=lambda each: min(abs(each - other) for other in pictured))
+    has[number].click()
+    assert tab.locator(".stage").is_hidden()
+    note = has[number].get_attribute("data-note")
+    assert note is None or note in tab.locator(".absent").inner_text()
+    tab.locator(".absent button").click()
+    distance = min(abs(number - other) for other in pictured)
+    assert abs(frame(tab) - number) == distance
+    assert tab.locator(".stage").is_visible()
+
+
+def test_the_address_names_the_frame_and_back_goes_to_the_last_one(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    first = frame(tab)
+    assert "#" not in tab.url
+    one, two = (
+        int(each.get_attribute("data-frame")) for each in tab.locator("tr.pictured").all()[1:3]
+    )
+    for number in (one, two):
+        tab.locator(f".frames tr[data-frame='{number}'] a").click()
+        assert tab.url.endswith(f"#frame-{number}")
+    tab.keyboard.press("ArrowRight")
+    assert tab.url.endswith(f"#frame-{frame(tab)}")
+    assert frame(tab) > two
+    tab.go_back()
+    assert frame(tab) == one
+    tab.go_back()
+    assert frame(tab) == first
+    assert frame(watched(f"{drive.as_uri()}#frame-{two}").tab) == two
+
+
+def test_rows_of_frames_are_one_line_and_their_number_stays_in_sight(drive, watched):
+    for width in (1440, 390):
+        tab = watched(drive.as_uri(), width=width).tab
+        rows = tab.locator(".frames tbody tr")
+        heights = rows.evaluate_all("rows => rows.map(row => row.offsetHeight)")
+        assert max(heights) < 40
+        box = tab.locator(".scroll:has(.frames)")
+        box.evaluate("each => each.scrollTo(200, 200)")
+        left = box.bounding_box()["x"]
+        number = rows.nth(9).locator("th").bounding_box()
+        assert number["x"] - left == pytest.approx(1, abs=1)
+        head = tab.locator(".frames thead").bounding_box()
+        assert head["y"] - box.bounding_box()["y"] == pytest.approx(1, abs=1)
+
+
+def test_a_page_opens_on_six_screens_at_most(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    assert tab.evaluate("document.documentElement.scrollHeight") <= 6 * 900
+    tab.locator("summary", has_text="figures 2, 3a and 3b").click()
+    chart = tab.locator("#over-the-drive .along").first
+    ticks = chart.locator(".xs text").all_inner_texts()
+    assert len(ticks) > 4
 
 
 def test_a_slider_lies_between_two_variants(drive, watched):
@@ -253,7 +311,7 @@ def test_rows_of_marks_are_told_by_pointer_and_keyboard(drive, watched):
 
 def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
     tab = watched(drive.as_uri()).tab
-    section = tab.locator("#filtered-against-unfiltered")
+    section = tab.locator("#what-the-filter-and-the-variants-change")
     assert section.locator(".area .level").count() == section.locator(".area .band").count() == 1
     section.locator(".area").hover()
     mean = demo.summary["difference"]["post"]["ERR"]
@@ -307,7 +365,10 @@ def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
 def test_without_a_script_everything_is_there(drive, watched):
     tab = watched(drive.as_uri(), java_script_enabled=False).tab
     assert len(shown(tab, ".strip h3")) > 5
-    assert all(each.is_visible() for each in tab.locator(".strip .tile img").all()[:20])
+    outcomes = tab.locator(".strip > .pictures img")
+    assert all(each.is_visible() for each in outcomes.all()[:20])
+    tab.locator(".strip summary").first.click()
+    assert tab.locator(".strip").first.locator("img").last.is_visible()
     assert shown(tab, ".charts .axis")
     assert not shown(tab, ".filters, .tools, .stage, .find, .scripted")
 

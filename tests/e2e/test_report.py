@@ -54,7 +54,7 @@ def of_folder(demo, tmp_path_factory):
 def test_a_results_folder_gives_the_same_numbers_without_pictures(of_folder, words):
     told, _ = of_folder
     assert "Made without pictures" in told
-    table = re.search(r"final mask frames ERR .*? precision (.*?) frames count", told)
+    table = re.search(r"final mask ERR .*? precision (.*?) Frames: ", told)
     assert table
     assert table[1] in words
 
@@ -115,7 +115,7 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(kille
     assert any("Where the final masks go wrong, over all" in page for page in pages)
     assert any("If a stage were perfect" in page for page in pages)
     assert "This run did not reach its end" in first
-    (evaluated,) = re.findall(r"evaluated (\d+)", first)
+    (evaluated,) = re.findall(r"(\d+) evaluated", first)
     # Of the 20 frames with truth ten are trained on, and six more come before the end.
     assert 0 < int(evaluated) < 10
 
@@ -135,7 +135,6 @@ def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):
     assert run.returncode == 0, run.stderr
     words = text((tmp_path / "report.pdf").read_bytes())
     assert "Without truth nothing can be said about errors" in words
-    assert "ms a frame" in words
 
 
 @pytest.mark.parametrize("of", ["recording", "reports"])
@@ -151,7 +150,6 @@ def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, t
     ):
         assert said in words
     assert "undefined on some of" not in words
-    assert "Of 0 frames" not in words
 
 
 @pytest.mark.parametrize("name", ["not.rrd", "missing.rrd", "empty"])

@@ -10,7 +10,7 @@ from pypdf import PdfReader
 
 from roadeval.data import Rows
 from roadeval.evaluation.stats import Difference
-from roadeval.report.blocks import Cell, Document
+from roadeval.report.blocks import Cell, Details, Document
 from roadeval.report.findings import Commands, Findings, PairedComparison
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 from roadeval.results.rows import as_arrays
@@ -96,7 +96,6 @@ def some_findings(**changes):
         "facts": Facts(**facts | {n: value for n, value in changes.items() if n in FACTS}),
         "properties": {},
         "windows": NO_WINDOWS,
-        "window_size": 10,
         "paired": [],
         "regions": {},
         "overlap": {
@@ -123,6 +122,11 @@ def the(kind, blocks):
     """The only block of a kind."""
     (block,) = (block for block in blocks if isinstance(block, kind))
     return block
+
+
+def opened(blocks):
+    """Blocks, with those that a page shows after a click in the place of their title."""
+    return [inner for b in blocks for inner in (opened(b.blocks) if type(b) is Details else [b])]
 
 
 def plain_rows(table):

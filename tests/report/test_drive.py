@@ -22,7 +22,7 @@ def headings(made):
 
 def test_without_truth_there_are_masks_in_place_of_rates():
     assert sections(some_findings(totals={}, overlap={})) == [
-        *("Summary", "Masks", "Settings, versions, and how to reproduce this")
+        *("Summary", "Masks", "How to reproduce this")
     ]
 
 
@@ -35,12 +35,11 @@ def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
     )
     assert sections(findings) == [
         "Summary",
-        "Over the drive: the paper's tables and figures",
-        "Filtered against unfiltered",
+        "What the filter and the variants change",
         "Where the errors are",
         "Which stage broke it",
         "The worst frames",
-        "Settings, versions, and how to reproduce this",
+        "How to reproduce this",
     ]
 
 

@@ -45,6 +45,7 @@ from roadeval.evaluation.score.rows import (
     pairs,
     perfect_stages,
     region_totals,
+    scene_ns,
     stages_of,
     totals,
     windows,

@@ -6,7 +6,7 @@ understood as well as a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -174,6 +174,11 @@ def _errors(own: Rows, frames: Ints) -> dict[str, Floats]:
 # --- Frames worth opening -------------------------------------------------------------------------
 
 
+def scene_ns(stamps: Ints) -> int:
+    """Return how far apart frames of two scenes are: a quarter of the drive, at most 3 seconds."""
+    return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
+
+
 def worst(rows: Rows, variant: str, count: int, apart_ns: int | None = None) -> Rows:
     """Pick at most ``count`` frames with the highest final ERR of a variant, the worst first.
 
@@ -186,17 +191,32 @@ def worst(rows: Rows, variant: str, count: int, apart_ns: int | None = None) -> 
     return own.take(_apart(own["stamp_ns"], ranked, count, apart_ns))
 
 
-def most_changed(stamps: Ints, changes: Floats, count: int, *, harmed: bool) -> Ints:
+def most_changed(
+    stamps: Ints,
+    changes: Floats,
+    count: int,
+    *,
+    harmed: bool,
+    apart_ns: int | None = None,
+    besides: Sequence[int] = (),
+) -> Ints:
     """Return the places of the frames whose ERR rose most (``harmed``) or fell most.
 
-    Only frames that did rise, or fall, and of neighbours only one, as in `worst`.
+    Only frames that did rise, or fall, and of neighbours only one, as in `worst`; none that is a
+    neighbour of the stamps ``besides``.
     """
     sign = 1 if harmed else -1
     ranked = np.argsort(-sign * changes, kind="stable")
-    return _apart(stamps, ranked[sign * changes[ranked] > 0], count)
+    return _apart(stamps, ranked[sign * changes[ranked] > 0], count, apart_ns, besides)
 
 
-def _apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) -> Ints:
+def _apart(
+    stamps: Ints,
+    ranked: Ints,
+    count: int,
+    apart_ns: int | None = None,
+    besides: Sequence[int] = (),
+) -> Ints:
     """Return the first ``count`` places of a ranking that are no neighbours of one before."""
     if apart_ns is None:
         apart_ns = min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
@@ -204,7 +224,8 @@ def _apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) 
     for place in ranked.tolist():
         if len(places) == count:
             break
-        if (np.abs(stamps[places] - stamps[place]) >= apart_ns).all():
+        taken = np.array([*besides, *stamps[places]], np.int64)
+        if (np.abs(taken - stamps[place]) >= apart_ns).all():
             places.append(place)
     return np.array(places, np.int64)
 

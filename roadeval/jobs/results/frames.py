@@ -33,8 +33,8 @@ from roadeval.results.sentences import notes
 if TYPE_CHECKING:
     from roadeval.recording import Recording
 
-WORST: Final = 6
-MOVED: Final = 3
+WORST: Final = 4
+MOVED: Final = 2
 """Frames that a report shows: the worst, and those that the filter helped and harmed most."""
 OUTCOMES: Final = 6
 LAYERS: Final = 2
@@ -119,21 +119,36 @@ class FramePicker:
         return [self._outcome(self._recording, n) for n in numbers] if self._recording else []
 
     def worst(self) -> list[NotableFrame]:
-        """Return the worst frames of the first variant."""
+        """Return the worst frames of the first variant, one a scene, all worse than the mean."""
         if not self._variants:
             return []
-        rows = score.worst(self._result.rows, self._variants[0], WORST)
+        table = self._result.rows
+        rows = score.worst(table, self._variants[0], WORST, score.scene_ns(table["stamp_ns"]))
+        mean = np.nanmean(self._finals.of_variant(self._variants[0])["ERR"]) if len(rows) else 0
+        rows = rows.take(rows["ERR"] >= mean)
         return [
             self._notable(*row)
             for row in zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True)
         ]
 
-    def moved(self, paired: Sequence[PairedComparison], *, harmed: bool) -> list[NotableFrame]:
-        """Return the frames that the filter harmed most, or helped most."""
+    def moved(
+        self,
+        paired: Sequence[PairedComparison],
+        shown: Sequence[NotableFrame],
+        *,
+        harmed: bool,
+    ) -> list[NotableFrame]:
+        """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
         for pair in paired:
             if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
                 stamps, changes = pair.frames["stamp_ns"], pair.frames["ERR"]
-                rows = pair.frames.take(score.most_changed(stamps, changes, MOVED, harmed=harmed))
+                places = score.most_changed(
+                    *(stamps, changes, MOVED),
+                    harmed=harmed,
+                    apart_ns=score.scene_ns(stamps),
+                    besides=[frame.stamp_ns for frame in shown],
+                )
+                rows = pair.frames.take(places)
                 columns = (rows[name].tolist() for name in ("frame", "stamp_ns", "ERR"))
                 return [self._notable(*row) for row in zip(*columns, strict=True)]
         return []

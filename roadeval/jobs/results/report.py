@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
+from roadeval.data import Packed, Rows, TruthBits
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
 from roadeval.evaluation.regions import ALL
@@ -136,9 +136,9 @@ def page_of(
 SAMPLED: Final = 100
 """Frames whose masks are read for the maps, at most; tables know every frame."""
 WINDOWS: Final = 30
-"""Rows of the table over the drive, at most."""
+"""Points of the figures over the drive, at most."""
 EXAMPLES: Final = 4
-THUMBNAILS: Final = 8
+THUMBNAILS: Final = 4
 """Frames in figure 2 and on the first page."""
 
 
@@ -147,9 +147,9 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     rows, facts = result.rows, result.facts
     pictured = _pictured(result)
     changes, heat, sampled = _mask_sums(result, pictured)
-    windows, window_size = _windows(result)
     paired = list(_paired(result, changes))
     picker = FramePicker(result)
+    worst = picker.worst()
     return Findings(
         source=str(result.path),
         complete=result.complete,
@@ -158,8 +158,7 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         pictured=len(pictured),
         facts=facts,
         properties=result.properties,
-        windows=windows,
-        window_size=window_size,
+        windows=_windows(result),
         paired=paired,
         regions=score.by_region(result.table("regions")) if len(rows) else {},
         overlap={
@@ -174,9 +173,9 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         sampled=sampled,
         examples=picker.examples(_examples(facts, result.pictured, pictured)),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
-        worst=picker.worst(),
-        helped=picker.moved(paired, harmed=False),
-        harmed=picker.moved(paired, harmed=True),
+        worst=worst,
+        helped=picker.moved(paired, [], harmed=False),
+        harmed=picker.moved(paired, worst, harmed=True),
         coverage=_coverage(result, pictured),
     )
 
@@ -196,20 +195,20 @@ def _pictured(result: DriveResult) -> list[int]:
 # --- Tables ---------------------------------------------------------------------------------------
 
 
-def _windows(result: DriveResult) -> tuple[Rows, int]:
-    """Return the drive's windows and their size; longer ones where the drive is long."""
+def _windows(result: DriveResult) -> Rows:
+    """Return the drive's windows; longer ones where the drive is long."""
     size, windows = result.facts.evaluation.window, result.table("windows")
     count = -(-len(result.rows.distinct("frame")) // size)
     if not count or (count <= WINDOWS and len(windows)):
-        return windows, size
+        return windows
     size *= -(-count // WINDOWS)
-    return as_arrays("windows", window_rows(score.windows(result.rows, size))), size
+    return as_arrays("windows", window_rows(score.windows(result.rows, size)))
 
 
 def _paired(result: DriveResult, changes: Rows) -> Iterator[PairedComparison]:
-    """Compare filtered against unfiltered, then every variant with the baseline."""
+    """Compare the variants with unfiltered, then with the baseline."""
     for each in result.facts.effects:
-        if each.final and each.base in (BASELINE, UNFILTERED if each.variant == FILTERED else ""):
+        if each.final:
             between = (changes["from_variant"] == each.base) & (changes["N"] > 0)
             own = changes.take(between & (changes["to_variant"] == each.variant))
             columns = (own[name].tolist() for name in ("repaired", "spoiled", "N"))

@@ -26,7 +26,6 @@ from roadeval.report.blocks import (
     Heading,
     ImageFile,
     KeepTogether,
-    PageBreak,
     Table,
     TableOfContents,
 )
@@ -266,7 +265,7 @@ def _flat(blocks: Iterable[Block]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, KeepTogether):
             yield from _flat(block.blocks)
-        elif not isinstance(block, PageBreak | TableOfContents):  # a page's outline is always there
+        elif not isinstance(block, TableOfContents):  # a page's outline is always there
             yield block
 
 

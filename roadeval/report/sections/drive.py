@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
-
-import numpy as np
+from dataclasses import replace
+from itertools import pairwise
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import DASH, defined, listing, number, percent, points
-from roadeval.evaluation import score
-from roadeval.evaluation.metrics import FULL, SHORT, SHORT_OVERLAP
-from roadeval.evaluation.regions import partitions, titles
+from roadeval.data.words import DASH, MINUS, defined, number, percent, points
+from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
+from roadeval.evaluation.regions import titles
 from roadeval.evaluation.score import BINS, FILTER, merged
-from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import (
     Block,
     Cell,
+    Details,
     Figure,
     Heading,
     ImageGrid,
-    KeepTogether,
     Table,
     Text,
 )
@@ -35,7 +32,6 @@ from roadeval.report.charts.standard import (
 from roadeval.report.findings import Findings, FleetFindings, PairedComparison
 from roadeval.report.images import variants_of
 from roadeval.report.sections.common import (
-    SIDE_BY_SIDE,
     example_pictures,
     rate_cells,
     sampled_frames,
@@ -44,29 +40,23 @@ from roadeval.report.sections.common import (
 from roadeval.results.facts import Totals
 from roadeval.results.sentences import CLAIMED, correction, marked_interval
 
-PAPER_WINDOW: Final = 10
-"""Frames in a row of the paper's figures (over_drive 5)."""
-RATES: Final = 4
-"""Rates that share a table where the variants are side by side."""
-NO_NUMBERS: Final = (
-    "The paper's text gives no number for its figures 3a and 3b, and their curves are lost, so "
-    "nothing can be held against it number by number. Its claims can be checked."
-)
-
 
 def over_drive(findings: Findings) -> Iterator[Block]:
     """Yield the rates over the drive as the paper shows them."""
-    yield Heading("Over the drive: the paper's tables and figures")
-    if len(findings.windows):
-        yield from _rates_tables(findings)
+    told = [*_claims(findings)]
     if findings.examples:
-        pictures = list(example_pictures(findings.examples))
-        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 2)
-        yield Text("The paper's figure 2: input and output images, and the truth.", "note")
-    for figure in figures_over_drive():
-        if charts := figure.charts(findings.windows):
-            yield Figure(charts, figure.caption)
-    yield from _claims(findings)
+        pictures = [*example_pictures(findings.examples)]
+        columns = len(variants_of(findings.examples)) + 2
+        caption = "The paper's figure 2: input and output images, and the truth."
+        told.append(ImageGrid(pictures, columns, caption=caption))
+    told += [
+        Figure(charts, figure.caption)
+        for figure in figures_over_drive()
+        if (charts := figure.charts(findings.windows))
+    ]
+    if told:
+        yield Heading("Over the drive")
+        yield Details("The paper's claims, and its figures 2, 3a and 3b", told)
 
 
 def _claims(findings: Findings) -> Iterator[Block]:
@@ -87,91 +77,29 @@ def _claims(findings: Findings) -> Iterator[Block]:
     table = Table(
         ["claim", "borne out by", *(["shorter, at the end"] if short else [])],
         rows,
-        caption=f"Windows of {findings.facts.evaluation.window} frames that bear it out, of those "
-        "in which both rates are defined. Equal rates do not.",
+        caption=f"Windows of {findings.facts.evaluation.window} frames that bear a claim out, of "
+        "those in which both rates are defined; windows.csv has their rates.",
     )
-    yield KeepTogether([Heading("What the paper claims", 2), Text(NO_NUMBERS), table])
-
-
-def _rates_tables(findings: Findings) -> Iterator[Block]:
-    """Tabulate the windows; several tables where the variants do not fit side by side."""
-    together = RATES if len(findings.finals) <= SIDE_BY_SIDE else 1
-    names = [*FULL]
-    for place in range(0, len(names), together):
-        yield _rates_table(findings, names[place : place + together])
-    size = findings.window_size
-    long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
-    rest = score.each_window(findings.windows)["frames"][-1]
-    short = f" The last row holds {rest}." if rest < size else ""
-    yield Text(
-        f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long}{short} "
-        "The last line is the mean over all evaluated frames.",
-        "note",
-    )
-
-
-def _rates_table(findings: Findings, rates: Sequence[str]) -> Table:
-    windows, names = findings.windows, [*findings.finals]
-    masks = zip(*(windows[each] for each in ("variant", "stage", "window")), strict=True)
-    places = {mask: place for place, mask in enumerate(masks)}
-
-    def cell(name: str, window: int, rate: str) -> str:
-        place = places.get((name, findings.finals[name], window))
-        return percent(None if place is None else float(windows[rate][place]))
-
-    each = score.each_window(windows)
-    spans = (each[name].tolist() for name in ("window", "first_frame", "last_frame"))
-    rows: list[list[Cell | str]] = [
-        [
-            _span(first, last),
-            *(cell(name, number, rate) for rate in rates for name in names),
-        ]
-        for number, first, last in zip(*spans, strict=True)
-    ]
-    whole = [percent(findings.total(name).get(rate)) for rate in rates for name in names]
-    rows.append([Cell(text, bold=True) for text in ("all", *whole)])
-    return Table(
-        ["frames", *(name for _ in rates for name in names)],
-        rows,
-        breaks=[len(rows) - 1],
-        groups=[("", 1), *((f"{rate}, %", len(names)) for rate in rates)],
-        small=True,
-    )
-
-
-def _span(first: int, last: int) -> str:
-    return str(first) if first == last else f"{first}{DASH}{last}"
+    yield table
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
-    """Yield what the filter changed, how much masks flicker, and who beats the baseline."""
-    filters = [each for each in findings.paired if each.control != BASELINE]
-    blind = [each for each in findings.paired if each.control == BASELINE]
-    for each in filters:
-        yield Heading("Filtered against unfiltered")
-        yield from _paired(findings, each)
-    if blind:
-        yield Heading("Against a guess that never looks at the image", 2 if filters else 1)
-        yield _against_baseline(findings, blind)
-        yield Text(
-            f"{BASELINE}: the training frames' mean truth, thresholded at one half. A variant that "
-            "does not beat it has learnt nothing from the pixels. Differences are the variant "
-            "minus the guess, with intervals that allow for neighbouring frames' likeness.",
-            "note",
-        )
-    if legend := correction(pair.differences["ERR"] for pair in findings.paired):
-        yield Text(legend, "note")
+    """Yield what the filter and each variant change, and how much masks flicker."""
+    if findings.paired:
+        yield Heading("What the filter and the variants change")
+        yield _differences(findings)
+        yield Text(_method(findings.paired), "note")
+    for pair in findings.paired:
+        if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
+            yield from _frame_by_frame(findings, pair)
     yield from _flicker(findings)
 
 
-def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
-    yield _differences(findings, pair)
+def _frame_by_frame(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
     change = pair.differences["ERR"]
     if not defined(change.mean):
         yield Text("ERR is undefined on every frame, so the effect of the filter on it is unknown.")
         return
-    yield Text(_method(change), "note")
-    yield Text(frames_changed(pair))
     if pair.pixels is not None:
         yield Text(pixels_changed(findings, pair))
     columns = pair.frames["frame"], pair.frames["ERR"]
@@ -181,48 +109,55 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
     )
 
 
-def _differences(findings: Findings, pair: PairedComparison) -> Table:
-    names = [pair.treated, pair.control]
+def _differences(findings: Findings) -> Table:
+    """Tabulate each variant's final mask against unfiltered and the baseline, a row each."""
+    names, pairs = [*findings.finals], findings.paired
+    others = [rate for rate in SHORT if rate != "ERR"]
     return Table(
-        ["rate", *names, "difference, pp", "interval, pp", "frames", "effective"],
+        [
+            *("difference", "from, %", "to, %", "ERR, pp", "interval, pp"),
+            *(*(f"{rate}, pp" for rate in others), "better", "worse", "effective"),
+        ],
         [
             [
-                rate,
-                *(percent(findings.total(name)[rate]) for name in names),
-                Cell(points(change.mean), bold=True),
+                replace(
+                    variant_cell(pair.treated, names),
+                    text=f"{pair.treated} {MINUS} {pair.control}",
+                ),
+                *(percent(findings.total(name)["ERR"]) for name in (pair.control, pair.treated)),
+                Cell(points((change := pair.differences["ERR"]).mean), bold=True),
                 marked_interval(change),
-                number(change.units),
+                *(points(pair.differences[rate].mean) for rate in others),
+                *(number(int((sign * pair.frames["ERR"] > 0).sum())) for sign in (-1, 1)),
                 DASH if change.effective is None else f"{change.effective:.0f}",
             ]
-            for rate, change in pair.differences.items()
+            for pair in pairs
         ],
-        caption=(
-            f"Paired differences of the final masks, {pair.treated} minus {pair.control}: percent, "
-            "and percentage points with their interval."
-        ),
+        breaks=[
+            place
+            for place, (above, below) in enumerate(pairwise(pairs), 1)
+            if above.control != below.control
+        ],
+        groups=[("", 1), ("ERR", 4), ("", len(others)), ("frames", 3)],
+        small=True,
     )
 
 
-def _method(change: Difference) -> str:
-    if change.low is None:
-        return f"No interval for ERR: {change.none_because}."
-    return (
-        f"{percent(change.confidence, 0)} % intervals. Neighbouring frames resemble each other, "
-        "and the intervals are the wider for it; effective is the number of independent frames "
-        "that would say as much. All of this is about this drive only."
-    )
-
-
-def frames_changed(pair: PairedComparison) -> str:
-    """Return on how many frames the filter lowers ERR, raises it and leaves it."""
-    better, same, worse = (int((np.sign(pair.frames["ERR"]) == sign).sum()) for sign in (-1, 0, 1))
-    count = max(better + same + worse, 1)
-    parts = [
-        f"lowers ERR on {better} frames ({percent(better / count, 0)} %)",
-        f"raises it on {worse} ({percent(worse / count, 0)} %)",
-        *([f"leaves it on {same} ({percent(same / count, 0)} %)"] if same else []),
+def _method(pairs: Sequence[PairedComparison]) -> str:
+    changes = [pair.differences["ERR"] for pair in pairs]
+    told = [
+        f"Final masks. {BASELINE}: a guess that never looks at the image, the training frames' "
+        "mean truth thresholded at one half."
     ]
-    return f"Of {better + same + worse} frames the filter {listing(parts)}."
+    if known := [change for change in changes if change.low is not None]:
+        told.append(
+            f"{percent(known[0].confidence, 0)} % intervals, of this drive only, allow for "
+            "neighbouring frames that resemble each other; effective: the number of independent "
+            "frames that would say as much."
+        )
+    why = dict.fromkeys(change.none_because for change in changes if change.low is None)
+    told += [f"No interval for ERR: {reason}." for reason in why if reason]
+    return " ".join(filter(None, [*told, correction(changes)]))
 
 
 def pixels_changed(findings: Findings, pair: PairedComparison) -> str:
@@ -243,8 +178,7 @@ def _flicker(findings: Findings) -> Iterator[Block]:
     known = {name: each for name, each in findings.facts.beyond.items() if defined(each["flicker"])}
     if not known:
         return
-    yield Heading("From one frame to the next", 2)
-    yield Table(
+    table = Table(
         ["final mask", "flicker, %", "the truth's own, %", "beyond it, pp", "pairs of frames"],
         [
             [
@@ -257,33 +191,13 @@ def _flicker(findings: Findings) -> Iterator[Block]:
             for name, each in known.items()
         ],
     )
-    yield Text(
+    meaning = Text(
         "Flicker: the share of pixels, labelled in both of two frames read one after the other, "
         "whose mask differs. What moves must change, as the truth does; only what goes beyond it "
-        "is unrest. Motion is not taken out.",
+        "is unrest.",
         "note",
     )
-
-
-def _against_baseline(findings: Findings, blind: Sequence[PairedComparison]) -> Table:
-    return Table(
-        ["final mask", "ERR", "difference, pp", "interval, pp", "frames better", "frames worse"],
-        [
-            [
-                variant_cell(pair.treated, [*findings.finals]),
-                percent(findings.total(pair.treated)["ERR"]),
-                Cell(points((change := pair.differences["ERR"]).mean), bold=True),
-                marked_interval(change),
-                number(int((pair.frames["ERR"] < 0).sum())),
-                number(int((pair.frames["ERR"] > 0).sum())),
-            ]
-            for pair in blind
-        ],
-    )
-
-
-SHARES: Final = {"ERR": "ERR within, %", "errors": "share of its wrong pixels, %"}
-"""Columns of `Findings.regions` that are tabulated for each variant, with their titles."""
+    yield Details("From one frame to the next", [table, meaning])
 
 
 def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
@@ -297,9 +211,6 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
-    together = len(findings.finals) <= SIDE_BY_SIDE
-    for columns in [[*SHARES]] if together else [[column] for column in SHARES]:
-        yield regions_table(findings, names, {column: SHARES[column] for column in columns})
     yield Text(_regions_note(findings, names), "note")
     if isinstance(findings, Findings) and findings.heatmaps:
         yield Figure(
@@ -309,54 +220,14 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
         )
 
 
-def regions_table(
-    findings: Findings | FleetFindings, names: Mapping[str, str], columns: Mapping[str, str]
-) -> Table:
-    """Tabulate the regions with their share of the pixels, and some columns for each variant.
-
-    Parameters
-    ----------
-    findings
-        Of the drive.
-    names
-        The regions' titles.
-    columns
-        Some of `SHARES`.
-    """
-    variants = [*findings.finals]
-    found, order = findings.regions, [*names]
-    return Table(
-        ["region", "of all, %", *(name for _ in columns for name in variants)],
-        [
-            [
-                title,
-                percent(found[region, variants[0]]["pixels"], 1),
-                *(percent(found[region, v][column], 1) for column in columns for v in variants),
-            ]
-            for region, title in names.items()
-        ],
-        # A rule above each family of regions that is the whole frame cut in another way.
-        breaks=sorted({order.index(family[0]) for family in partitions(order)} - {0}),
-        groups=[
-            ("", 1),
-            ("pixels", 1),
-            *((title, len(variants)) for title in columns.values()),
-        ],
-        small=True,
-    )
-
-
 def _regions_note(findings: Findings | FleetFindings, names: Mapping[str, str]) -> str:
     width = findings.facts.run.get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
-    shadow = (
-        "Shadow is what the filter took for shadow, right or wrong; where it is not true shadow, "
-        "that is a finding of its own. "
-    )
+    shadow = "Shadow is what the filter took for shadow, right or wrong. "
     return (
         f"{shadow if 'shadow' in names else ''}"
-        f"Near the road's edge means {near} the border between road "
-        "and non-road in the truth. Counts of all evaluated frames together; regions overlap."
+        f"Near the road's edge: {near} the border between road and non-road in the truth. "
+        "Regions overlap; regions.csv has their counts."
     )
 
 
@@ -368,16 +239,16 @@ def stages(findings: Findings) -> Iterator[Block]:
         f"Rates of each stage's mask, means over the frames; {BASELINE}, which has no stages, for "
         "scale.",
     )
-    yield stages_table(findings)
-    if findings.changes:
-        yield Text(
-            "Repaired and spoiled: labelled pixels that the stage has right and the mask before it "
-            f"wrong, and the reverse, over {sampled_frames(findings)}.",
-            "note",
-        )
-    yield Heading("How the error of the final mask comes about", 2)
     yield _parts_table(findings)
     yield Text(_parts_note(findings), "note")
+    numbers: list[Block] = [stages_table(findings)]
+    if findings.changes:
+        note = (
+            "Repaired and spoiled: labelled pixels that the stage has right and the mask before it "
+            f"wrong, and the reverse, over {sampled_frames(findings)}."
+        )
+        numbers.append(Text(note, "note"))
+    yield Details("Every stage in numbers", numbers)
     yield from _oracles(findings)
 
 
@@ -436,8 +307,8 @@ def _parts_note(findings: Findings) -> str:
     first, *rest = max(findings.error_parts.values(), key=len)
     meanings = "".join(f"; {part}: {_meaning(part)}" for part in rest)
     return (
-        f"A sum, in percent of the pixels. {first}: the error of the mask that the last stage is "
-        f"given, without the filter{meanings}. Percentage points add up to ERR."
+        f"How ERR comes about, in percent of the pixels. {first}: the mask that the last stage is "
+        f"given, without the filter{meanings}."
     )
 
 
@@ -451,8 +322,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
     """Yield what remains when a stage is replaced by the truth, where the run counted that."""
     if not findings.oracles:
         return
-    yield Heading("If a stage were perfect", 2)
-    yield Table(
+    table = Table(
         [
             *("variant", "if there were a", "ERR as it is", "ERR then", "change, pp"),
             *(*(f"{name} then" for name in SHORT if name != "ERR"), "frames"),
@@ -472,12 +342,12 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         text_columns=(0, 1),
         small=True,
     )
-    yield Text(
-        "Oracles: the stage's output replaced by the truth while replaying, and the stages after "
-        "it run on that; ignored pixels count as non-road, or lit. No result, but a bound on "
-        "what mending the stage could bring, and what the stages after it lose by themselves.",
+    meaning = Text(
+        "The stage's output is replaced by the truth, and the stages after it run on that; ignored "
+        "pixels count as non-road, or lit: a bound on what mending the stage could bring.",
         "note",
     )
+    yield Details("If a stage were perfect", [table, meaning])
 
 
 def thresholds(findings: Findings) -> Iterator[Block]:
@@ -487,9 +357,7 @@ def thresholds(findings: Findings) -> Iterator[Block]:
     if not quoted or not charts:
         return
     yield Heading("Over thresholds")
-    yield Figure(charts, CURVES_CAPTION)
-    yield _thresholds_table(findings, quoted)
-    yield Text(
+    meanings = Text(
         "All labelled pixels of the evaluated frames together. F is the harmonic mean of precision "
         "and recall; MaxF the greatest over all thresholds, and a threshold that was chosen on the "
         "drive that it is judged on flatters. AP: the mean precision over the steps of recall, "
@@ -498,6 +366,10 @@ def thresholds(findings: Findings) -> Iterator[Block]:
         f"{BINS} equal bins of the probability is from the mean probability there, on average over "
         "the pixels; 0 if probabilities are what they say.",
         "note",
+    )
+    table = _thresholds_table(findings, quoted)
+    yield Details(
+        "Curves, areas and calibration", [Figure(charts, CURVES_CAPTION), table, meanings]
     )
 
 

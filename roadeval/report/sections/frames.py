@@ -34,7 +34,7 @@ LARGE: Final = 420
 SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
 LEAST: Final = 4
-MOST: Final = 5
+MOST: Final = 6
 """Pictures of outcomes that have room beside each other, at least and at most."""
 
 NO_COMMAND: Final = (
@@ -49,7 +49,7 @@ def worst_frames(findings: Findings) -> Iterator[Block]:
     if not findings.worst:
         yield Heading("The worst frames")
         yield Text(f"ERR of {first} is undefined on every frame, so no frame is the worst.")
-    rule = f"Highest ERR of {first}; of neighbouring frames only the worst."
+    rule = f"Highest ERR of {first}; of a scene only the worst, above the mean."
     rows = (row for frame in findings.worst for row in frame.layers if row)
     if stepped := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
         rule += f" Below the errors are the steps of {listing(stepped)}, from left to right."
@@ -146,7 +146,7 @@ class BrowsedFrames:
     variants: Sequence[str]
     """Those that were scored."""
     pictured: frozenset[int]
-    """Frames whose pictures can be had."""
+    """Frames that a server has the pictures of."""
     strips: Sequence[Strip]
     """Frames with their pictures."""
     charts: Sequence[Chart]
@@ -164,17 +164,18 @@ def browser(browsed: BrowsedFrames) -> Iterator[Block]:
     if not browsed.frames:
         return
     shown = _shown(browsed)
+    pictured = frozenset(strip.frame for strip in browsed.strips) or browsed.pictured
     conditions = list(dict.fromkeys(each for facts in shown for each in facts.conditions))
     order = {each: place for place, each in enumerate(conditions)}
     yield Heading("Frames")
     yield FrameBrowser(
         rates=[*SHORT] if browsed.variants else [],
         variants=browsed.variants,
-        rows=[_row(facts, browsed, order) for facts in shown],
+        rows=[_row(facts, browsed, order, pictured) for facts in shown],
         conditions=conditions,
         strips=browsed.strips,
         charts=browsed.charts,
-        first=_first(browsed),
+        first=_first(browsed, pictured),
         compared=_compared(browsed),
         command=browsed.inspect(0).replace(" --frame 0", " --frame {}") if browsed.inspect else "",
         note=_note(browsed, len(shown)),
@@ -197,7 +198,9 @@ def _error(facts: FrameFacts) -> float:
     return error if defined(error) else -1.0
 
 
-def _row(facts: FrameFacts, browsed: BrowsedFrames, order: Mapping[str, int]) -> FrameRow:
+def _row(
+    facts: FrameFacts, browsed: BrowsedFrames, order: Mapping[str, int], pictured: frozenset[int]
+) -> FrameRow:
     return FrameRow(
         facts.frame,
         f"{(facts.stamp_ns - browsed.frames[0].stamp_ns) / 1e9:.2f}",
@@ -208,15 +211,12 @@ def _row(facts: FrameFacts, browsed: BrowsedFrames, order: Mapping[str, int]) ->
         ],
         [order[each] for each in facts.conditions],
         " ".join(facts.notes),
-        facts.frame in browsed.pictured,
+        facts.frame in pictured,
     )
 
 
-def _first(browsed: BrowsedFrames) -> int | None:
-    there = [facts for facts in browsed.frames if facts.frame in browsed.pictured]
-    if browsed.strips:
-        held = {strip.frame for strip in browsed.strips}
-        there = [facts for facts in there if facts.frame in held]
+def _first(browsed: BrowsedFrames, pictured: frozenset[int]) -> int | None:
+    there = [facts for facts in browsed.frames if facts.frame in pictured]
     return max(there, key=_error).frame if there else None
 
 

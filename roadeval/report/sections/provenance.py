@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from roadeval.data.words import number
-from roadeval.report.blocks import Block, Command, Heading, KeepTogether, Table, Text, TwoColumns
+from roadeval.report.blocks import Block, Command, Details, Heading, Table, Text, TwoColumns
 from roadeval.report.findings import Findings, FleetFindings
 from roadeval.results.facts import Facts
 
@@ -22,28 +22,29 @@ OF_A_FLEET: Final = ("output", "run")
 def section(findings: Findings) -> Iterator[Block]:
     """Yield what was run on what, and how to run it again."""
     facts = findings.facts
-    yield Heading("Settings, versions, and how to reproduce this")
+    yield Heading("How to reproduce this")
     if facts.log:
         yield Text(f"Log: {facts.log.path}")
         yield Text(f"SHA-256: {facts.log.sha256}")
         if findings.commands and findings.commands.again:
             yield Command(findings.commands.again(facts.log.path))
             yield Text("The same log, configuration and versions give the same numbers.", "note")
-    for topic in facts.drive.topics:
-        yield Text(topic, "note")
     for name, labels in facts.masks.items():
         yield Text(f"{name}: {labels['path']}, SHA-256: {labels['sha256']}", "note")
+    yield from _methods(facts)
+    about: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
     # The digest of the input says less than the log's checksum and the settings around it.
     known = {n: value for n, value in findings.properties.items() if n != "input" and value != ""}
     if known:
-        yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
-    yield from _methods(facts)
-    yield from _versions_and_seconds(facts)
+        about.append(Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note"))
+    about += _versions_and_seconds(facts)
     if facts.settings:
         first = {"preset": facts.run["preset"]} if "preset" in facts.run else {}
         shared = {name: facts.run[name] for name in TABLES if name in facts.run}
         own = {name: {**first, **each, **shared} for name, each in facts.settings.items()}
-        yield from _settings(settings_rows(own))
+        about.append(_settings(settings_rows(own)))
+    if about:
+        yield Details("Topics, versions, milliseconds, settings", about, on_paper=False)
 
 
 def of_drives(findings: FleetFindings) -> Iterator[Block]:
@@ -61,7 +62,8 @@ def of_drives(findings: FleetFindings) -> Iterator[Block]:
         "note",
     )
     own = {name: value for name, value in facts.run.items() if name not in OF_A_FLEET}
-    yield from _settings([[name, value] for name, value in flattened(own)])
+    settings = _settings([[name, value] for name, value in flattened(own)])
+    yield Details("Settings", [settings], on_paper=False)
 
 
 def _models(findings: FleetFindings) -> str:
@@ -88,18 +90,17 @@ def _methods(facts: Facts) -> Iterator[Block]:
             time = {} if seconds is None else {"ms a frame": f"{1e3 * seconds:.2f}"}
             known = {name: value for name, value in flattened(about) if value != "none"} | time
             rows = [[name, value] for name, value in known.items()]
-            yield KeepTogether([Heading(f"{variant}: {stage}", 2), _words(["what", "value"], rows)])
+            yield Details(f"{variant}: {stage}", [_words(["what", "value"], rows)])
 
 
-def _settings(rows: list[list[str]]) -> Iterator[Block]:
-    """Yield settings in two columns, which may break across pages; without those that are unset."""
+def _settings(rows: list[list[str]]) -> Block:
+    """Return settings in two columns; without those that are unset."""
     rows = [row for row in rows if row[1] != "none"]
     half = -(-len(rows) // 2)
     left, *right = [
         _words(["setting", "value"], part) for part in (rows[:half], rows[half:]) if part
     ]
-    yield Heading("Settings", 2)
-    yield TwoColumns([left], right)
+    return TwoColumns([left], right)
 
 
 def _versions_and_seconds(facts: Facts) -> Iterator[Block]:
@@ -156,6 +157,8 @@ def flattened(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[s
     for name, value in settings.items():
         if isinstance(value, Mapping):
             yield from flattened(value, f"{prefix}{name}.")
+        elif isinstance(value, list | tuple) and any(isinstance(each, Mapping) for each in value):
+            yield from flattened({str(i): each for i, each in enumerate(value)}, f"{prefix}{name}.")
         elif isinstance(value, list | tuple):
             yield f"{prefix}{name}", ", ".join(map(str, value)) or "none"
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Final
 
 from roadeval.data import BASELINE, FINAL_STAGE
@@ -15,7 +16,6 @@ from roadeval.report.blocks import (
     Cell,
     Heading,
     ImageGrid,
-    PageBreak,
     Table,
     TableOfContents,
     Text,
@@ -29,8 +29,6 @@ from roadeval.results.rows import ACCOUNT
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import of_seeds, seeds_in_words, spread_in_words
 
-CROWDED: Final = 7
-"""Rows of the tables and warnings together that leave room for all thumbnails."""
 LOSSES: Final = 3
 """Losses that are named."""
 PARTIAL: Final = (
@@ -61,8 +59,8 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [PARTIAL], "warning")
     yield Text(findings.facts.verdict, "verdict")
-    if note := _how_sure(findings):
-        yield Text(note, "note")
+    if "probably" in findings.facts.verdict:
+        yield Text("Probably: by chance alone, one drive in ten would show as much.", "note")
     if findings.totals:
         yield rates_table(findings)
         if seeds := findings.facts.seeds:
@@ -73,16 +71,11 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
                 "from the least to the greatest.",
             )
             yield Text(of_seeds(seeds), "note")
-    beware = list(warnings(findings))
+    yield Text(_accounting(findings.facts.frames), "note")
     if findings.thumbnails:
-        # A crowded page has room for one row of four only.
-        rows = len(findings.finals) + len(_seeds(findings)) + len(beware)
-        shown = findings.thumbnails[: 4 if rows > CROWDED else None]
-        yield ImageGrid([(image.title, jpeg(image)) for image in shown], 4)
-        yield Text(_legend(findings), "note")
-    yield TwoColumns([_accounting(findings.facts.frames)], [_beware(beware)])
-    yield TableOfContents()
-    yield PageBreak()
+        pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
+        yield ImageGrid(pictures, 4, caption=_legend(findings))
+    yield _beware(list(warnings(findings)))
 
 
 def _of_drives(findings: FleetFindings) -> Iterator[Block]:
@@ -122,17 +115,20 @@ def rates_table(findings: Findings) -> Table:
     """Tabulate every final mask's rates; the best of each column is bold."""
     names = [*findings.finals]
     columns = {title: [*cells] for title, cells in _columns(findings)}
+    rows = zip(*columns.values(), strict=True)
+    counts = [number(findings.total(name)["frames"]) for name in names]
+    alike = len(set(counts)) == 1
     widths = {each["width"] for each in findings.facts.beyond.values()}
     edge = f" Boundary F: the road's edge within {widths.pop()} pixels." if widths else ""
     return Table(
-        ["final mask", "frames", *columns],
+        ["final mask", *([] if alike else ["frames"]), *columns],
         [
-            [variant_cell(name, names), number(findings.total(name)["frames"]), *row]
-            for name, row in zip(names, zip(*columns.values(), strict=True), strict=True)
+            [variant_cell(name, names), *([] if alike else [count]), *row]
+            for name, count, row in zip(names, counts, rows, strict=True)
         ],
         caption=(
-            "Percent. The paper's rates are means over the evaluated frames; pooled ERR, IoU, F1 "
-            f"and precision are of all pixels together.{edge} Bold: the best."
+            f"Percent: means over {counts[0] if alike else 'the evaluated'} frames; pooled ERR, "
+            f"IoU, F1 and precision are of all pixels together.{edge} Bold: the best."
         ),
     )
 
@@ -296,17 +292,6 @@ def _were(count: int) -> str:
     return f"{counted(count, 'drive')} {'was' if count == 1 else 'were'}"
 
 
-def _how_sure(findings: Findings) -> str:
-    changes = [pair.differences["ERR"] for pair in findings.paired]
-    if not any(defined(change.low) for change in changes):
-        return "The verdict concerns this drive only." if findings.totals else ""
-    return (
-        f"In brackets: {percent(changes[0].confidence, 0)} % intervals, which allow for "
-        "neighbouring frames that resemble each other. Probably: by chance alone, one drive in ten "
-        "would show as much in that direction. The verdict concerns this drive only."
-    )
-
-
 def _how_sure_over_drives(facts: FleetFacts) -> str:
     first = next((each for each in facts.effects if each.metric == "ERR" and each.units), None)
     if first is None:
@@ -342,11 +327,17 @@ def _legend(findings: Findings) -> str:
 # --- Accounts -------------------------------------------------------------------------------------
 
 
-def _accounting(frames: FrameAccount) -> Table:
-    rows = [(name.replace("_", " "), getattr(frames, name)) for name in ACCOUNT]
-    rows += [(f"skipped: {why}", count) for why, count in frames.skipped.items()]
-    known = [[name, number(count)] for name, count in rows if count is not None]
-    return Table(["frames", "count"], known, small=True)
+def _accounting(frames: FrameAccount) -> str:
+    """Return what became of the frames; names of one count are together."""
+    counts = ((name.replace("_", " "), getattr(frames, name)) for name in ACCOUNT)
+    known = [each for each in counts if each[1] is not None and each[0] not in frames.skipped]
+    kept = [
+        f"{number(count)} {listing([name for name, _ in group])}"
+        for count, group in groupby(known, lambda each: each[1])
+    ]
+    left_out = [f"{number(count)} {why}" for why, count in frames.skipped.items()]
+    told = f"Frames: {'; '.join(kept)}."
+    return f"{told} Left out: {'; '.join(left_out)}." if left_out else told
 
 
 def _statuses(facts: FleetFacts) -> Table:

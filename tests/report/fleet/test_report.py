@@ -49,12 +49,12 @@ def test_the_first_page_has_the_verdict_the_rates_and_the_differences(findings):
     assert len(effects.rows) == 9
 
 
-def test_the_regions_of_all_drives_are_tabulated(findings):
-    (table,) = tables(drive.regions, findings)
+def test_the_regions_of_all_drives_are_drawn(findings):
+    (figure,) = (each for each in blocks(drive.regions, findings) if isinstance(each, Figure))
     final = Result(findings.source).scores.query("final and region != 'all'")
     sums = final.groupby(["variant", "region"])[["FP", "FN", "N"]].sum()
     names = sorted({region for region, _ in findings.regions})
-    assert len(table.rows) == len(names) > 0
+    assert len(figure.charts[0].names) == len(names) > 0
     for (region, variant), own in findings.regions.items():
         counted = sums.loc[(variant, region)]
         assert own["ERR"] == pytest.approx((counted.FP + counted.FN) / counted.N)

@@ -13,12 +13,12 @@ from roadeval.report.blocks import (
     BulletList,
     Cell,
     Command,
+    Details,
     Figure,
     Heading,
     ImageFile,
     ImageGrid,
     KeepTogether,
-    PageBreak,
     Table,
     TableOfContents,
     Text,
@@ -113,6 +113,8 @@ def test_a_long_legend_takes_lines_and_stays_on_the_page():
         Figure([a_chart(HOSTILE)], ""),
         Figure([a_chart("ERR")], HOSTILE),
         ImageGrid([(HOSTILE, a_png())], 1),
+        ImageGrid([("one", a_png())], 1, caption=HOSTILE),
+        Details(HOSTILE, []),
     ],
     ids=lambda block: type(block).__name__,
 )
@@ -135,11 +137,28 @@ def test_the_same_document_gives_the_same_bytes():
 
 
 def test_headings_are_the_outline_and_the_table_of_contents():
-    content = pdf(a_document(TableOfContents(), Heading("First"), PageBreak(), Heading("Second")))
+    content = pdf(a_document(TableOfContents(), Heading("First"), Heading("Second")))
     assert [entry["/Title"] for entry in reader(content).outline] == ["1 First", "2 Second"]
     contents = reader(content).pages[0]
     assert len(contents["/Annots"]) == 2
-    assert "1 / 2" in contents.extract_text()
+    assert "1 / 1" in contents.extract_text()
+
+
+def test_what_a_page_hides_is_a_part_on_paper_or_is_left_out():
+    hidden = [Details(f"about {on}", [Text(f"told {on}")], on_paper=on) for on in (True, False)]
+    content = pdf(a_document(Heading("One"), *hidden))
+    assert "told True" in text(content)
+    assert "False" not in text(content)
+    one, (two,) = reader(content).outline
+    assert (one["/Title"], two["/Title"]) == ("1 One", "about True")
+
+
+def test_the_caption_of_pictures_is_on_their_page():
+    for above in range(2, 8):
+        pictures = ImageGrid([("one", a_png())] * 3, 2, caption="What they show")
+        blocks = [Table(["n"], [[str(n)] for n in range(above * 6)], small=True), pictures]
+        pages = [page.extract_text() for page in reader(pdf(a_document(*blocks))).pages]
+        assert ["one" in words for words in pages] == ["What they show" in words for words in pages]
 
 
 def test_who_listens_to_a_document_is_told_what_each_part_is_and_what_pictures_show():

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from roadeval.data.words import DASH, MINUS
-from roadeval.report.blocks import Heading, Table, Text
-from roadeval.report.sections.drive import filter_effect, frames_changed, pixels_changed
-from tests.report.making import a_difference, a_pair, plain_rows, some_findings
+from roadeval.report.blocks import Details, Table, Text
+from roadeval.report.sections.drive import filter_effect, pixels_changed
+from tests.report.making import a_difference, a_pair, plain_rows, some_findings, the
 
 
 def texts(findings):
@@ -27,31 +27,29 @@ def test_more_wrong_pixels_are_more_and_fewer_are_fewer(wrong, told):
     )
 
 
-def test_frames_are_lowered_raised_or_left_as_they_are():
+def table_of(findings):
+    table, *_ = (block for block in filter_effect(findings) if isinstance(block, Table))
+    return table
+
+
+def test_each_difference_has_both_errors_how_sure_it_is_and_the_frames_it_won():
     changes = [-0.1, -0.2, -0.3, 0.1, 0.0, math.nan]
-    assert frames_changed(a_pair(changes, [0] * 6)) == (
-        "Of 5 frames the filter lowers ERR on 3 frames (60 %), raises it on 1 (20 %) "
-        "and leaves it on 1 (20 %)."
-    )
-
-
-def test_the_table_has_both_rates_their_difference_and_how_sure_it_is():
-    table, *_ = (
-        block
-        for block in filter_effect(some_findings(paired=[a_pair([-0.1], [-1])]))
-        if isinstance(block, Table)
-    )
-    assert table.columns[1:3] == ["filtered", "unfiltered"]
-    assert plain_rows(table)[0] == [
-        *("ERR", "10.00", "15.00", f"{MINUS}2.00", f"{MINUS}3.00 to {MINUS}1.00 *", "1,200", "40")
+    other = replace(a_pair([0.1, -0.1], [0, 0], control="blind"), treated="unfiltered")
+    table = table_of(some_findings(paired=[a_pair(changes, [0] * 6), other]))
+    change = (f"{MINUS}2.00", f"{MINUS}3.00 to {MINUS}1.00 *", f"{MINUS}2.00", f"{MINUS}2.00")
+    assert plain_rows(table) == [
+        [f"filtered {MINUS} unfiltered", "15.00", "10.00", *change, "3", "1", "40"],
+        [f"unfiltered {MINUS} blind", "12.00", "15.00", *change, "1", "1", "40"],
     ]
+    assert table.breaks == [1]
+    assert sum(columns for _, columns in table.groups) == len(table.columns)
 
 
 def test_where_there_is_no_interval_the_reason_is_given():
     pair = a_pair([-0.1], [-1])
     pair.differences["ERR"] = a_difference(-0.02)
     assert any(
-        text.startswith("No interval for ERR: 1200 frames are too few")
+        "No interval for ERR: 1200 frames are too few" in text
         for text in texts(some_findings(paired=[pair]))
     )
 
@@ -59,31 +57,23 @@ def test_where_there_is_no_interval_the_reason_is_given():
 def test_where_err_is_undefined_nothing_is_said_about_frames():
     pair = a_pair([math.nan], [0])
     pair.differences["ERR"] = a_difference(None)
-    text, *_ = texts(some_findings(paired=[pair]))
+    *_, text = texts(some_findings(paired=[pair]))
     assert text.startswith("ERR is undefined on every frame")
-
-
-def test_against_the_baseline_better_is_a_lower_error():
-    pair = a_pair([-0.1, -0.2, 0.3], [0, 0, 0], control="blind")
-    table, *_ = (b for b in filter_effect(some_findings(paired=[pair])) if isinstance(b, Table))
-    assert table.columns[-2:] == ["frames better", "frames worse"]
-    assert plain_rows(table)[0][-2:] == ["2", "1"]
 
 
 def test_flicker_stands_beside_the_truths_own():
     each = {"boundary_F": 0.5, "width": 5, "flicker": 0.05, "truth_flicker": 0.02, "pairs": 1199}
     unknown = each | {"flicker": None, "truth_flicker": None}
     blocks = list(filter_effect(some_findings(beyond={"filtered": each, "unfiltered": unknown})))
-    (table,) = (block for block in blocks if isinstance(block, Table))
-    assert plain_rows(table) == [["filtered", "5.00", "2.00", "+3.00", "1,199"]]
-    assert "From one frame to the next" in [b.text for b in blocks if isinstance(b, Heading)]
+    hidden = the(Details, blocks)
+    assert plain_rows(the(Table, hidden.blocks)) == [["filtered", "5.00", "2.00", "+3.00", "1,199"]]
+    assert hidden.title == "From one frame to the next"
 
 
 def test_an_unknown_number_of_effective_frames_is_a_dash():
     pair = a_pair([-0.1], [-1])
     pair.differences["ERR"] = replace(pair.differences["ERR"], effective=None)
-    table, *_ = (b for b in filter_effect(some_findings(paired=[pair])) if isinstance(b, Table))
-    assert plain_rows(table)[0][-1] == DASH
+    assert plain_rows(table_of(some_findings(paired=[pair])))[0][-1] == DASH
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ def test_helped_and_harmed_frames_are_told_apart():
     assert said(harmed)[-1] == "The filter changes ERR by +10.00 pp."
 
 
-@pytest.mark.parametrize(("count", "columns"), [(3, 4), (4, 4), (5, 5), (6, 4), (9, 5)])
+@pytest.mark.parametrize(("count", "columns"), [(3, 4), (4, 4), (5, 5), (6, 6), (7, 4), (9, 5)])
 def test_pictures_of_the_outcomes_fill_their_rows(count, columns):
     image = LayerImage("it", np.zeros((4, 4, 3), np.uint8), None, None)
     (blocks,) = shown(some_findings(worst=[a_frame(7, images=[image] * count)]))

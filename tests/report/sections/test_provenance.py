@@ -1,7 +1,7 @@
 """Settings and versions: what all variants share is told once."""
 
-from roadeval.report.blocks import Command, Table, Text, TwoColumns
-from roadeval.report.sections.provenance import section, settings_rows
+from roadeval.report.blocks import Command, Details, Table, Text, TwoColumns
+from roadeval.report.sections.provenance import flattened, section, settings_rows
 from roadeval.results.facts import LogFacts
 from tests.report.making import plain_rows, some_findings, the
 
@@ -24,6 +24,13 @@ def test_settings_are_told_once_where_variants_agree_and_apart_where_they_differ
     ]
 
 
+def test_a_list_of_tables_is_told_setting_by_setting():
+    told = dict(
+        flattened({"nets": [{"name": "a", "size": [4, 3]}, {"name": "b"}], "seeds": [1, 2]})
+    )
+    assert told == {"nets.0.name": "a", "nets.0.size": "4, 3", "nets.1.name": "b", "seeds": "1, 2"}
+
+
 def test_the_log_and_the_command_that_makes_the_results_again_are_given():
     blocks = list(section(some_findings(log=LogFacts("street.mcap", "abc"))))
     texts = [block.text for block in blocks if isinstance(block, Text)]
@@ -33,6 +40,8 @@ def test_the_log_and_the_command_that_makes_the_results_again_are_given():
 
 def test_seconds_are_told_in_milliseconds_beside_the_versions():
     seconds = {"filtered": {"svm": 0.0123}}
-    both = the(TwoColumns, section(some_findings(versions={"numpy": "2.0"}, seconds=seconds)))
+    hidden = the(Details, section(some_findings(versions={"numpy": "2.0"}, seconds=seconds)))
+    assert not hidden.on_paper
+    both = the(TwoColumns, hidden.blocks)
     assert plain_rows(the(Table, both.left)) == [["numpy", "2.0"]]
     assert plain_rows(the(Table, both.right)) == [["filtered", "svm", "12.30"]]

@@ -1,8 +1,10 @@
 """Where the errors are: every region that was counted, with its own numbers."""
 
-from roadeval.report.blocks import Figure, Table, Text
+import pytest
+
+from roadeval.report.blocks import Figure, Text
 from roadeval.report.sections.drive import regions
-from tests.report.making import VARIANTS, plain_rows, some_findings
+from tests.report.making import VARIANTS, some_findings, the
 
 
 def table_of(*regions, variants=VARIANTS):
@@ -18,50 +20,30 @@ def table_of(*regions, variants=VARIANTS):
     }
 
 
-def tables(findings):
-    return [block for block in regions(findings) if isinstance(block, Table)]
+def charts(findings):
+    return the(Figure, regions(findings)).charts
 
 
-def test_each_column_has_its_own_numbers():
-    (table,) = tables(some_findings(regions=table_of("lit", "boundary", "interior")))
-    assert [title for title, _ in table.groups] == [
-        *("", "pixels", "ERR within, %", "share of its wrong pixels, %")
-    ]
-    assert table.columns == ["region", "of all, %", *VARIANTS, *VARIANTS]
-    assert plain_rows(table) == [
-        ["in light", "10.0", "2.0", "2.1", "2.2", "40.0", "40.1", "40.2"],
-        ["near the road's edge", "11.0", "2.3", "2.4", "2.5", "40.3", "40.4", "40.5"],
-        ["away from the road's edge", "12.0", "2.6", "2.7", "2.8", "40.6", "40.7", "40.8"],
-    ]
+def test_each_region_has_its_own_numbers():
+    within, errors = charts(some_findings(regions=table_of("lit", "boundary", "interior")))
+    assert within.names == ["in light", "near the road's edge", "away from the road's edge"]
+    assert [each.name for each in within.series] == [*VARIANTS]
+    assert within.series[1].y == pytest.approx([2.1, 2.4, 2.7])
+    assert errors.series[2].y == pytest.approx([40.2, 40.5, 40.8])
+    assert errors.share == pytest.approx([10, 11, 12])
 
 
 def test_a_region_that_no_one_knows_is_shown_by_its_name():
     findings = some_findings(regions=table_of("boundary", "interior", "wet_asphalt"))
-    (table,) = tables(findings)
-    assert [row[0] for row in table.rows][-1] == "wet asphalt"
-    (figure,) = (block for block in regions(findings) if isinstance(block, Figure))
-    assert figure.charts[0].names[-1] == "wet asphalt"
+    assert charts(findings)[0].names[-1] == "wet asphalt"
 
 
-def test_row_bands_are_named_by_their_rows_below_a_rule():
+def test_row_bands_are_named_by_their_rows():
     names = ("shadow", "boundary", "interior", "band_0", "band_1", "band_2")
-    (table,) = tables(some_findings(regions=table_of(*names)))
-    assert [row[0] for row in table.rows][3:] == [
+    assert charts(some_findings(regions=table_of(*names)))[0].names[3:] == [
         "image rows 0–6, the top",  # noqa: RUF001
         "image rows 7–13",  # noqa: RUF001
         "image rows 14–19, the bottom",  # noqa: RUF001
-    ]
-    assert table.breaks == [1, 3]
-
-
-def test_many_variants_have_a_table_a_number():
-    variants = ("a", "b", "c", "d")
-    findings = some_findings(
-        regions=table_of("boundary", "interior", variants=variants),
-        totals={name: {"post": {}} for name in variants},
-    )
-    assert [table.groups[2][0] for table in tables(findings)] == [
-        *("ERR within, %", "share of its wrong pixels, %")
     ]
 
 

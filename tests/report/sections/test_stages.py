@@ -3,7 +3,7 @@
 from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Table, Text
 from roadeval.report.sections.drive import stages, stages_table
-from tests.report.making import column, plain_rows, some_findings
+from tests.report.making import column, opened, plain_rows, some_findings, the
 
 PARTS = {
     "filtered": {"svm": 0.3, "filter": -0.1, "post": -0.1},
@@ -25,7 +25,7 @@ def test_each_stage_has_its_rates_and_what_it_repaired_and_spoiled():
 
 
 def test_the_parts_of_the_error_add_up_to_it():
-    _, parts = (b for b in stages(some_findings(error_parts=PARTS)) if isinstance(b, Table))
+    parts = the(Table, stages(some_findings(error_parts=PARTS)))
     assert parts.columns == ["final mask", "svm", "filter", "post", "ERR"]
     assert plain_rows(parts) == [
         ["filtered", "30.00", f"{MINUS}10.00", f"{MINUS}10.00", "10.00"],
@@ -36,9 +36,9 @@ def test_the_parts_of_the_error_add_up_to_it():
 def test_the_parts_are_explained():
     (note,) = (b.text for b in stages(some_findings(error_parts=PARTS)) if isinstance(b, Text))
     assert note == (
-        "A sum, in percent of the pixels. svm: the error of the mask that the last stage is "
+        "How ERR comes about, in percent of the pixels. svm: the mask that the last stage is "
         "given, without the filter; filter: what filtered has more or less than unfiltered in "
-        "that mask; post: what post made of it. Percentage points add up to ERR."
+        "that mask; post: what post made of it."
     )
 
 
@@ -46,7 +46,7 @@ def test_an_oracle_shows_what_would_change():
     row = {"variant": "filtered", "oracle": "svm", "as_is": 0.1, "frames": 1200}
     oracles = [row | {"ERR": 0.04, "FPR": 0.05, "FNR": 0.06}]
     findings = some_findings(error_parts=PARTS, oracles=oracles)
-    *_, table = (block for block in stages(findings) if isinstance(block, Table))
+    *_, table = (block for block in opened(stages(findings)) if isinstance(block, Table))
     assert plain_rows(table) == [
         ["filtered", "perfect svm", "10.00", "4.00", f"{MINUS}6.00", "5.00", "6.00", "1,200"]
     ]

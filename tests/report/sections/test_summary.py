@@ -6,8 +6,8 @@ import pytest
 
 from roadeval.report.blocks import BulletList, Table, Text
 from roadeval.report.sections.summary import rates_table, section, warnings
-from roadeval.results.facts import TrainingFacts
-from tests.report.making import a_pair, a_total, column, plain_rows, some_findings
+from roadeval.results.facts import FrameAccount, TrainingFacts
+from tests.report.making import a_total, column, plain_rows, some_findings
 
 
 def bold(table, title):
@@ -73,9 +73,18 @@ def test_the_spread_over_seeds_stands_below_the_rates_and_in_a_sentence():
 def test_every_final_mask_has_its_row():
     rows = plain_rows(rates_table(some_findings()))
     assert rows[1] == [
-        *("unfiltered", "1,200", "15.00", "16.00", "17.00", "85.00", "16.00"),
+        *("unfiltered", "15.00", "16.00", "17.00", "85.00", "16.00"),
         *("60.00", "60.00", "70.00"),
     ]
+
+
+def test_the_frames_are_a_column_only_where_they_differ():
+    findings = some_findings()
+    assert "means over 1,200 frames" in rates_table(findings).caption
+    findings.totals["filtered"]["post"]["frames"] = 7
+    table = rates_table(findings)
+    assert column(table, "frames") == ["7", "1,200", "1,200"]
+    assert "means over the evaluated frames" in table.caption
 
 
 def test_who_is_worse_than_the_baseline_is_named():
@@ -110,18 +119,14 @@ def test_a_drive_that_trained_itself_says_so():
 
 
 def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
-    findings = some_findings(paired=[a_pair([-0.1], [-1])])
+    account = FrameAccount(1210, 1210, evaluated=1200, skipped={"trained on": 10})
+    findings = some_findings(verdict="It helps. It probably does.", frames=account)
     blocks = list(section(findings))
     texts = [block.text for block in blocks if isinstance(block, Text)]
-    assert texts[0] == "It helps."
-    assert texts[1].startswith("In brackets: 95 % intervals, which allow for neighbouring frames")
-    (counts,) = (block.left[0] for block in blocks if hasattr(block, "left"))
-    assert isinstance(counts, Table)
-    assert plain_rows(counts) == [
-        ["in log", "1,210"],
-        ["trained on", "0"],
-        ["evaluated", "1,200"],
-        ["skipped: trained on", "10"],
+    assert texts == [
+        "It helps. It probably does.",
+        "Probably: by chance alone, one drive in ten would show as much.",
+        "Frames: 1,210 in log and read; 1,200 evaluated. Left out: 10 trained on.",
     ]
 
 

@@ -7,7 +7,7 @@ from roadeval.data.words import DASH
 from roadeval.report.blocks import Figure, Table
 from roadeval.report.sections.drive import thresholds
 from tests.evaluation.making import rows_of
-from tests.report.making import plain_rows, some_findings
+from tests.report.making import opened, plain_rows, some_findings
 
 BINS = [
     {"pixels": 10, "probability": 0.1, "road": 0.2},
@@ -43,7 +43,7 @@ def findings(**quoted):
 
 
 def test_what_is_quoted_stands_beside_the_mask_as_it_is():
-    (table,) = (block for block in thresholds(findings()) if isinstance(block, Table))
+    (table,) = (block for block in opened(thresholds(findings())) if isinstance(block, Table))
     assert plain_rows(table) == [
         [
             *("filtered", "post", "8", "91.00", "92.00", "7.00", "93.00", "40.00", "95.00"),
@@ -54,7 +54,7 @@ def test_what_is_quoted_stands_beside_the_mask_as_it_is():
 
 
 def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
-    (figure,) = (block for block in thresholds(findings()) if isinstance(block, Figure))
+    (figure,) = (block for block in opened(thresholds(findings())) if isinstance(block, Figure))
     recall, roc, reliability = figure.charts
     curve, mask, *_ = recall.series
     # Of 6 road and 9 other pixels, 4 and 1 are of the higher level.
@@ -68,7 +68,7 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
 
 
 def test_the_axes_begin_and_end_where_the_masks_lie():
-    (figure,) = (block for block in thresholds(findings()) if isinstance(block, Figure))
+    (figure,) = (block for block in opened(thresholds(findings())) if isinstance(block, Figure))
     recall, roc, reliability = figure.charts
     # Half of the room at least; the FPR of the mask is 25 %.
     assert (recall.x_range, recall.y_range) == ((50, 101), (50, 101))
@@ -83,7 +83,7 @@ def numbers(series):
 
 def test_what_is_undefined_is_a_dash():
     undefined = dict.fromkeys(("AP", "AUC", "MaxF", "threshold", "precision", "recall"))
-    (table,) = (b for b in thresholds(findings(**undefined)) if isinstance(b, Table))
+    (table,) = (b for b in opened(thresholds(findings(**undefined))) if isinstance(b, Table))
     assert plain_rows(table)[0].count(DASH) == 6
 
 

@@ -26,10 +26,16 @@ class Browser {
       this.stage.toggle();
     });
     range.onChange.push(() => this.filter());
-    const asked = /^#frame-(\d+)$/.exec(location.hash);
-    const first = asked ? asked[1] : element.dataset.first;
-    if (first !== "") this.show(Number(first), Boolean(asked));
-    else for (const each of this.held.values()) each.hidden = true;
+    for (const each of this.held.values()) each.hidden = true;
+    this.follow(Boolean(location.hash));
+    addEventListener("popstate", () => this.follow(true));
+  }
+
+  /** Show the frame of the address, or without one the first. */
+  follow(scroll) {
+    const named = /^#frame-(\d+)$/.exec(location.hash);
+    const frame = named ? named[1] : this.element.dataset.first;
+    if (frame !== "" && (named || !location.hash || this.frame === undefined)) this.show(Number(frame), { scroll: scroll && Boolean(named), address: null });
   }
 
   tools() {
@@ -55,8 +61,7 @@ class Browser {
 
   /** Frames that can be looked at, in the drive's order; of the filtered ones, if any is. */
   pictured() {
-    const can = (row) => (this.live ? row.classList.contains("pictured") : this.held.has(Number(row.dataset.frame)));
-    const all = this.rows.filter(can);
+    const all = this.rows.filter((row) => row.classList.contains("pictured"));
     const shown = all.filter((row) => !row.hidden);
     return (shown.length ? shown : all).map((row) => Number(row.dataset.frame)).sort((a, b) => a - b);
   }
@@ -64,11 +69,13 @@ class Browser {
   step(by) {
     const frames = this.pictured();
     const next = by > 0 ? frames.find((each) => each > this.frame) : frames.findLast((each) => each < this.frame);
-    if (next !== undefined) this.show(next, false, true);
+    if (next !== undefined) this.show(next, { follow: true, address: "replaceState" });
   }
 
-  async show(frame, scroll = false, follow = false) {
+  /** Show a frame; the address names it, as a step to go back from or in the place of the last. */
+  async show(frame, { scroll = false, follow = false, address = "pushState" } = {}) {
     this.frame = frame;
+    if (address && location.hash !== `#frame-${frame}`) history[address](null, "", `#frame-${frame}`);
     this.element.querySelector(".viewer").hidden = false;
     const row = this.byFrame.get(frame);
     for (const each of this.rows) each.removeAttribute("aria-current");
@@ -96,11 +103,17 @@ class Browser {
   }
 
   tellAbsent(frame) {
-    const command = this.element.dataset.command.replace("{}", frame);
-    const words = document.createElement("code");
+    const [command, words] = [this.element.dataset.command.replace("{}", frame), document.createElement("code")];
     words.textContent = command;
-    this.absent.replaceChildren("This page holds no pictures of this frame. ");
-    if (command) this.absent.append("In the viewer: ", words);
+    this.absent.replaceChildren("This page holds no pictures of this frame. ", this.byFrame.get(frame)?.dataset.note ?? "");
+    const near = this.pictured().sort((a, b) => Math.abs(a - frame) - Math.abs(b - frame))[0];
+    if (near !== undefined) {
+      const button = document.createElement("button");
+      button.textContent = `Frame ${near}, the nearest with pictures`;
+      button.addEventListener("click", () => this.show(near, { follow: true }));
+      this.absent.append(" ", button);
+    }
+    if (command) this.absent.append(" In the viewer: ", words);
   }
 
   /** Ask the server for a frame's pictures. */
@@ -152,13 +165,11 @@ class Browser {
       return rate === wanted.rate && (!wanted.variant || variant === wanted.variant) ? [place] : [];
     });
     const fits = (value) => !(value < least) && !(value > most) && !(Number.isNaN(value) && (least >= 0 || most >= 0));
-    const words = (wanted.note ?? "").trim().toLowerCase();
     for (const row of this.rows) {
       const frame = Number(row.dataset.frame);
       const inRate = !places.length || places.some((place) => fits(numberOf(row.cells[place].textContent)));
       const inRange = !range.whole || (frame >= range.low && frame <= range.high) || range.low === range.high;
-      const note = row.cells[row.cells.length - 1].textContent.toLowerCase();
-      row.hidden = !(inRate && inRange && hasCondition(row, wanted.condition) && note.includes(words));
+      row.hidden = !(inRate && inRange && hasCondition(row, wanted.condition));
     }
     this.hideColumns(wanted.variant);
     const shown = this.rows.filter((row) => !row.hidden).length;

@@ -38,7 +38,7 @@ for (const long of document.querySelectorAll(".long")) makeSearchable(long);
 makeCommands(document);
 const element = document.querySelector(".browser");
 let browser = null;
-startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), true));
+startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), { scroll: true }));
 startPlaces();
 if (element) browser = new Browser(element);
 followOutline();
@@ -64,7 +64,5 @@ for (const button of document.querySelectorAll(".opens")) {
 for (const image of document.querySelectorAll(".grid img, figure.picture img, section > .strip img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }
-addEventListener("hashchange", () => {
-  const asked = /^#frame-(\d+)$/.exec(location.hash);
-  if (asked && browser) browser.show(Number(asked[1]), true);
-});
+// What was closed had no width to fit a chart's numbers into.
+for (const more of document.querySelectorAll("details")) more.addEventListener("toggle", () => dispatchEvent(new Event("resize")));
