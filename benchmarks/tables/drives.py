@@ -130,7 +130,7 @@ CLASSES: Final = {"road": [3], "ignore": [11]}
 DRIVES: Final = {
     drive.name: drive
     for drive in (
-        Drive("synthetic_0", "synthetic, seed 0 (ships)", synthetic(0), tuned=True),
+        Drive("synthetic_0", "synthetic, seed 0", synthetic(0), tuned=True),
         Drive("synthetic_1", "synthetic, seed 1", synthetic(1)),
         Drive("synthetic_2", "synthetic, seed 2", synthetic(2)),
         Drive(

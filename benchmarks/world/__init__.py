@@ -13,6 +13,7 @@ while the shutter is open.
 """
 
 from benchmarks.world.drive import (
+    DEMO,
     IMAGE_TOPIC,
     ROAD_TOPIC,
     SHADOW_TOPIC,
@@ -24,6 +25,7 @@ from benchmarks.world.drive import (
 )
 
 __all__ = [
+    "DEMO",
     "IMAGE_TOPIC",
     "ROAD_TOPIC",
     "SHADOW_TOPIC",

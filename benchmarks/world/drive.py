@@ -88,6 +88,12 @@ class RenderSettings:
         return self.frames / self.rate_hz
 
 
+DEMO: Final = RenderSettings(rate_hz=2.0, seed=6)
+"""The drive that ships: 50 seconds, so that its frames differ. Of eight seeds looked at, this one
+shows most at once: the shadow filter mends most of it, harms at its begin, and fails in a full
+shade. No setting was chosen on it."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SynthFrame:
     """A rendered frame with its truth.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import traceback
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Final
@@ -28,6 +29,8 @@ COLLECT_EVERY: Final = 400_000
 of which stay; with Python's own threshold the searches take a sixth of a short run."""
 THREADS: Final = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"}
 """The variables that OpenBLAS reads, in its order."""
+_NO_NUMBER: Final = re.compile(r"Input should be a valid (number|integer), .*")
+_NUMBERS: Final = {"number": "number, as 0.5", "integer": "whole number"}
 
 app = typer.Typer(
     add_completion=False,
@@ -170,6 +173,7 @@ def _usage(error: typer.TyperException) -> str:
     sentence = error.format_message().replace("Value error, ", "").rstrip(".")
     # No single value is invalid where options do not go together.
     sentence = sentence.removeprefix("Invalid value: ")
+    sentence = _NO_NUMBER.sub(lambda found: f"must be a {_NUMBERS[found[1]]}", sentence)
     context = getattr(error, "ctx", None)
     sentence = messages.one_line(sentence)
     return f"{sentence}; see '{context.command_path} --help'" if context else sentence

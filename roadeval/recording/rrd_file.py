@@ -255,7 +255,7 @@ def _places(store: LazyStoreInternal) -> dict[str, list[Place]]:
 def _reason(path: Path) -> str:
     with path.open("rb") as file:
         if file.read(4) != b"RRF2":
-            return f"{path}: not a recording (.rrd)"
+            return f"{path}: not a recording (.rrd); 'roadeval replay' makes one of a log"
     return (
         f"{path}: the recording is torn; "
         f"'rerun rrd optimize --continue-on-error {path} -o repaired.rrd' keeps what is whole"

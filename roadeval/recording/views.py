@@ -2,7 +2,8 @@
 
 The first tab is an overview that fits a screen of 1920x1080. From top to bottom: what the camera
 saw and what went wrong; a row a variant with its phases from left to right, equal phases below each
-other; the rates over time. Further tabs hold every layer and every number.
+other; the rates over time, how each frame went and what was noted. Further tabs hold every layer
+and every number.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ _LEAST_PICTURE: Final = 200
 
 _ROWS: Final = 2
 """Most variants that have a row: more would leave every picture too small to read."""
-_OUTCOMES: Final = 3
+_OUTCOMES: Final = 4
 """Most variants whose errors are at the top."""
 
 Cell = tuple[LayerSpec, ...]
@@ -118,8 +119,7 @@ def overview(layout: Layout) -> BlueprintPart:
     rows = {variant.name: _cells(variant) for variant in layout.variants[:_ROWS]}
     columns = max(map(len, rows.values()))
     shortest = min(rows, key=lambda name: len(rows[name]))
-    free = columns - len(rows[shortest])
-    aside = {shortest: events(wide=free > 2)} if free > 1 else {}
+    aside = {shortest: _events()} if len(rows[shortest]) + 1 < columns else {}
 
     pictures = [camera(), *([truth()] if layout.has_truth else [])]
     pictures += [outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]]
@@ -133,7 +133,7 @@ def overview(layout: Layout) -> BlueprintPart:
     return rrb.Vertical(
         rrb.Horizontal(*pictures, guide, column_shares=shares),
         *(_row(name, cells, columns, aside.get(name)) for name, cells in rows.items()),
-        rrb.Horizontal(*_curves(layout), *([] if aside else [events(wide=False)])),
+        rrb.Horizontal(*_curves(layout), *([] if aside else [_events()])),
         row_shares=[top, *[row] * len(rows), max(_HEIGHT - top - row * len(rows), _LEAST_CURVES)],
         name="Overview",
     )
@@ -158,13 +158,16 @@ def _cells(variant: VariantLayout) -> list[Cell]:
 def _row(
     variant: str, cells: Sequence[Cell], columns: int, aside: BlueprintPart | None
 ) -> BlueprintPart:
-    """Return a variant's row, filled from the right, so that equal phases are aligned."""
+    """Return a variant's row, filled from the right, so that equal phases are aligned.
+
+    What has its place beside a short row stands before the row's header, which parts the two.
+    """
     width = (_WIDTH - _HEADER) / columns
     space = (columns - len(cells)) * width
     # Titles must be short here: the layers' names.
     pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
     header = document(at.guide_path(variant))
-    start, shares = ([header, aside], [_HEADER, space]) if aside else ([header], [_HEADER + space])
+    start, shares = ([aside, header], [space, _HEADER]) if aside else ([header], [_HEADER + space])
     return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[width] * len(cells)])
 
 
@@ -176,7 +179,7 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
     finals += [(BASELINE, FINAL_STAGE)] * layout.baseline
     return [
         plot(
-            f"{rate}: {SHORT[rate].in_words}",
+            f"{rate} as a fraction: {SHORT[rate].in_words}",
             [at.scalar_path("metrics", *final, rate) for final in finals],
         )
         for rate in SHORT
@@ -241,9 +244,8 @@ def document(path: str, title: str | None = None) -> BlueprintPart:
     )
 
 
-def events(*, wide: bool) -> BlueprintPart:
-    """Return views of how frames were used, of each variant's health, and of the notes."""
-    state = rrb.StateTimelineView(origin="/state", name="How it went")
+def _events() -> BlueprintPart:
+    """Return, side by side, how frames were used with each variant's health, and the notes."""
     notes = rrb.TextLogView(
         origin=at.NOTES,
         contents=[at.NOTES],
@@ -251,9 +253,8 @@ def events(*, wide: bool) -> BlueprintPart:
         columns=rrb.TextLogColumns(timeline_columns=[at.FRAME], text_log_columns=["body"]),
         format_options=rrb.TextLogFormat(monospace_body=False),
     )
-    return (
-        rrb.Horizontal(state, notes, column_shares=[1, 2]) if wide else rrb.Vertical(state, notes)
-    )
+    states = rrb.StateTimelineView(origin="/state", name="How each frame went")
+    return rrb.Horizontal(states, notes, column_shares=[2, 3])
 
 
 StaticData = Iterator[tuple[str, list[Any]]]
@@ -287,7 +288,8 @@ _ERRORS: Final = """\
 *grey* ignored.
 """
 _ROW_GUIDE: Final = """\
-**Rows:** a variant each, its phases from left to right; *green* is what a phase calls road.
+**Rows:** the phases of {rows} from left to right; *green* is what a phase calls road.
+{others}
 """
 _CURVES: Final = """\
 **Curves:** rates of the final masks; *blind*, the training frames' mean truth, never looks at the
@@ -312,9 +314,7 @@ def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> Stati
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
     yield at.GUIDE, [_markdown(guide(layout))]
     for variant in layout.variants:
-        # A heading would break the name in a column as narrow as this one.
-        words = f"**{as_markdown(variant.name)}**\n\n{as_markdown(variant.title)}\n"
-        yield at.guide_path(variant.name), [_markdown(words)]
+        yield at.guide_path(variant.name), [_markdown(_header(variant))]
     yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **layout.properties)]
     for name, header in layout.tables.items():
         yield at.result_path(name), [rr.AnyValues(header=header.rstrip())]
@@ -357,6 +357,9 @@ def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData
     """
     summary = json.loads(texts.get(at.SUMMARY, "{}"))
     yield at.GUIDE, [_markdown(guide(layout, str(summary.get("verdict", ""))))]
+    for variant in layout.variants:
+        final = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
+        yield at.guide_path(variant.name), [_markdown(_header(variant, final))]
     yield at.result_path(at.OVERVIEW), [_markdown(results_in_words(layout, summary))]
     yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
     kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
@@ -377,10 +380,24 @@ def _line(name: str, colour: Colour) -> rr.SeriesLines:
 
 def guide(layout: Layout, verdict: str = "") -> str:
     """Return the guide to the first tab, after the verdict on the drive if there is one yet."""
-    parts = [_ERRORS, _ROW_GUIDE, _CURVES] if layout.has_truth else [_NO_TRUTH, _ROW_GUIDE]
+    names = [as_markdown(variant.name) for variant in layout.variants]
+    others = " and ".join(names[_ROWS:])
+    rows = _ROW_GUIDE.format(
+        rows=" and ".join(names[:_ROWS]),
+        others=f"Those of {others} have tabs of their own." if others else "",
+    )
+    parts = [_ERRORS, rows, _CURVES] if layout.has_truth else [_NO_TRUTH, rows]
     return "\n".join(
         [f"### {as_markdown(layout.drive)}", "", as_markdown(verdict), "", *parts, _HANDLING]
     )
+
+
+def _header(variant: VariantLayout, rates: Mapping[str, Any] | None = None) -> str:
+    """Return a row's header: name and title, and the rates of its final mask if they are known."""
+    # A heading would break the name in a column as narrow as this one.
+    parts = [f"**{as_markdown(variant.name)}**", as_markdown(variant.title)]
+    parts += [f"{name} {percent(rates[name])} %" for name in SHORT if rates and name in rates]
+    return "\n\n".join(parts) + "\n"
 
 
 def results_in_words(layout: Layout, summary: Mapping[str, Any]) -> str:

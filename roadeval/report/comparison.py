@@ -169,10 +169,15 @@ def overview(
 
 
 def _changes(comparison: Comparison) -> Iterator[Block]:
-    """Yield a table a result: ERR of each stage, and every rate of final masks."""
+    """Yield a table a result: ERR of each stage, and every rate of final masks.
+
+    Variants of which no stage changed have no rows.
+    """
     base = comparison.results[0].label
     alone = all(row.result == row.variant for row in comparison.changes)
-    for result, rows in _by(comparison.changes, lambda row: "" if alone else row.result):
+    changed = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
+    shown = [row for row in comparison.changes if (row.result, row.variant) in changed]
+    for result, rows in _by(shown, lambda row: "" if alone else row.result):
         drives = max(row.drives for row in rows)
         over = f": {drives} drives in common" if drives > 1 else ""
         lines: list[list[Cell | str]] = []

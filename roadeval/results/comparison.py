@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from roadeval.data.words import first_of, percent, plain_points
+from roadeval.data.words import first_of, listing, percent, plain_points
 from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
 from roadeval.evaluation.score import TESTED
 from roadeval.results.sentences import is_significant, levels, sentence
@@ -62,7 +63,18 @@ def verdict(comparison: Comparison) -> str:
     finals = comparison.finals()
     base = comparison.results[0].label
     several = len({change.variant for change in finals}) > 1
-    return " ".join(_sentence(change, base, comparison, several=several) for change in finals)
+    changed = [change for change in finals if not change.unchanged] or finals[:1]
+    parts = [_sentence(change, base, comparison, several=several) for change in changed]
+    return " ".join([*parts, *unchanged(comparison, [c for c in finals if c not in changed])])
+
+
+def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
+    """Yield the masks that are as they were, a sentence a result."""
+    base = comparison.results[0].label
+    for result, rows in groupby(masks, lambda row: row.result):
+        names = dict.fromkeys(row.variant for row in rows)
+        of = "" if [*names] == [result] else f" of {result}"
+        yield f"{listing([*names])}{of}: every frame as in {base}."
 
 
 def _sentence(change: Change, base: str, comparison: Comparison, *, several: bool) -> str:
@@ -78,7 +90,9 @@ def _sentence(change: Change, base: str, comparison: Comparison, *, several: boo
 
 def where(comparison: Comparison) -> list[str]:
     """Return where final masks are surely better or worse: regions, frames and drives."""
+    still = {(each.result, each.variant) for each in comparison.finals() if each.unchanged}
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
+    masks = {mask: None for mask in masks if mask not in still}
     return [
         *(_by_region(comparison, *mask) for mask in masks),
         *_disagreements(comparison),

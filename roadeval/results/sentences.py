@@ -118,11 +118,12 @@ def sentence(
     if levels is not None:
         before, after = (_size(level, 1 if abs(found.mean) >= FINE else 2) for level in levels)
         by = f"from {before} to {after} %"
-    doubt = _doubt(found, settings)
-    if doubt == said and degree(found, settings) is Degree.UNKNOWN:
-        doubt = "on others that is unclear, too"
+    doubt = f"; {_doubt(found, settings)}"
+    if doubt == f"; {said}":
+        again = {Degree.UNKNOWN: "; on others that is unclear, too", Degree.FEW: ""}
+        doubt = again.get(degree(found, settings), doubt)
     verb = "raises" if found.mean > 0 else "lowers"
-    return f"{here} {what} {verb} {rate} {by}{windows}{_counted(found)}; {doubt}."
+    return f"{here} {what} {verb} {rate} {by}{windows}{_counted(found)}{doubt}."
 
 
 def levels(

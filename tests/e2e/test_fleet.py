@@ -88,6 +88,13 @@ def tables(folder):
     }
 
 
+def finals(folder):
+    """The scores of the filtered variant's final masks, a row a drive."""
+    rows = pq.read_table(folder / "scores.parquet").to_pylist()
+    wanted = {"variant": "filtered", "stage": "post", "region": "all"}
+    return [row for row in rows if wanted.items() <= row.items()]
+
+
 @pytest.fixture(scope="module")
 def ran(drives, tmp_path_factory):
     """A fleet of which the recording of the worst drive was kept."""
@@ -110,8 +117,14 @@ def test_dasks_workers_replay_every_drive_and_the_broken_one_is_named(drives, ra
     assert done.returncode == 3, done.stderr
     assert "3 drives: 2 scored, 1 failed; 20 frames evaluated" in done.stdout
     (said,) = [line for line in done.stderr.splitlines() if "warning" in line]
-    assert said.startswith("roadeval: warning: b-")
-    assert "not an MCAP file" in said or "MCAP" in said
+    assert said.startswith("roadeval: warning: b: not an MCAP file")
+    errors = {row["drive"][0]: row["ERR"] for row in finals(tmp_path / "f")}
+    caption, _, _, *rows = done.stdout.partition("Final masks, ERR %")[2].splitlines()[:5]
+    assert caption == ": the drives, filtered's worst first"
+    worst = sorted(errors, key=lambda name: -errors[name])
+    assert [row.split()[:3] for row in rows] == [
+        [name, "10", f"{100 * errors[name]:.2f}"] for name in worst
+    ]
     assert tables(tmp_path / "f") == tables(ran.folder)
     assert not list(tmp_path.rglob("*.lock"))
 

@@ -109,6 +109,16 @@ def test_each_result_has_a_table_of_every_rate_of_final_masks_and_of_err_of_othe
     assert first.breaks == [4]
 
 
+def test_a_variant_of_which_no_stage_changed_has_no_rows():
+    svm = a_change(a_difference(0, 0, 0), "wide", result="new|er")
+    rows = CHANGE, replace(svm, stage="svm", final=False), svm
+    table, *_ = blocks(Table, a_comparison(changes=rows))
+    assert {row[0] for row in plain_rows(table)} == {"filtered", ""}
+    post = replace(CHANGE, variant="wide")
+    table, *_ = blocks(Table, a_comparison(changes=(*rows[:2], post)))
+    assert [row[:2] for row in plain_rows(table)][3:5] == [["wide", "svm"], ["", "post"]]
+
+
 def test_the_variants_of_a_single_result_are_in_one_table():
     rows = [replace(CHANGE, result=name, variant=name) for name in ("filtered", "wide")]
     table, *_ = blocks(Table, a_comparison(changes=rows))

@@ -33,6 +33,17 @@ def test_of_several_variants_each_is_named():
     assert verdict(variants).startswith("On these 12 frames net instead of base raises")
 
 
+def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
+    same = a_difference(0, 0, 0)
+    rows = a_change(WORSE), a_change(same, "net"), a_change(same, "wide")
+    told = verdict(a_comparison(*rows))
+    assert told.count("these 12 frames") == 1
+    assert told.endswith("net and wide of new: every frame as in base.")
+    # ERR alone may stay where other rates change.
+    moved = replace(rows[1], difference={**rows[1].difference, "FPR": WORSE})
+    assert "net: on these 12 frames" in verdict(a_comparison(rows[0], moved))
+
+
 def test_of_different_drives_there_is_no_difference_to_tell():
     told = verdict(a_comparison(paired=False))
     assert told == "Different drives, side by side: no difference is given."

@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of, interval, percent, points
 from roadeval.evaluation.metrics import FULL
+from roadeval.evaluation.regions import ALL
+from roadeval.evaluation.score import TESTED
 from roadeval.report.blocks import Table
 from roadeval.results.facts import OverDrives
+from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 
 if TYPE_CHECKING:
@@ -18,7 +21,6 @@ if TYPE_CHECKING:
 
     from roadeval.jobs.run.fleet import FleetOutcome
 
-TESTED: Final = "ERR"
 RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
 STATUSES: Final = {
     SCORED: "scored",
@@ -26,6 +28,8 @@ STATUSES: Final = {
     UNSCORED: "without truth",
     FAILED: "failed",
 }
+WORST: Final = 12
+"""Drives that the table of drives shows."""
 NAMED: Final = 5
 """Drives that failed for one reason, which are named."""
 
@@ -49,6 +53,9 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     if facts.effects:
         show_effects(facts.effects, out)
         out.print()
+    if facts.rates:
+        show_drives(FleetFolder(outcome.folder), list(facts.rates), out)
+        out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
 
 
@@ -60,6 +67,31 @@ def show_rates(rates: Sequence[Mapping[str, Any]], out: Console) -> None:
     ]
     caption = "Final masks: the mean of the drives' mean rates"
     tables.show_table(Table(["variant", "drives", *RATES.values()], rows, caption=caption), out)
+
+
+def show_drives(folder: FleetFolder, rates: Sequence[Mapping[str, Any]], out: Console) -> None:
+    """Print the drives on which the first variant has the highest error rates."""
+    import pyarrow.compute as pc
+
+    variants = [row["variant"] for row in rates]
+    final = (pc.field("region") == ALL) & pc.field("final")
+    errors: dict[str, dict[str, float | None]] = {}
+    for row in folder.table("scores").filter(final).to_pylist():
+        errors.setdefault(row["drive"], {})[row["variant"]] = row[TESTED]
+    first = variants[0]
+    worst = sorted(errors, key=lambda name: (-(errors[name].get(first) or 0.0), name))
+    rows = [
+        [
+            folder.names[name],
+            str(folder.drives[name]["evaluated"]),
+            *(percent(errors[name].get(each)) for each in variants),
+        ]
+        for name in worst[:WORST]
+    ]
+    caption = f"Final masks, ERR %: the drives, {first}'s worst first"
+    if len(worst) > WORST:
+        caption += f" ({WORST} of {len(worst)}; all are in drives.parquet and scores.parquet)"
+    tables.show_table(Table(["drive", "frames", *variants], rows, (0,), caption=caption), out)
 
 
 def show_effects(effects: Sequence[OverDrives], out: Console) -> None:
@@ -91,8 +123,9 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
             more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
             yield f"{condition.condition}: {missing[0]}{more}"
     reasons: dict[str, list[str]] = {}
+    names = FleetFolder(outcome.folder).names
     for drive, text in outcome.problems.items():
-        reasons.setdefault(_reason(drive, text, outcome), []).append(drive)
+        reasons.setdefault(_reason(drive, text, outcome), []).append(names[drive])
     for reason, drives in reasons.items():
         yield f"{first_of(drives, NAMED)}: {reason}"
 

@@ -57,4 +57,6 @@ def _light(frame: WorstFrame) -> tuple[str, ...]:
 def _why(frame: WorstFrame) -> str:
     (first, value), *rest = frame.parts.items()
     terms = [f"{first} {percent(value, 1)}", *(f"{name} {points(part, 1)}" for name, part in rest)]
-    return " ".join([f"{ascii_of(', '.join(terms))} pp.", *frame.notes])
+    # The title names the variant.
+    notes = (note.removeprefix(f"{frame.variant} ") for note in frame.notes)
+    return " ".join([f"{ascii_of(', '.join(terms))} pp.", *(n[:1].upper() + n[1:] for n in notes)])

@@ -109,6 +109,11 @@ class Change:
         """The result and its variant, which may be called the same."""
         return self.result if self.result == self.variant else f"{self.result}: {self.variant}"
 
+    @property
+    def unchanged(self) -> bool:
+        """Whether no rate changed, on any frame."""
+        return bool(self.difference) and all(each.is_zero for each in self.difference.values())
+
 
 @dataclass(frozen=True, slots=True)
 class DriveChange:

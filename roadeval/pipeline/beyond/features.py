@@ -382,7 +382,7 @@ crossed."""
 AROUND_EDGES: Final = 1.5
 """And by that over the squared edges of the image at twice its size, which grows where something
 steep is, thin kerbs included. Both values are the best, or next to it, on the train part of IDD
-Lite, on CamVid 0016E5 and 0006R0 and on the demo drive; for working images of 160 columns, made of
+Lite, on CamVid 0016E5 and 0006R0 and a synthetic drive; for working images of 160 columns, made of
 320 or more: edges of smaller images are blurred, and more is reached. They hold after the stage
 `exposure`, which weakens edges among what is brighter than the patch."""
 SUNLIT: Final = 80

@@ -26,5 +26,5 @@ def test_the_list_says_whose_frames_these_are_and_where_their_error_comes_from()
     title, _, head, _, row, *_ = out.file.getvalue().splitlines()
     assert title == "street: worst frames of net by ERR of post (of neighbours only the worst)"
     assert head.split() == ["frame", "ERR", "%", "FPR", "%", "FNR", "%", "why"]
-    why = "svm 20.0, filter +7.0, post -2.0 pp. net fails."
+    why = "svm 20.0, filter +7.0, post -2.0 pp. Fails."
     assert " ".join(row.split()) == f"1 39 25.00 12.50 - {why}"
