@@ -169,15 +169,10 @@ def overview(
 
 
 def _changes(comparison: Comparison) -> Iterator[Block]:
-    """Yield a table a result: ERR of each stage, and every rate of final masks.
-
-    Variants of which no stage changed have no rows.
-    """
+    """Yield a table a result: ERR of each stage, and every rate of final masks."""
     base = comparison.results[0].label
     alone = all(row.result == row.variant for row in comparison.changes)
-    changed = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
-    shown = [row for row in comparison.changes if (row.result, row.variant) in changed]
-    for result, rows in _by(shown, lambda row: "" if alone else row.result):
+    for result, rows in _by(_changed(comparison), lambda row: "" if alone else row.result):
         drives = max(row.drives for row in rows)
         over = f": {drives} drives in common" if drives > 1 else ""
         lines: list[list[Cell | str]] = []
@@ -218,6 +213,12 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
         yield Text(legend, "note")
 
 
+def _changed(comparison: Comparison) -> list[Change]:
+    """Return what is shown of a comparison: not the variants of which no stage changed."""
+    names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
+    return [row for row in comparison.changes if (row.result, row.variant) in names]
+
+
 def _by(rows: Sequence[Change], key: Callable[[Change], str]) -> list[tuple[str, list[Change]]]:
     return [(name, [*own]) for name, own in groupby(rows, key)]
 
@@ -256,11 +257,11 @@ def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
 
 
 def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Block]:
-    finals = [row for row in comparison.changes if row.final]
-    if comparison.paired:
+    finals = [row for row in _changed(comparison) if row.final]
+    if comparison.paired and finals:
         caption = "Change of the final mask's rates against the base."
         yield Figure(charts.changes(finals), caption)
-    else:
+    elif not comparison.paired:
         yield Figure(charts.levels(finals), "Rates of the final masks.")
     if over_drive:
         yield Heading("Over the drive", 2)

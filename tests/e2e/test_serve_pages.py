@@ -1,6 +1,7 @@
 """``roadeval serve`` in a real browser: pictures on demand, and the viewer."""
 
 import re
+from datetime import date
 
 import pytest
 
@@ -19,12 +20,22 @@ def frame(tab):
 
 def test_every_result_is_listed_and_a_click_away(address, watched):
     seen = watched(address)
-    links = seen.tab.locator(".links a")
+    links = seen.tab.locator("table a")
     assert links.count() == 3
+    says = seen.tab.locator("tbody tr").first.inner_text()
+    assert "of the pixels are wrong." in says
+    assert str(date.today().year) in says
     for place, title in enumerate(["demo", "demo", "week"]):
         seen.tab.goto(address)
         links.nth(place).click()
         assert seen.tab.locator("h1").inner_text() == title
+    seen.tab.goto(address)
+    assert violations(seen.tab) == []
+    assert seen.tab.locator(".links a").count() == 3
+    seen.tab.locator(".links a").first.click()
+    assert "instead of" in seen.tab.locator(".verdict").inner_text()
+    seen.tab.get_by_text("All results").click()
+    assert links.count() == 3
     assert seen.complaints == []
     assert all(url.startswith(address) for url in seen.elsewhere)
 

@@ -178,7 +178,7 @@ def write(
         case ".pdf":
             content = pdf(_document(compared, inspect), paper)
         case ".html":
-            content = _page(compared, inspect)
+            content = as_page(compared, inspect)
         case ".md":
             from roadeval.report.comparison import markdown
 
@@ -190,16 +190,21 @@ def write(
     return write_file(path, content)
 
 
-def _page(compared: Compared, inspect: Inspect | None) -> bytes:
-    from roadeval.report.page.render import page
+def as_page(compared: Compared, inspect: Inspect | None = None, home: str = "") -> bytes:
+    """Return a comparison as a page that is whole by itself.
 
+    ``inspect`` is that of `write`; ``home`` is the address of the page above, or empty.
+    """
+    from roadeval.report.page.render import Place, page
+
+    place = Place(home=home)
     made = _document(compared, inspect)
 
     def rendered(frames: BrowsedFrames) -> bytes:
-        return page(replace(made, blocks=[*made.blocks, *browser(frames)]))
+        return page(replace(made, blocks=[*made.blocks, *browser(frames)]), place)
 
     frames = browsed(compared, inspect, lambda frames: len(rendered(frames)))
-    return page(made) if frames is None else rendered(frames)
+    return page(made, place) if frames is None else rendered(frames)
 
 
 def _document(compared: Compared, inspect: Inspect | None) -> Document:

@@ -6,21 +6,24 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from datetime import datetime
 from functools import cached_property, partial
 from http import HTTPStatus
+from itertools import combinations
 from pathlib import Path
 from threading import Lock
 from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.progress import OnProgress
+from roadeval.jobs.results.compare import as_page, compare
 from roadeval.jobs.results.frames import FramePicker, browsed
 from roadeval.jobs.results.inspect import WorstFrame, worst_frames
 from roadeval.jobs.results.report import PICTURED_OF_FLEET, findings_of
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.jobs.serve.replayed import CancelledReplayError, Replayer, recording_of
 from roadeval.recording.viewer import WindowViewer
-from roadeval.report.blocks import Document, Heading, LinkList, Strip
+from roadeval.report.blocks import Cell, Document, Heading, LinkList, Strip, Table
 from roadeval.report.document import page_document
 from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page, part
@@ -31,6 +34,8 @@ from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request,
 
 MakeCommands = Callable[[Result], Commands]
 """Returns the commands that the page of a result names."""
+PAIRS: Final = 20
+"""Pairs of results that the list of results offers to compare."""
 STRIPS: Final = 40
 """Frames whose pictures are kept in memory."""
 _CODE: Final = {STYLE: "text/css; charset=utf-8", SCRIPT: "text/javascript; charset=utf-8"}
@@ -105,22 +110,44 @@ class _Site:
                 return self._home()
             case (name,) if name in _CODE and not request.acts:
                 return Response(code()[name], _CODE[name])
-            case (place, *rest) if place.isdecimal() and int(place) < len(self._served):
+            case ("compare", base, new) if not request.acts and self._has(base) and self._has(new):
+                return self._compared(int(base), int(new))
+            case (place, *rest) if self._has(place):
                 if not rest and not request.folder:
                     return _moved(f"{place}/")
                 below = replace(request, parts=tuple(rest))
                 return self._served[int(place)].answer(below, self._viewer)
         return NOT_FOUND
 
+    def _has(self, place: str) -> bool:
+        return place.isdecimal() and int(place) < len(self._served)
+
     def _home(self) -> Response:
         if len(self._served) == 1:
             return _moved("0/")
-        links = [
-            (f"{each.title} ({each.path})", f"{place}/") for place, each in enumerate(self._served)
+        rows: list[list[Cell | str]] = [
+            [Cell(each.title, leads=f"{place}/"), each.headline, each.written, str(each.path)]
+            for place, each in enumerate(self._served)
         ]
-        blocks = [Heading("Results"), LinkList(links)]
-        made = Document("roadeval", "Results", f"{len(links)} results", "", blocks)
+        pairs = [
+            (
+                f"{self._served[new].path} against {self._served[base].path}",
+                f"compare/{base}/{new}",
+            )
+            for base, new in combinations(range(len(rows)), 2)
+        ]
+        blocks = [
+            Heading("Results"),
+            Table(["result", "what it says first", "written", "file"], rows, range(4)),
+            Heading("Compare two"),
+            LinkList(pairs[:PAIRS]),
+        ]
+        made = Document("roadeval", "Results", f"{len(rows)} results", "", blocks)
         return _page(page(made, _HOME), _HOME)
+
+    def _compared(self, base: int, new: int) -> Response:
+        found = compare([self._served[place].path for place in (base, new)])
+        return _page(as_page(found, home="../../"), Place())
 
 
 def _served(result: Result, commands: MakeCommands | None, replayer: Replayer) -> _Served:
@@ -151,6 +178,16 @@ class _Served:
         self._commands: Final = make_commands(result) if make_commands else None
         self._lock: Final = Lock()
         self._place: Final = place
+
+    @property
+    def headline(self) -> str:
+        """The first sentence of the verdict."""
+        return f"{self._result.facts.verdict.split('. ')[0].rstrip('.')}."
+
+    @property
+    def written(self) -> str:
+        """When its file or folder was written, by the clock of this machine."""
+        return f"{datetime.fromtimestamp(self.path.stat().st_mtime):%Y-%m-%d %H:%M}"
 
     def answer(self, request: Request, viewer: WindowViewer) -> Response:
         """Return what is asked for below its address."""
