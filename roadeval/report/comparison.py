@@ -60,6 +60,7 @@ _OVER_DRIVES: Final = (
     "drive counts where both results have scored the same frames of it."
 )
 _FRAMES: Final = "Percent of the labelled pixels that only one of the two final masks has right."
+_SAME: Final = "Regions without any change are left out."
 _LEFT_OUT: Final = (
     "A region that is not the same pixels in both, as the shadow that another filter found, is "
     "left out."
@@ -237,15 +238,15 @@ def _level(row: Change, rate: str) -> str:
 
 
 def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
-    """Tabulate rows: what names one, without the result where the variants are that, and columns.
+    """Tabulate rows: what names one, without a result that says nothing new, and columns.
 
     A rule is drawn where another result begins.
     """
     names: Columns = {"result": lambda row: row.result, "variant": lambda row: row.variant}
-    if all(row.result == row.variant for row in rows):
+    results = [row.result for row in rows]
+    if len(set(results)) == 1 or all(row.result == row.variant for row in rows):
         del names["result"]
     made = names | columns
-    results = [row.result for row in rows]
     return Table(
         [*made],
         [[cell(row) for cell in made.values()] for row in rows],
@@ -280,8 +281,10 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         legend = correction(row.difference for row in comparison.regions)
         yield Heading("Where it is better, and where worse", 2)
         over = _OVER_DRIVES if comparison.drives else _REGIONS
-        yield _region_table(comparison.regions, over)
-        notes = [legend, _LEFT_OUT, "" if comparison.drives else _SHADE]
+        if rows := [row for row in comparison.regions if not row.difference.is_zero]:
+            yield _region_table(rows, over)
+        same = "" if len(rows) == len(comparison.regions) else _SAME
+        notes = [legend, same, _LEFT_OUT, "" if comparison.drives else _SHADE]
         yield Text(" ".join(filter(None, notes)), "note")
     if comparison.disagreements:
         yield Heading("Frames on which they disagree most", 2)

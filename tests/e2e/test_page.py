@@ -194,6 +194,14 @@ def test_a_page_opens_on_six_screens_at_most(drive, watched):
     assert len(ticks) > 4
 
 
+def test_contents_are_open_beside_the_page_and_closed_above_it(drive, watched):
+    for width, there in ((1440, True), (390, False)):
+        tab = watched(drive.as_uri(), width=width).tab
+        assert tab.locator(".outline a").first.is_visible() == there
+    tab.set_viewport_size({"width": 1440, "height": 900})
+    tab.locator(".outline a").first.wait_for(state="visible")
+
+
 def test_a_slider_lies_between_two_variants(drive, watched):
     tab = watched(drive.as_uri()).tab
     assert tab.locator("select.left").input_value() == "filtered: errors"

@@ -16,6 +16,14 @@ function makeCommands(part) {
   }
 }
 
+/** Have the contents open beside the page, and closed where they would be above all else. */
+function fitOutline() {
+  const wide = matchMedia("(min-width: 1100px)");
+  const fit = () => (document.querySelector(".outline details").open = wide.matches);
+  wide.addEventListener("change", fit);
+  fit();
+}
+
 /** Mark in the contents the section that is read. */
 function followOutline() {
   const links = new Map([...document.querySelectorAll(".outline a")].map((a) => [a.hash.slice(1), a]));
@@ -41,6 +49,7 @@ let browser = null;
 startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), { scroll: true }));
 startPlaces();
 if (element) browser = new Browser(element);
+fitOutline();
 followOutline();
 
 /** The frame of the table that is nearest to a number. */
