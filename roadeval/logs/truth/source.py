@@ -42,6 +42,8 @@ from roadeval.logs.truth.pairing import (
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
+_RECTIFIED: Final = re.compile(r"(?:^|[_.-])(?:rect(?:ified)?|undist\w*)(?:$|[_.-])", re.I)
+_RAW: Final = re.compile(r"image_raw")
 _BYTE: Final = 255
 """Greatest code of a confidence map of 16 bits that was made for 8."""
 _ONES: Final = (1, 257)
@@ -126,7 +128,8 @@ def in_log(
     A `LogError` if its values cannot be understood.
     """
     meaning = _meaning(labels, settings, several=several)
-    return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why)
+    notes = other_optics(labels.name, camera.topic.name)
+    return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why, notes=notes)
 
 
 def beside_log(
@@ -158,8 +161,30 @@ def beside_log(
     words = camera.clock if from_log and settings.pair is None else by
     meaning = _meaning(labels, settings, camera, several=several)
     notes = labels.origin.notes if isinstance(labels, NamedLabels) else ()
+    notes += other_optics(labels.name, camera.topic.name)
     why = f"{count}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
+
+
+def other_optics(labels: str, topic: str) -> tuple[str, ...]:
+    """Return a warning where names say that labels are of rectified images and the camera's not.
+
+    Both have the same size and stamps, so that nothing but the names of folder, file or topic
+    (its last two parts) can tell, as ``image_rect_color`` does.
+
+    >>> other_optics("labels_rectified", "/front/image_rect")
+    ()
+    """
+    rectified, of_camera = (
+        any(map(_RECTIFIED.search, text.rstrip("/").split("/")[-2:])) for text in (labels, topic)
+    )
+    if rectified == of_camera or (of_camera and not _RAW.search(labels)):
+        return ()
+    theirs, ours = ("rectified", "raw") if rectified else ("raw", "rectified")
+    return (
+        f"by its name {labels} is of {theirs} images, and {topic} of {ours} ones: where the lens "
+        f"bends, edges do not fit; `topics.image` chooses the topic of the {theirs} images",
+    )
 
 
 def log_and_topic(path: str) -> tuple[str | None, str | None]:
