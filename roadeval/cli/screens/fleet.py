@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli.screens import tables
-from roadeval.data.words import first_of, interval, percent, points
+from roadeval.data.words import counted, first_of, interval, percent, points
 from roadeval.evaluation.metrics import FULL
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
@@ -37,13 +37,15 @@ NAMED: Final = 5
 def show(outcome: FleetOutcome, out: Console) -> None:
     """Print how many drives there are, the verdict, the rates, and the effects over drives."""
     facts = outcome.facts
-    counted = (
+    states = (
         f"{outcome.counts[s]} {text}" for s, text in STATUSES.items() if outcome.counts.get(s)
     )
     total = sum(outcome.counts.values())
-    out.print(f"{total} drives: {', '.join(counted)}; {facts.frames} frames evaluated")
-    if outcome.replayed < total:
+    out.print(f"{counted(total, 'drive')}: {', '.join(states)}; {facts.frames} frames evaluated")
+    if 0 < outcome.replayed < total:
         out.print(f"{total - outcome.replayed} of them were done before.")
+    elif not outcome.replayed:
+        out.print("All of it was done before.")
     out.print()
     out.print(facts.verdict)
     out.print()

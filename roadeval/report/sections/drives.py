@@ -231,11 +231,16 @@ _LIGHT: Final = {column.name for column in LIGHT}
 
 
 def strata(findings: FleetFindings) -> Iterator[Block]:
-    """Yield a table of parts for each difference that has a plot."""
+    """Yield a table of parts for each difference that has a plot.
+
+    Thirds by light are shown where one of them has drives enough for an interval.
+    """
     tables = []
     for effect, title in plotted(findings):
         mask = (effect.base, effect.variant)
         own = [each for each in findings.facts.strata if (each.base, each.variant) == mask]
+        if all(each.low is None for each in own):
+            own = [each for each in own if each.by not in _LIGHT]
         if own:
             tables.append((title, [Part(e.by.removeprefix(TAG), _value(e), e) for e in own]))
     if not tables:
@@ -244,12 +249,15 @@ def strata(findings: FleetFindings) -> Iterator[Block]:
     for title, rows in tables:
         yield Heading(title, 2)
         yield from strata_table(rows)
-    yield Text(
-        "Light is measured from the images: luminance and contrast from 0 to 1; shadow: the share "
-        "of the lower half that is dark beside its lit part; sun: above 0 where shadows are bluer "
-        "than what is lit. Each is divided into thirds of the drives.",
-        "note",
-    )
+    if any(row.by in _LIGHT for _, rows in tables for row in rows):
+        yield Text(_OF_LIGHT, "note")
+
+
+_OF_LIGHT: Final = (
+    "Light is measured from the images: luminance and contrast from 0 to 1; shadow: the share "
+    "of the lower half that is dark beside its lit part; sun: above 0 where shadows are bluer "
+    "than what is lit. Each is divided into thirds of the drives."
+)
 
 
 def _value(each: StratumFacts) -> str:
