@@ -56,7 +56,7 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
         return _jpeg(data, limits)
     image = _loaded(data, format_, limits)
     if image.mode in _SAMPLES:
-        return _in_all_channels(_samples(image))
+        return np.repeat(eight_bits(_samples(image))[..., None], 3, axis=2)
     return np.array(image.convert("RGB"))
 
 
@@ -244,7 +244,3 @@ def _samples(image: Any) -> Array:
             raise ImageError("an image of 32-bit numbers")
         samples = samples.astype(np.uint16)
     return samples.astype(samples.dtype.newbyteorder("="), copy=False)
-
-
-def _in_all_channels(samples: Array) -> Rgb:
-    return np.repeat(eight_bits(samples)[..., None], 3, axis=2)

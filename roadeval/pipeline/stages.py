@@ -64,7 +64,9 @@ def _somebodys(name: str) -> Stage:
     try:
         found = _imported(name)
         default = name.partition(":")[2].rpartition(".")[2] if ":" in name else name
-        modules = _modules(found, name)
+        defining = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
+        named = sys.modules.get(name.partition(":")[0])
+        modules = [module for module in (defining, named) if module is not None]
         if callable(found) and not isinstance(found, type):
             found = stage_of_function(default, found)
         if not isinstance(found, Stage):
@@ -76,13 +78,6 @@ def _somebodys(name: str) -> Stage:
     except Exception as error:  # whatever somebody's module raises
         said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
         raise UnknownStageError(f"stage {name!r} cannot be used: {said}") from error
-
-
-def _modules(found: Any, name: str) -> list[ModuleType]:
-    """Return the module that defines a function or a stage, and the one that the chain names."""
-    defining = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
-    named = sys.modules.get(name.partition(":")[0])
-    return [module for module in (defining, named) if module is not None]
 
 
 def _with_origin(stage: Stage, name: str, modules: Sequence[ModuleType]) -> Stage:

@@ -42,7 +42,7 @@ def encode_labels(labels: Bytes | Packed, palette: Sequence[ColourWithOpacity]) 
 
     Labels of two classes may be packed, or of another type: what is not 0 is of the second class.
     """
-    bits = _bits(len(palette))
+    bits = next(bits for bits in (1, 2, 4, 8) if len(palette) <= 1 << bits)
     if bits == 1:
         mask = labels if isinstance(labels, Packed) else Packed.of(labels)
         lines = KERNELS.mask_rows(mask.bits, mask.width)
@@ -81,10 +81,6 @@ def _file(
             _chunk(b"IEND", b""),
         )
     )
-
-
-def _bits(colours: int) -> int:
-    return next(bits for bits in (1, 2, 4, 8) if colours <= 1 << bits)
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:

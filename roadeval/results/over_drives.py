@@ -42,7 +42,10 @@ def summarise(
     conditions: list[ConditionFacts],
 ) -> FleetFacts:
     """Make the facts of a fleet of the tables in its folder, and the rows of ``drives``."""
-    rows = _final_effects(folder)
+    found: defaultdict[Key, Rows] = defaultdict(list)
+    for row in final_rows(folder / "effects.parquet"):
+        found[row["base"], row["variant"], row["metric"]].append(row)
+    rows = dict(found)
     copies = _copies(drives)
     groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
     effects = _effects(rows, groups, settings)
@@ -109,14 +112,6 @@ def _of_drives(drives: Rows) -> Iterator[str]:
 
 Key = tuple[str, str, str]
 """Base, variant and metric of a difference of final masks."""
-
-
-def _final_effects(folder: Path) -> dict[Key, Rows]:
-    """Return the rows of the final masks' differences by what they are of."""
-    found: defaultdict[Key, Rows] = defaultdict(list)
-    for row in final_rows(folder / "effects.parquet"):
-        found[row["base"], row["variant"], row["metric"]].append(row)
-    return dict(found)
 
 
 def _effects(

@@ -86,7 +86,8 @@ def read_table(
         each.with_type(pa.string()) if pa.types.is_dictionary(each.type) else each
         for each in table.schema
     )
-    return _pandas(table.cast(pa.schema(fields)))
+    frame: pd.DataFrame = table.cast(pa.schema(fields)).to_pandas()
+    return frame
 
 
 def read_rows(
@@ -118,7 +119,9 @@ def _read(name: str, source: Path | str, stated: Mapping[str, TableFacts] | None
         return pa.Table.from_batches([], _coded(table))
     try:
         if stated is None:
-            _check_lines(content)
+            lines = content.splitlines()
+            if len({*lines}) < len(lines):
+                raise ValueError("a row is there twice")
         return _parsed(content, table)
     except ValueError as error:  # Arrow's too
         reason = str(error).partition("\n")[0]
@@ -165,13 +168,6 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
         if column.kind is not Kind.RATE:
             _check_cells(column, parsed[column.name])
     return parsed
-
-
-def _check_lines(content: bytes) -> None:
-    """Refuse, as a ValueError, a table with a line twice: each begins with what it is of."""
-    lines = content.splitlines()
-    if len({*lines}) < len(lines):
-        raise ValueError("a row is there twice")
 
 
 def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
@@ -231,11 +227,6 @@ def _numbers(column: pa.ChunkedArray) -> Cells:
 def _filled(cells: pa.Array, blank: float) -> Cells:
     # Filling imports pandas.
     return np.from_dlpack(cells.fill_null(blank) if cells.null_count else cells)
-
-
-def _pandas(table: pa.Table) -> pd.DataFrame:
-    frame: pd.DataFrame = table.to_pandas()
-    return frame
 
 
 # --- Parquet --------------------------------------------------------------------------------------

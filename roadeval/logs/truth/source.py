@@ -256,7 +256,7 @@ def _meaning(
                 seen += seen_in(picture, wanted, labels.name, labels.limits)
             else:
                 seen.append(int(confidence.codes(picture, labels.limits).max()))
-                fractions |= _is_fraction(picture)
+                fractions |= isinstance(picture, RawPicture) and format_of(picture).dtype == "f4"
         except BadMessage as error:
             problem = problem or str(error)
     if not seen:
@@ -267,10 +267,6 @@ def _meaning(
     if drawn:
         return of_classes(wanted, origin, labels.name)
     return understand(wanted, seen, labels.name, several=several)
-
-
-def _is_fraction(picture: Picture) -> bool:
-    return isinstance(picture, RawPicture) and format_of(picture).dtype == "f4"
 
 
 def _check_confidence(greatest: int, name: str, *, fractions: bool) -> None:

@@ -142,7 +142,8 @@ def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
     total = _brightness(image)
     share: Values = cv2.resize(place.astype(np.float32), (width, height))
     likely = share > 0.5
-    level = _quantile(total[likely], share[likely], LEVEL)
+    counted = np.cumsum(np.bincount(total[likely], share[likely], minlength=1))
+    level = float(np.searchsorted(counted, LEVEL * counted[-1])) if counted[-1] > 0 else 0.0
     shining = likely & (total >= LIT * level)
     lit = np.asarray(cv2.mean(image, shining.view(np.uint8))[:3])
     candidates = (total < settings.darkness * level) & (share > settings.place)
@@ -156,12 +157,6 @@ def _brightness(image: Rgb) -> npt.NDArray[np.uint16]:
         cv2.add(red, green, dtype=cv2.CV_16U), blue, dtype=cv2.CV_16U
     )
     return total
-
-
-def _quantile(values: npt.NDArray[np.uint16], weights: Values, share: float) -> float:
-    """Return the least value that holds, with those below it, a share of the weight; 0 for none."""
-    counted = np.cumsum(np.bincount(values, weights, minlength=1))
-    return float(np.searchsorted(counted, share * counted[-1])) if counted[-1] > 0 else 0.0
 
 
 def features_of(seen: Look) -> Values:
