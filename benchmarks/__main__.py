@@ -35,8 +35,7 @@ from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import frame as runner
-from roadeval.jobs.run.prepared import prepare
-from roadeval.jobs.run.processing import process
+from roadeval.jobs.run.prepared import prepare, process
 from roadeval.pipeline.stage import View
 from roadeval.recording import RecordRule, recorder_for
 from roadeval.runtime.threads import one_thread_each

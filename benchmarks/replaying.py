@@ -20,8 +20,7 @@ from roadeval.config import RunConfig
 from roadeval.data import FrameResult, Packed
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import summary
-from roadeval.jobs.run.prepared import prepare
-from roadeval.jobs.run.processing import process
+from roadeval.jobs.run.prepared import prepare, process
 from roadeval.recording import RecordRule, png, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows

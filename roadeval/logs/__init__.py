@@ -16,10 +16,9 @@ if TYPE_CHECKING:
     from roadeval.logs.container.file import Damage
     from roadeval.logs.errors import FrameError, LogError
     from roadeval.logs.files import METADATA, files_of, natural
-    from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame
+    from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame, Selection
     from roadeval.logs.log import Log, LogDescription, describe, open_log
     from roadeval.logs.messages.encoding import TopicKind
-    from roadeval.logs.selection import Selection
     from roadeval.logs.settings import (
         FrameSettings,
         LabelPlace,
@@ -29,11 +28,10 @@ if TYPE_CHECKING:
         TopicSettings,
         parse_time,
     )
-    from roadeval.logs.topics.description import TopicInfo
+    from roadeval.logs.topics.reader import TopicInfo
     from roadeval.logs.truth.source import LabelSource, label_files
     from roadeval.logs.writing.pack import PackResult, pack
-    from roadeval.logs.writing.sidecar import NoSidecar, SidecarWriter
-    from roadeval.logs.writing.writer import LogWriter
+    from roadeval.logs.writing.writer import LogWriter, NoSidecar, SidecarWriter
 
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

@@ -15,14 +15,12 @@ from roadeval.images import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
-from roadeval.logs.frames import FrameStream
+from roadeval.logs.frames import TRUTH, FrameStream, Selection, settle
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
-from roadeval.logs.selection import TRUTH, Selection, settle
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import choose_truth, named
-from roadeval.logs.topics.description import TopicInfo, describe_topic, survey
-from roadeval.logs.topics.reader import topic_readers
+from roadeval.logs.topics.reader import TopicInfo, describe_topic, survey, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.named import with_keys
 from roadeval.logs.truth.pairing import frames_of

@@ -19,8 +19,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
-from roadeval.pipeline.parameters import check_arrays, check_range
-from roadeval.pipeline.stage import Stage
+from roadeval.pipeline.stage import Stage, check_arrays, check_range
 from roadeval.pipeline.stages import STAGES
 from roadeval.runtime.files import check_input, put
 from roadeval.runtime.text import visible

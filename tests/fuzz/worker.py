@@ -31,7 +31,7 @@ INSTRUMENTED: Final = (
         "roadeval.images",
         "roadeval.logs",
         "roadeval.recording.codecs",
-        "roadeval.recording.png",
+        "roadeval.recording.codecs",
     ),
     *(
         "roadeval.recording.layout",

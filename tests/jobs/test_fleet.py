@@ -13,7 +13,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.jobs.run import identity
+from roadeval.jobs.run import prepared
 from roadeval.pipeline import stages
 from tests.e2e.test_fleet import Here, ThreadTasks, run, tables, write
 
@@ -117,17 +117,17 @@ def test_masks_that_have_changed_and_kept_size_and_time_are_another_input(logs, 
 
 
 def test_other_versions_of_what_computes_replay_every_drive(logs, folder, monkeypatch):
-    monkeypatch.setattr(identity, "computing", lambda: {"opencv-python-headless": "4.14"})
+    monkeypatch.setattr(prepared, "computing", lambda: {"opencv-python-headless": "4.14"})
     assert run(logs, folder, keep="worst:1")[0].replayed == 2
 
 
 def test_a_worker_with_another_version_is_refused(logs, tmp_path, monkeypatch):
-    other = identity.computing() | {"numpy": "1.0"}
+    other = prepared.computing() | {"numpy": "1.0"}
 
     class Elsewhere(Here):
         def submit(self, do, /, task):
             with monkeypatch.context() as there:
-                there.setattr(identity, "computing", lambda: other)
+                there.setattr(prepared, "computing", lambda: other)
                 return super().submit(do, task)
 
     with pytest.raises(RoadevalError, match=r"a worker has numpy 1\.0, and the command \d"):

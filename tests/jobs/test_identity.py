@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 import roadeval
-from roadeval.jobs.run import identity
+from roadeval.jobs.run import prepared
 from roadeval.logs import open_log
 from tests.jobs.making import settings, write_log
 
@@ -17,7 +17,7 @@ def drive(tmp_path_factory):
 
 def of(path, **values):
     with open_log(path) as log:
-        return identity.identity(log, settings(**values))
+        return prepared.identity(log, settings(**values))
 
 
 def test_two_drives_of_one_name_differ(drive, tmp_path):
@@ -52,7 +52,7 @@ def test_two_models_differ_and_one_is_the_same_wherever_it_lies(drive, tmp_path)
 
 def test_two_versions_differ(drive, monkeypatch):
     before = of(drive)
-    monkeypatch.setattr(identity, "VERSION", "99.0")
+    monkeypatch.setattr(prepared, "VERSION", "99.0")
     assert of(drive) != before
 
 

@@ -9,7 +9,7 @@ from sklearn.metrics import average_precision_score, roc_auc_score
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.jobs.run.identity import identity
+from roadeval.jobs.run.prepared import identity
 from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
 from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here

@@ -10,7 +10,7 @@ from pypdf import PdfReader
 
 import roadeval
 from roadeval.config import network_variant
-from roadeval.jobs.run import identity
+from roadeval.jobs.run import prepared
 from roadeval.logs import open_log
 from tests.jobs.making import settings, write_log
 from tests.networks.making import network, red_network
@@ -131,7 +131,7 @@ def test_numbers_do_not_depend_on_threads(once, folder, tmp_path):
 def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder, tmp_path):
     def known_by(path):
         with open_log(folder / "drive.mcap") as log:
-            return identity.identity(log, with_network(path).resolved())
+            return prepared.identity(log, with_network(path).resolved())
 
     moved = shutil.copy(folder / "red.onnx", tmp_path / "moved.onnx")
     other = red_network(tmp_path / "other.onnx", bias=-120)

@@ -12,7 +12,7 @@ import pytest
 
 import roadeval
 from roadeval.cli.app import main
-from roadeval.jobs.run.identity import asked
+from roadeval.jobs.run.prepared import asked
 from roadeval.pipeline import stages
 from tests.jobs.making import settings, write_log
 from tests.pipeline import somebody

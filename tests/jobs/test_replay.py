@@ -15,8 +15,7 @@ from rerun.chunk import RrdReader
 import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run.prepared import prepare
-from roadeval.jobs.run.processing import process
+from roadeval.jobs.run.prepared import prepare, process
 from roadeval.logs import LogConfig, TopicSettings, open_log
 from roadeval.pipeline.paper import svm
 from roadeval.report import figures as drawn

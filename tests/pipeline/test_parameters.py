@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
+from roadeval.pipeline.stage import check_arrays, check_covariance, check_range
 
 
 @dataclass

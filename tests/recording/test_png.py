@@ -10,7 +10,7 @@ from PIL import Image
 
 from roadeval import images
 from roadeval.data import Packed
-from roadeval.recording import png as pngs
+from roadeval.recording import codecs as pngs
 
 ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]
 

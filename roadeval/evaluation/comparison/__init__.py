@@ -14,19 +14,17 @@ from roadeval.evaluation.comparison.compare import (
 )
 from roadeval.evaluation.comparison.conditions import Condition, ConditionError, Judgement, judge
 from roadeval.evaluation.comparison.pairing import (
+    Disagreement,
     Kind,
+    MovedFrame,
     Note,
     Part,
     Side,
     common_masks,
+    disagreements,
     match_drives,
     matched,
     one_drive,
-)
-from roadeval.evaluation.comparison.where import (
-    Disagreement,
-    MovedFrame,
-    disagreements,
     parts_of,
     region_counts,
 )

@@ -20,19 +20,17 @@ from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison.pairing import (
+    Disagreement,
     Kind,
     MaskPair,
+    MovedFrame,
     Note,
     Pair,
     Part,
     Side,
     common_masks,
-    match_drives,
-)
-from roadeval.evaluation.comparison.where import (
-    Disagreement,
-    MovedFrame,
     disagreements,
+    match_drives,
     moved_frames,
     parts_of,
     region_counts,

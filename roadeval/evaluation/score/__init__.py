@@ -1,18 +1,20 @@
 """The score of a drive: counts and rates frame by frame, summed up over frames and windows."""
 
 from roadeval.evaluation.score.counts import (
+    EdgesAndFlicker,
     FourCounts,
     FrameCounts,
     GrowingCounts,
     Name,
     Window,
+    boundary_f,
     count,
     cut,
+    edge_of,
     error_map,
     means,
     sum_up,
 )
-from roadeval.evaluation.score.edges import EdgesAndFlicker, boundary_f, edge_of
 from roadeval.evaluation.score.effects import (
     BASES,
     CLAIMS,
@@ -26,11 +28,11 @@ from roadeval.evaluation.score.effects import (
 from roadeval.evaluation.score.frame import (
     BlindPrior,
     CountsNotConservedError,
+    Light,
     check_conserved,
     judge,
+    light_of,
 )
-from roadeval.evaluation.score.light import Light, light_of
-from roadeval.evaluation.score.maps import HeatMap, Maps, changes
 from roadeval.evaluation.score.rows import (
     FILTER,
     by_region,
@@ -57,9 +59,12 @@ from roadeval.evaluation.score.thresholds import (
     CODES,
     LEVELS,
     Curves,
+    HeatMap,
+    Maps,
     Thresholds,
     at_levels,
     calibration,
     calibration_error,
+    changes,
     histogram,
 )

@@ -27,6 +27,7 @@ from roadeval.data import (
 from roadeval.data.arrays import Sums
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
+    EdgesAndFlicker,
     FrameCounts,
     GrowingCounts,
     Name,
@@ -36,11 +37,9 @@ from roadeval.evaluation.score.counts import (
     cut,
     sum_up,
 )
-from roadeval.evaluation.score.edges import EdgesAndFlicker
 from roadeval.evaluation.score.effects import Effect, drive_effects, evidence
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
-from roadeval.evaluation.score.maps import HeatMap, Maps
-from roadeval.evaluation.score.thresholds import Curves
+from roadeval.evaluation.score.thresholds import Curves, HeatMap, Maps
 from roadeval.evaluation.settings import EvaluationSettings
 
 Totals = dict[str, dict[str, Total]]

@@ -32,7 +32,7 @@ from roadeval.jobs.run.fleet_work import (
     train_fold,
     valid_record,
 )
-from roadeval.jobs.run.identity import software
+from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter, recording_path
 from roadeval.results.over_drives import check_conditions

@@ -23,7 +23,7 @@ from roadeval.evaluation.regions import ALL
 from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.fleet.remote import staged, stamp
 from roadeval.jobs.run.fleet_frames import FrameGatherer
-from roadeval.jobs.run.identity import asked, content_of, software
+from roadeval.jobs.run.prepared import asked, content_of, software
 from roadeval.jobs.run.replay import replay
 from roadeval.logs import METADATA
 from roadeval.recording import RecordingError
@@ -65,7 +65,7 @@ class DriveTask:
     config: RunConfig
     """Of this drive, its model included."""
     software: Mapping[str, str]
-    """That of the program that asks, see `roadeval.jobs.run.identity.software`."""
+    """That of the program that asks, see `roadeval.jobs.run.prepared.software`."""
     model: str = ""
     """SHA-256 of the model file; empty where the drive trains its own."""
     fold: int | None = None

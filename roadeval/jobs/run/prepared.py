@@ -1,28 +1,35 @@
-"""A run over a log, prepared: topics, model, chains and scoreboard."""
+"""A run over a log: prepared, its identity, and its frames, computed in worker threads."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import platform
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from roadeval import logs
-from roadeval.config import RunConfig, Variant
-from roadeval.data import VariantLayout
+from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig, Variant
+from roadeval.data import FrameResult, Role, VariantLayout
+from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
-from roadeval.jobs.run import frame
-from roadeval.jobs.run.identity import identity
+from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError, StageError
+from roadeval.pipeline.stage import MisfitError, StageError, View
 from roadeval.recording import Layout
-from roadeval.results.rows import Key
+from roadeval.results.rows import Key, csv_lines, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
-from roadeval.runtime.memory import trim
+from roadeval.results.sentences import notes_of
+from roadeval.runtime.memory import TRIM_EVERY, trim
+from roadeval.runtime.threads import ordered
 from roadeval.training import Model, TrainingSettings, learning
 from roadeval.training.model import ModelError
 from roadeval.training.schedule import Schedule
@@ -200,7 +207,7 @@ def _learn(
 
 def _bind(variants: tuple[Variant, ...], model: Model, path: str | None) -> Mapping[str, Chain]:
     try:
-        return frame.bind(variants, model)
+        return bind(variants, model)
     except MisfitError as error:
         raise ModelError(f"{path}: {error}") from error
 
@@ -208,6 +215,174 @@ def _bind(variants: tuple[Variant, ...], model: Model, path: str | None) -> Mapp
 def _external(selection: logs.Selection) -> tuple[VariantLayout, ...]:
     """Describe the variants whose masks another system has made."""
     return tuple(
-        frame.external_layout(name, mask.where, probable=mask.is_confidence)
+        external_layout(name, mask.where, probable=mask.is_confidence)
         for name, mask in selection.masks.items()
     )
+
+
+OPENCV: Final = (
+    *("opencv-python-headless", "opencv-python"),
+    *("opencv-contrib-python-headless", "opencv-contrib-python"),
+)
+"""The packages that bring OpenCV; without one, its own version is taken."""
+COMPUTING: Final = (
+    *("numpy", "scipy", "scikit-learn", *OPENCV, "onnxruntime"),
+    *("av", "isal", "mcap", "pillow", "simplejpeg"),
+)
+"""The packages that decode and compute: another version may give other numbers."""
+
+
+def deciding(config: RunConfig) -> RunConfig:
+    """Return a configuration without what changes no number: output paths and who computes."""
+    output = OutputSettings(record=config.output.record)
+    return replace(config, output=output, run=ExecutionSettings(), fleet=FleetSettings())
+
+
+@cache
+def computing() -> dict[str, str]:
+    """Return the versions of the installed packages that compute, and of OpenCV in any case."""
+    found = {}
+    for package in COMPUTING:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    if not found.keys() & set(OPENCV):
+        import cv2
+
+        found["opencv"] = cv2.__version__
+    return found
+
+
+def software(config: RunConfig) -> dict[str, str]:
+    """Return the versions of all that computes: roadeval, Python, packages, and others' stages.
+
+    Of a stage that is not roadeval's own it is the digest of its code, see
+    `roadeval.runtime.discovery.code_of`. The processor, and how packages were compiled,
+    are not included.
+    """
+    python = ".".join(platform.python_version_tuple()[:2])
+    own = {name: code.digest for name, code in config.others_code().items()}
+    return {"roadeval": VERSION, "python": python, **computing(), **own}
+
+
+def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
+    """Return a digest of the log, the settings, the model file and the software, in hexadecimal.
+
+    Equal for the same input, in any place of log, model and masks. ``masks`` are the digests of
+    those that lie beside the log, by their variant. A `RoadevalError` if the disk of one of them
+    fails.
+    """
+    model = config.training.model
+    digest = hashlib.sha256(Path(model).read_bytes()).hexdigest() if model else ""
+    return asked(config, digest, of=log.sha256, masks=masks)
+
+
+def asked(
+    config: RunConfig, model: str, *, of: str = "", masks: Mapping[str, Any] | None = None
+) -> str:
+    """Return a digest of the settings, the software and the SHA-256 of a model, in hexadecimal.
+
+    With ``of``, the SHA-256 of a log, and those of masks that lie beside it, it is that of all that
+    decides what a run finds.
+    """
+    plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
+    truth = replace(config.truth, path="", images=None)
+    nowhere = "" if config.training.adapt else None  # wherever the file lies
+    training = replace(config.training, model=nowhere)
+    settings = replace(deciding(config).without_places(), training=training, masks=plain)
+    settings = replace(settings, truth=truth)
+    parts = [settings.as_dict(), software(config), of, model, masks or {}]
+    text = json.dumps(parts, sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def content_of(path: Path, config: RunConfig, model: str) -> str | None:
+    """Return the `identity` of a replay of a log, which is read whole; None if it cannot be."""
+    try:
+        with logs.open_log(path, config) as log:
+            masks = log.select().digests() if config.masks or config.truth.path else {}
+            return asked(config, model, of=log.sha256, masks=masks)
+    except RoadevalError:
+        return None
+
+
+class Encoder(Protocol):
+    """The part of a recorder that encodes a frame; called from any thread."""
+
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
+        """Encode the frame at ``position`` among those read, from 0, with its table lines."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProcessedFrame:
+    """A scored frame without its layers, its lines of the tables, and its encoded form.
+
+    ``position`` counts the frames that were read, from 1, those included that cannot be decoded.
+    ``beside`` are the training frames of a model file that show the same place.
+    """
+
+    position: int
+    result: FrameResult
+    lines: Mapping[str, str]
+    encoded: Any
+    beside: frozenset[int]
+
+
+def process(run: Run, encoder: Encoder, on_progress: OnProgress) -> Iterator[ProcessedFrame]:
+    """Yield every decodable frame in order, and add it to the run's score.
+
+    Decoding, computing, scoring and encoding happen in the worker threads.
+    """
+    total, workers = len(run.frames), run.config.run.jobs or os.cpu_count() or 1
+    work = partial(_process, run, encoder)
+    for position, done in enumerate(ordered(work, enumerate(run.frames, 1), workers), 1):
+        on_progress(Progress(position, total, "replaying"))
+        if position % TRIM_EVERY == 0:
+            trim()
+        if done is None:
+            run.board.lose()
+        else:
+            run.board.add(done.result)
+            run.beside.update(done.beside)
+            yield done
+
+
+def _process(
+    run: Run, encoder: Encoder, item: tuple[int, logs.LoggedFrame]
+) -> ProcessedFrame | None:
+    position, logged = item
+    try:
+        frame = replace(logged.decode(), camera=run.key.camera)
+    except logs.FrameError:
+        return None  # the log's accounting has it, with the reason
+    use = run.schedule.use(frame)
+    known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
+    shared: dict[Any, Any] = {}
+    view = View.of(frame.image, frame.moment)
+    try:
+        variants = [
+            run_variant(
+                name,
+                chain,
+                view,
+                truth=known[0],
+                shadow_truth=known[1],
+                known=shared,
+                repeats={seed: chains[name] for seed, chains in run.repeats.items()},
+            )
+            for name, chain in run.chains.items()
+        ]
+    except StageError as error:
+        run.failures.add(frame.number, error)
+        return None
+    variants += [
+        external_variant(name, mask, frame.probabilities.get(name))
+        for name, mask in frame.external.items()
+    ]
+    result = run.board.score(frame, use.role, tuple(variants))
+    result = replace(result, notes=notes_of(result.tallies))
+    own = csv_lines(run.key, frame_rows(result))
+    encoded = encoder.encode(result, position - 1, own)
+    # Results wait for their turn, and would wait with some 15 bytes a pixel.
+    return ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)

@@ -15,9 +15,7 @@ from roadeval.evaluation.comparison import Condition
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
-from roadeval.jobs.run.identity import deciding
-from roadeval.jobs.run.prepared import Run, prepare
-from roadeval.jobs.run.processing import process
+from roadeval.jobs.run.prepared import Run, deciding, prepare, process
 from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts

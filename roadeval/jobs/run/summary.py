@@ -10,8 +10,7 @@ from typing import Any, Final
 
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
-from roadeval.jobs.run.identity import computing
-from roadeval.jobs.run.prepared import Run
+from roadeval.jobs.run.prepared import Run, computing
 from roadeval.results.facts import (
     DriveFacts,
     Facts,

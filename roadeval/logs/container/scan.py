@@ -43,15 +43,16 @@ from roadeval.logs.container.records import (
     FileBytes,
     Message,
     Record,
+    Summary,
     crc_of,
     message_at,
     parse,
     parse_chunk,
     parse_message_index,
+    read_summary,
     record_at,
     walk,
 )
-from roadeval.logs.container.summary import Summary, read_summary
 from roadeval.logs.errors import BadRecord
 
 END: Final = -1

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from roadeval.logs.errors import LogError
 from roadeval.logs.messages.pixels import lossy_labels
 from roadeval.logs.settings import LabelSettings
-from roadeval.logs.topics.description import TopicInfo
+from roadeval.logs.topics.reader import TopicInfo
 
 
 def _set(text: str) -> frozenset[str]:

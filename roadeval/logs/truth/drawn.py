@@ -8,11 +8,11 @@ first pixel at 0.5,0.5. Where shapes overlap, the later one covers the earlier o
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -177,3 +177,23 @@ class Segments:
 
 Drawn = Drawing | Segments
 """The label of one image, as a format reads it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LabelFormat:
+    """A kind of files that hold labels.
+
+    `roadeval.logs.truth.beside` parses a file once by its ending: ``.json`` to lists and dicts,
+    ``.xml`` to its root element, ``.txt`` to a text.
+    """
+
+    name: str
+    """For people."""
+    ending: str
+    """Of its files, in lower case."""
+    holds: Callable[[Path, Any], bool]
+    """Whether a parsed file is of this format."""
+    read: Callable[[Path, Any, Size | None], Iterable[Drawn]]
+    """Return the label of each image in a parsed file of this format, given the size of the log's
+    images. A `LogError` says what cannot be used; a KeyError, TypeError or ValueError means that
+    the file is not as the format asks."""

@@ -18,8 +18,7 @@ import numpy.typing as npt
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import some
 from roadeval.logs.settings import LabelPlace, TopicSettings
-from roadeval.logs.topics.description import TopicInfo, median_period
-from roadeval.logs.topics.reader import UNREADABLE, TopicReader
+from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.logs.truth.named import NamedLabels
 
 REACH: Final = 4

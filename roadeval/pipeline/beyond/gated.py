@@ -35,9 +35,17 @@ from roadeval.data.arrays import Floats, Values
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
-from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, stage_settings
+from roadeval.pipeline.stage import (
+    GREATEST,
+    Output,
+    Stage,
+    TrainingSet,
+    View,
+    check_arrays,
+    check_range,
+    stage_settings,
+)
 
 GRID: Final = (12, 16)
 """Rows and columns of the cells by which the place of road is learnt."""

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Values
-from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.pipeline.stage import GREATEST, check_arrays, check_range
 from roadeval.runtime.imports import whole
 
 CODES: Final = 256
@@ -100,7 +100,7 @@ def train(
 
     Each pass draws pixels anew by their weights, and adds other noise to their ranks: few frames
     show few values of what is the same all over a frame, and nothing shall hang on their digits.
-    The arguments are those of `roadeval.pipeline.beyond.forest.grow`, the number of planes, passes
+    The arguments are those of `roadeval.pipeline.beyond.trees.grow`, the number of planes, passes
     through as many pixels as there are, and the deviation of what is added to each rank.
     """
     from threadpoolctl import threadpool_limits

@@ -12,8 +12,16 @@ from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, stage_settings
+from roadeval.pipeline.stage import (
+    Output,
+    Stage,
+    TrainingSet,
+    View,
+    check_arrays,
+    check_covariance,
+    check_range,
+    stage_settings,
+)
 from roadeval.runtime.imports import special
 
 RIDGE: Final = 1.0

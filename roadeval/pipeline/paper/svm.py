@@ -21,8 +21,17 @@ from roadeval.pipeline.colour_table import (
     sums_of_products,
     sums_of_terms,
 )
-from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask, stage_settings
+from roadeval.pipeline.stage import (
+    GREATEST,
+    Output,
+    Stage,
+    TrainingSet,
+    View,
+    check_arrays,
+    check_range,
+    perfect_mask,
+    stage_settings,
+)
 from roadeval.runtime.imports import extension, whole
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")

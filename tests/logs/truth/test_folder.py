@@ -8,8 +8,7 @@ import pytest
 from roadeval.images import Limits
 from roadeval.logs import LogError, MaskSettings
 from roadeval.logs.messages.pictures import CompressedPicture
-from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.folder import npy_picture
+from roadeval.logs.truth.beside import labels_in, npy_picture
 from roadeval.logs.truth.meaning import Confidence
 from roadeval.logs.truth.named import NamedLabels, with_keys
 from roadeval.logs.truth.source import log_and_topic

@@ -8,7 +8,7 @@ import pytest
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pixels import to_labels
-from roadeval.logs.truth.folder import npy_picture
+from roadeval.logs.truth.beside import npy_picture
 
 LIMITS = Limits(1000)
 

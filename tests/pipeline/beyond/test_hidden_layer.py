@@ -8,9 +8,15 @@ import pytest
 from sklearn.neural_network import MLPClassifier
 
 from roadeval.pipeline.beyond.features import GROUPS, SHADE, SUN, names_of
-from roadeval.pipeline.beyond.forest import Growth, grow
 from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
-from roadeval.pipeline.beyond.trees import Blend, TreesSettings, balanced_back, network_weight
+from roadeval.pipeline.beyond.trees import (
+    Blend,
+    Growth,
+    TreesSettings,
+    balanced_back,
+    grow,
+    network_weight,
+)
 
 SMALL = {"planes": 32, "passes": 100, "noise": 0.1}
 

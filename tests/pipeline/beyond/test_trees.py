@@ -9,9 +9,19 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, reach
-from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, Growth, bin_edges, grow
 from roadeval.pipeline.beyond.scene import scene_of, stretched
-from roadeval.pipeline.beyond.trees import Blend, Stack, TreesSettings, balanced_back
+from roadeval.pipeline.beyond.trees import (
+    ALL,
+    BINS,
+    NODES,
+    Blend,
+    Growth,
+    Stack,
+    TreesSettings,
+    balanced_back,
+    bin_edges,
+    grow,
+)
 from roadeval.pipeline.stage import MisfitError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)

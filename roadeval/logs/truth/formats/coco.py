@@ -8,8 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Drawn, Outline, Runs, Segments, Shape, Size
-from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.drawn import (
+    Drawing,
+    Drawn,
+    LabelFormat,
+    Outline,
+    Runs,
+    Segments,
+    Shape,
+    Size,
+)
 
 
 def _holds(_: Path, content: Any) -> bool:

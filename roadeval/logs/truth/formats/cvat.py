@@ -8,8 +8,7 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Outline, Runs, Shape, Size, rectangle
-from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Runs, Shape, Size, rectangle
 
 NO_AREAS = ("polyline", "points", "tag", "skeleton")
 

@@ -9,8 +9,7 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Outline, Shape, Size, rectangle
-from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Shape, Size, rectangle
 
 _UPLOADED: Final = re.compile(r"(?:.*[/=])?(?:[0-9a-f]{8}-)?(.+)")
 """An image's name, with the path and the eight digits that an upload puts before it."""

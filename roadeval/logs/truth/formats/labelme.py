@@ -11,8 +11,7 @@ import numpy as np
 
 from roadeval.images import Limits, to_rgb
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Outline, Runs, Shape, Size, rectangle
-from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Runs, Shape, Size, rectangle
 
 NO_AREAS = ("point", "points", "line", "linestrip")
 

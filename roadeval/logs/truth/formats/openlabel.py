@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Outline, Shape, Size
-from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Shape, Size
 
 
 def _holds(_: Path, content: Any) -> bool:

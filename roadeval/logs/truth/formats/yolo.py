@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, Outline, Shape, Size
-from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Shape, Size
 from roadeval.runtime.documents import TOML_BYTES, read_bounded
 
 _LINE: Final = re.compile(r"\d+( +[-+.\deE]+){4,}\s*")
