@@ -66,7 +66,12 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     found = [entry for word in words for entry in _named(word)]
     if not found:
         raise FleetError("no drive found: name logs, folders of logs, URLs or a manifest")
-    return _told_apart(_once(_whole_bags(found)))
+    entries = _once(_whole_bags(found))
+    times = Counter(entry.id for entry in entries)
+    return [
+        replace(entry, id=identity(entry.source, _LONGER)) if times[entry.id] > 1 else entry
+        for entry in entries
+    ]
 
 
 def _named(word: str) -> Iterator[DriveEntry]:
@@ -195,15 +200,6 @@ def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
                 f"{entry.shown}: is named twice, with different groups, tags or settings"
             )
     return list(kept.values())
-
-
-def _told_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
-    """Return drives with different identities; two short digests may be equal by chance."""
-    times = Counter(entry.id for entry in entries)
-    return [
-        replace(entry, id=identity(entry.source, _LONGER)) if times[entry.id] > 1 else entry
-        for entry in entries
-    ]
 
 
 _KEYS: Final = ("path", "group", "tags", *OF_A_LOG)

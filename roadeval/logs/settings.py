@@ -31,7 +31,14 @@ def parse_time(text: str, start_ns: int = 0) -> int:
     """
     text = text.strip()
     if match := _RFC_3339.fullmatch(text):
-        return _rfc_3339_ns(match, text)
+        moment, fraction, zone = match.groups()
+        try:
+            at = datetime.fromisoformat(moment.upper() + zone.upper().replace("Z", "+00:00"))
+        except ValueError as error:
+            raise LogError(f"{text!r} is no time: {error}") from error
+        since = at - _EPOCH
+        seconds = since.days * 86400 + since.seconds
+        return seconds * NS + int((fraction or "").ljust(9, "0"))
     if match := re.fullmatch(r"(\d+)(ns)?", text):
         number = int(match[1])
         return number if match[2] or number >= NS else start_ns + number * NS
@@ -43,17 +50,6 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         f"{text!r} is no time: give seconds from the start (2.5), nanoseconds, or "
         "2013-05-01T12:00:00Z"
     )
-
-
-def _rfc_3339_ns(match: re.Match[str], text: str) -> int:
-    moment, fraction, zone = match.groups()
-    try:
-        at = datetime.fromisoformat(moment.upper() + zone.upper().replace("Z", "+00:00"))
-    except ValueError as error:
-        raise LogError(f"{text!r} is no time: {error}") from error
-    since = at - _EPOCH
-    seconds = since.days * 86400 + since.seconds
-    return seconds * NS + int((fraction or "").ljust(9, "0"))
 
 
 def _time(moment: object) -> object:

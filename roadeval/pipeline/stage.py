@@ -225,7 +225,14 @@ def check_arrays(
     lengths: dict[int | str, int] = {}
     for name, shape in shapes.items():
         array = np.asarray(getattr(parameters, name))
-        if not _matches(array.shape, shape, lengths):
+        if not (
+            len(array.shape) == len(shape)
+            and all(
+                length > 0
+                and length == (each if isinstance(each, int) else lengths.setdefault(each, length))
+                for length, each in zip(array.shape, shape, strict=True)
+            )
+        ):
             raise ValueError(f"{name} has the shape {_text(array.shape)} instead of {_text(shape)}")
         if array.dtype != dtype if shape else array.dtype.kind not in "iuf":
             raise ValueError(f"{name} is of type {array.dtype} instead of {np.dtype(dtype)}")
@@ -248,17 +255,6 @@ def check_covariance(name: str, matrix: npt.NDArray[np.float64], least: float) -
         raise ValueError(f"{name} is not symmetric, and so no covariance")
     if np.linalg.eigvalsh(matrix)[0] < least:
         raise ValueError(f"{name} has an eigenvalue below {least:g}, and so is no covariance")
-
-
-def _matches(
-    shape: tuple[int, ...], wanted: tuple[int | str, ...], lengths: dict[int | str, int]
-) -> bool:
-    """Compare shapes, and remember in ``lengths`` what each letter has come to stand for."""
-    return len(shape) == len(wanted) and all(
-        length > 0
-        and length == (each if isinstance(each, int) else lengths.setdefault(each, length))
-        for length, each in zip(shape, wanted, strict=True)
-    )
 
 
 def _text(shape: tuple[int | str, ...]) -> str:

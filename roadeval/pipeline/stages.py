@@ -168,7 +168,9 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
         if isinstance(default, type) or not dataclasses.is_dataclass(default):
             raise TypeError("the default of its argument settings is no instance of a dataclass")
         settings = type(default)
-    spec = mask_spec(name, _title(name, function))
+    spec = mask_spec(
+        name, ((inspect.getdoc(function) or name).partition("\n")[0].rstrip(".") or name)
+    )
 
     def bind(values: Any, _parameters: None) -> Callable[[View], Output]:
         given = {"settings": values} if "settings" in arguments else {}
@@ -180,11 +182,6 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
         return run
 
     return Stage(name, spec.title, settings, bind, (spec,))
-
-
-def _title(name: str, function: Callable[..., Any]) -> str:
-    """Return the first line of a function's docstring, without its full stop."""
-    return (inspect.getdoc(function) or name).partition("\n")[0].rstrip(".") or name
 
 
 def _output(found: Any, spec: LayerSpec) -> Output:

@@ -254,21 +254,18 @@ class Recorder:
                 self._file.begin()
                 self.check_disk_space()
                 self.partial.touch()
-            self._open()
+            identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
+            stream = rr.RecordingStream(
+                at.APPLICATION, recording_id=identity, send_properties=False
+            )
+            stream.save(self.partial, default_blueprint=views.arrange(self._layout))
+            stream.send_recording_name(self._layout.drive)
+            self._stream = stream
+            self._log_static(views.before_the_first_frame(self._layout, self._codecs))
         except BaseException:  # an interrupt, too; it holds no frame
             self._file.discard()
             raise
         return self
-
-    def _open(self) -> None:
-        # The same input gives the same bytes: the identity is that of the layout, and Rerun's own
-        # properties of the run are left out.
-        identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
-        stream = rr.RecordingStream(at.APPLICATION, recording_id=identity, send_properties=False)
-        stream.save(self.partial, default_blueprint=views.arrange(self._layout))
-        stream.send_recording_name(self._layout.drive)
-        self._stream = stream
-        self._log_static(views.before_the_first_frame(self._layout, self._codecs))
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         try:

@@ -97,7 +97,12 @@ class RrdFile:
 
         A `DamagedError` if they are not what was written.
         """
-        self._check(path)
+        with self.path.open("rb") as file:
+            for place in self._unchecked.get(path, ()):
+                file.seek(place.offset)
+                if self._sums.get(place.offset) != crc32(file.read(place.size)):
+                    raise DamagedError(self.path, path)
+        self._unchecked.pop(path, None)
         chunks = self.stream().filter(content=[path], components=[component], is_static=static)
         for chunk in self._all(chunks, path):
             with whole(self.path, path):
@@ -145,15 +150,6 @@ class RrdFile:
         with whole(self.path, SUMS):
             pairs = json.loads(self.document(SUMS) or "")
             return {int(offset): int(total) for offset, total in pairs}
-
-    def _check(self, path: str) -> None:
-        """Verify the messages of an entity, once."""
-        with self.path.open("rb") as file:
-            for place in self._unchecked.get(path, ()):
-                file.seek(place.offset)
-                if self._sums.get(place.offset) != crc32(file.read(place.size)):
-                    raise DamagedError(self.path, path)
-        self._unchecked.pop(path, None)
 
     def _all(self, chunks: LazyChunkStreamInternal, path: str) -> Iterator[ChunkInternal]:
         """Yield chunks; a `DamagedError` where one cannot be unpacked."""

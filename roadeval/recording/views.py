@@ -61,7 +61,13 @@ def arrange(layout: Layout) -> rrb.Blueprint:
     """Return the arrangement of a recording's views."""
     tabs = [overview(layout), *(_every_layer(layout, v) for v in layout.variants)]
     if layout.has_truth:
-        tabs += [_rates(layout), _counts(layout)]
+        plots = []
+        for stage in dict.fromkeys(stage for _, stage in layout.scored()):
+            variants = [variant for variant, other in layout.scored() if other == stage]
+            for rate in filter(layout.rates.__contains__, SHORT):
+                paths = [at.scalar_path("metrics", variant, stage, rate) for variant in variants]
+                plots.append(plot(f"{rate} of {stage}", paths))
+        tabs += [rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage"), _counts(layout)]
     tabs.append(rrb.Vertical(*map(stage_times, layout.variants), name="Timing"))
     results = (
         (at.OVERVIEW, "Results"),
@@ -91,17 +97,6 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     if layout.has_truth:
         views += [truth(), outcome(layout, variant)]
     return rrb.Grid(*views, grid_columns=4, name=f"{variant.name}: every layer")
-
-
-def _rates(layout: Layout) -> BlueprintPart:
-    """Return graphs, a row a stage and a column a rate."""
-    plots = []
-    for stage in dict.fromkeys(stage for _, stage in layout.scored()):
-        variants = [variant for variant, other in layout.scored() if other == stage]
-        for rate in filter(layout.rates.__contains__, SHORT):
-            paths = [at.scalar_path("metrics", variant, stage, rate) for variant in variants]
-            plots.append(plot(f"{rate} of {stage}", paths))
-    return rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage")
 
 
 def _counts(layout: Layout) -> BlueprintPart:

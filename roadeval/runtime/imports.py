@@ -101,24 +101,21 @@ def _empty(packages: tuple[str, ...]) -> Iterator[None]:
     absent = tuple(package for package in packages if package not in sys.modules)
     try:
         for package in absent:
-            sys.modules[package] = _package(package)
+            parent = package.rpartition(".")[0]
+            found = PathFinder.find_spec(
+                package, import_module(parent).__path__ if parent else None
+            )
+            if found is None or found.submodule_search_locations is None:
+                raise ModuleNotFoundError(f"no package {package}", name=package)
+            empty = ModuleSpec(package, None, is_package=True)
+            empty.submodule_search_locations = found.submodule_search_locations
+            sys.modules[package] = module_from_spec(empty)
         yield
     finally:
         below = tuple(f"{package}." for package in absent)
         for name in list(sys.modules):  # other threads import what they need meanwhile
             if name in absent or name.startswith(below):
                 del sys.modules[name]
-
-
-def _package(name: str) -> ModuleType:
-    """Return a package whose modules are found and whose ``__init__`` has not run."""
-    parent = name.rpartition(".")[0]
-    found = PathFinder.find_spec(name, import_module(parent).__path__ if parent else None)
-    if found is None or found.submodule_search_locations is None:
-        raise ModuleNotFoundError(f"no package {name}", name=name)
-    empty = ModuleSpec(name, None, is_package=True)
-    empty.submodule_search_locations = found.submodule_search_locations
-    return module_from_spec(empty)
 
 
 class _NoPandas(MetaPathFinder):

@@ -67,7 +67,10 @@ def fit(
     if learning:
         sampled = _sampled(frames, truths, settings)
         if source == "truth":
-            sampled = dataclasses.replace(sampled, share=_share_of_road(truths))
+            road = sum(np.count_nonzero(truth == ROAD) for truth in truths)
+            sampled = dataclasses.replace(
+                sampled, share=(road / sum(np.count_nonzero(truth != IGNORE) for truth in truths))
+            )
         pixels = len(sampled.road)
         each = partial(_fit_variant, sampled, {} if base is None else base.parameters)
         for name, learnt, warned in ordered(each, learning.items(), _AT_ONCE):
@@ -111,12 +114,6 @@ def _sampled(
             "`training.frames`, or give `training.model`"
         )
     return dataclasses.replace(sampled, images=tuple(frame.image for frame in frames))
-
-
-def _share_of_road(truths: Sequence[Truth]) -> float:
-    """Return the share of road among the labelled pixels of all frames."""
-    road = sum(np.count_nonzero(truth == ROAD) for truth in truths)
-    return road / sum(np.count_nonzero(truth != IGNORE) for truth in truths)
 
 
 def _fit_variant(

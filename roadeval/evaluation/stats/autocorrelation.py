@@ -110,6 +110,9 @@ def mean_distribution(series: Series) -> MeanDistribution:
     errors = np.sqrt(models.of_mean) * spreads
     scale = float(weights @ errors**-2) ** -0.5
     frames = min(float(series.var()) / scale**2, len(series))
+    centred = series - series.mean()
+    skewness = float((centred**3).mean() / (centred**2).mean() ** 1.5)
+    noise = _SKEWNESS_ERROR / frames
     return MeanDistribution(
         mean=float(series.mean()),
         errors=errors,
@@ -117,7 +120,7 @@ def mean_distribution(series: Series) -> MeanDistribution:
         degrees=degrees,
         frames=frames,
         scale=scale,
-        skewness=_skewness(series, frames) / math.sqrt(frames),
+        skewness=(skewness**3 / (skewness**2 + noise)) / math.sqrt(frames),
     )
 
 
@@ -180,14 +183,6 @@ def _variance_of_mean(coefficients: Series, shares: Series, n: int) -> Series:
 def _beyond(distance: float, errors: Series, weights: Series, degrees: int) -> float:
     """Return the probability that the mean is further off than ``distance``, skewness aside."""
     return float(2 * weights @ special("stdtr")(degrees, -distance / errors))
-
-
-def _skewness(series: Series, frames: float) -> float:
-    """Return a series' skewness, reduced the more, the less it exceeds its own error."""
-    centred = series - series.mean()
-    skewness = float((centred**3).mean() / (centred**2).mean() ** 1.5)
-    noise = _SKEWNESS_ERROR / frames
-    return skewness**3 / (skewness**2 + noise)
 
 
 def _straightened(t: float, skewness: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -31,7 +31,6 @@ from roadeval.report.findings import (
 )
 from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
-from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
 from roadeval.results.tables import parquet_rows
@@ -145,11 +144,12 @@ THUMBNAILS: Final = 4
 def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
     rows, facts = result.rows, result.facts
-    pictured = _pictured(result)
+    evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
+    pictured = [number for number in result.pictured if number in evaluated]
     changes, heat, sampled = _mask_sums(result, pictured)
     paired = list(_paired(result, changes))
     picker = FramePicker(result)
-    worst = picker.worst()
+    worst, drawn = picker.worst(), facts.examples
     return Findings(
         source=str(result.path),
         complete=result.complete,
@@ -171,25 +171,15 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         oracles=[*score.perfect_stages(result.table("oracles"), rows)],
         levels=result.table("probabilities"),
         sampled=sampled,
-        examples=picker.examples(_examples(facts, result.pictured, pictured)),
+        examples=picker.examples(
+            drawn if drawn and set(drawn) <= set(result.pictured) else evenly(pictured, EXAMPLES)
+        ),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
         worst=worst,
         helped=picker.moved(paired, [], harmed=False),
         harmed=picker.moved(paired, worst, harmed=True),
         coverage=_coverage(result, pictured),
     )
-
-
-def _examples(facts: Facts, there: Collection[int], pictured: Sequence[int]) -> Sequence[int]:
-    """Return the frames of the figure that the run drew, or where they have no pictures others."""
-    drawn = facts.examples
-    return drawn if drawn and set(drawn) <= set(there) else evenly(pictured, EXAMPLES)
-
-
-def _pictured(result: DriveResult) -> list[int]:
-    """Return the evaluated frames that have pictures, or without truth all that have."""
-    evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
-    return [number for number in result.pictured if number in evaluated]
 
 
 # --- Tables ---------------------------------------------------------------------------------------
@@ -304,21 +294,6 @@ def collect_fleet(
     `ResultsError` if a table cannot be read.
     """
     scores, regions = _scores(fleet)
-    return FleetFindings(
-        name=fleet.name,
-        source=str(fleet.path),
-        facts=fleet.facts,
-        drives=fleet.drives,
-        names=fleet.names,
-        effects=_effects(fleet),
-        regions=regions,
-        scores=scores,
-        worst=list(_worst(fleet, worst)),
-        inspect=inspect,
-    )
-
-
-def _effects(fleet: FleetFolder) -> dict[tuple[str, str], list[Row]]:
     from pyarrow import compute
 
     table = fleet.table("effects", _EFFECTS)
@@ -327,7 +302,18 @@ def _effects(fleet: FleetFolder) -> dict[tuple[str, str], list[Row]]:
     for row in table.filter(wanted).to_pylist():
         if row["mean"] is not None:
             found[row["base"], row["variant"]].append(row)
-    return dict(found)
+    return FleetFindings(
+        name=fleet.name,
+        source=str(fleet.path),
+        facts=fleet.facts,
+        drives=fleet.drives,
+        names=fleet.names,
+        effects=dict(found),
+        regions=regions,
+        scores=scores,
+        worst=list(_worst(fleet, worst)),
+        inspect=inspect,
+    )
 
 
 def _scores(fleet: FleetFolder) -> tuple[list[Row], dict[tuple[str, str], dict[str, float]]]:

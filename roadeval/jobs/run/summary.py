@@ -32,15 +32,30 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     """Return the facts of a run at its end, with the frames of figure 2 and the tables' sums."""
     found, effects = run.board.summary(), run.board.effects()
     repeats = run.board.repeats()
+    settings = run.config.training
+    given = settings.model is not None and not settings.adapt
     return Facts(
         **found,
         **as_parts(effects),
         verdict=verdict(found["totals"], effects, run.config.evaluation, found["claims"]),
-        drive=_drive(run),
+        drive=DriveFacts(
+            run.log.name,
+            run.key.camera,
+            *(run.selection.size or (0, 0)),
+            rate_hz=run.selection.image.rate_hz,
+            topics=[*run.selection.reasons, *run.config.ignored()],
+        ),
         frames=_accounting(run),
         seeds={"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else {},
         examples=examples,
-        training=_training(run),
+        training=TrainingFacts(
+            run.model.source,
+            len(run.model.digests),
+            run.model.pixels,
+            settings.model,
+            None if given else settings.placement,
+            settings.adapt,
+        ),
         warnings=list(warnings(run)),
         losses=list(losses(run)),
         run=run.config.as_dict(),
@@ -192,16 +207,6 @@ def _constant(run: Run) -> Iterator[str]:
                 yield f"{variant}: its final mask is road {where}, on every frame"
 
 
-def _drive(run: Run) -> DriveFacts:
-    return DriveFacts(
-        run.log.name,
-        run.key.camera,
-        *(run.selection.size or (0, 0)),
-        rate_hz=run.selection.image.rate_hz,
-        topics=[*run.selection.reasons, *run.config.ignored()],
-    )
-
-
 def _accounting(run: Run) -> FrameAccount:
     """Account for every frame of the image topic: evaluated, or skipped and why."""
     seen, roles = run.frames.accounting, Counter(run.board.roles())
@@ -232,16 +237,3 @@ def _unread(config: RunConfig) -> str:
 
 def _gap(config: RunConfig) -> str:
     return f"gap {'after' if config.training.placement == 'first' else 'beside'} training"
-
-
-def _training(run: Run) -> TrainingFacts:
-    settings = run.config.training
-    given = settings.model is not None and not settings.adapt
-    return TrainingFacts(
-        run.model.source,
-        len(run.model.digests),
-        run.model.pixels,
-        settings.model,
-        None if given else settings.placement,
-        settings.adapt,
-    )

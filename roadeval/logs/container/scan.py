@@ -234,7 +234,11 @@ class Scan:
             messages = self._unsure if self._is_unsure else self.loose
             messages[channel_id].extend((log_time, record.offset))
         elif opcode in DEFINITIONS:
-            self._take_definition(record.offset, content)
+            known: dict[int, Any] = self.schemas if isinstance(content, Schema) else self.channels
+            if self.data_end is not None and (content.id not in known or self.chunks):
+                self.late.append(content)
+            elif known.setdefault(content.id, content) != content:
+                self.conflicts.append((record.offset, content))
         else:
             self._is_unsure = False
             if opcode == CHUNK:
@@ -246,13 +250,6 @@ class Scan:
             elif opcode == Opcode.DATA_END:
                 self.data_end, self.after_data = record.offset, record.end
                 self.data_crc = content.data_section_crc
-
-    def _take_definition(self, offset: int, record: Schema | Channel) -> None:
-        known: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
-        if self.data_end is not None and (record.id not in known or self.chunks):
-            self.late.append(record)
-        elif known.setdefault(record.id, record) != record:
-            self.conflicts.append((offset, record))
 
     def _take_chunk(self, chunk: Chunk) -> None:
         if chunk.repaired:

@@ -67,7 +67,9 @@ class Video:
             self._feed(self._next)
             self._next += 1
         if position not in self._ready and self._next == len(self._packets):
-            self._flush()
+            with suppress(BadMessage):
+                self._drain(None)
+            self._decoder = None
         found = self._ready.pop(position, None)
         self._ready = {ready: late for ready, late in self._ready.items() if ready > position}
         if found is None:
@@ -84,12 +86,6 @@ class Video:
         if position < self._next or keyframe > self._next:
             self._decoder, self._waiting, self._ready = None, {}, {}
             self._next, self._broken, self._damaged = keyframe, "", False
-
-    def _flush(self) -> None:
-        """Take what the decoder still holds at the end of the video."""
-        with suppress(BadMessage):
-            self._drain(None)
-        self._decoder = None
 
     def _keyframe(self, position: int) -> int:
         """Position of the last keyframe at or before ``position``."""

@@ -78,7 +78,16 @@ def pack(
     if images.suffix.lower() in VIDEO_SUFFIXES and images.is_file():
         if masks is not None:
             raise LogError(f"{images}: masks go with a folder of images, not with a video")
-        return _pack_video(images, output, rate_hz)
+        count = 0
+        with LogWriter(output) as log:
+            for count, (time_ns, jpeg) in enumerate(_frames_of(images), start=1):
+                if rate_hz is not None:
+                    time_ns = round((count - 1) * NS / rate_hz)  # noqa: PLW2901
+                log.image(CAMERA, time_ns, jpeg, "jpeg")
+            if not count:
+                raise LogError(f"{images}: a video without frames")
+        words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
+        return PackResult(output, count, 0, words)
     if not images.is_dir():
         raise LogError(f"{images}: neither a folder of images nor a video")
     return _pack_folder(images, output, Path(masks) if masks else None, rate_hz)
@@ -139,19 +148,6 @@ def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], 
     rate = rate_hz or DEFAULT_RATE_HZ
     regular = {file: round(i * NS / rate) for i, file in enumerate(files)}
     return regular, f"{rate:g} images a second"
-
-
-def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
-    count = 0
-    with LogWriter(output) as log:
-        for count, (time_ns, jpeg) in enumerate(_frames_of(video), start=1):
-            if rate_hz is not None:
-                time_ns = round((count - 1) * NS / rate_hz)  # noqa: PLW2901
-            log.image(CAMERA, time_ns, jpeg, "jpeg")
-        if not count:
-            raise LogError(f"{video}: a video without frames")
-    words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
-    return PackResult(output, count, 0, words)
 
 
 def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:

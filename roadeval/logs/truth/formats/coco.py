@@ -36,7 +36,9 @@ def _read(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Dr
         if annotations and "segments_info" in annotations[0]:
             for each in annotations:
                 segments = {int(s["id"]): names[s["category_id"]] for s in each["segments_info"]}
-                file = _picture(path, each["file_name"])
+                bare = Path(each["file_name"]).name
+                places = (path.with_suffix("") / bare, path.parent / bare)
+                file = next((place for place in places if place.exists()), places[0])
                 yield Segments(str(image["file_name"]), size, file, segments)
         else:
             shapes = [s for each in annotations for s in _shapes(each, names[each["category_id"]])]
@@ -74,13 +76,6 @@ def lengths_in(text: str) -> Sequence[int]:
         lengths.append(value + (lengths[-2] if len(lengths) > 2 else 0))
         value = shift = 0
     return lengths
-
-
-def _picture(path: Path, name: str) -> Path:
-    """Return where the picture of segments lies: in a folder of the file's name, or beside it."""
-    bare = Path(name).name
-    places = (path.with_suffix("") / bare, path.parent / bare)
-    return next((place for place in places if place.exists()), places[0])
 
 
 FORMAT = LabelFormat("COCO", ".json", _holds, _read)
