@@ -59,17 +59,10 @@ def started(
     """Start worker processes here, or connect to a scheduler, until the block ends.
 
     Tasks that still run then are cancelled; workers that were started here end. A `FleetError` if
-    the scheduler does not answer.
-
-    Parameters
-    ----------
-    workers
-        Processes here; one a processor by default.
-    memory_gib
-        Limit of each; by default its share of the machine's. A process that takes more is ended,
-        which costs its drive one attempt.
-    scheduler
-        Address of a Dask scheduler, ``tcp://host:8786``, or the file that it has written.
+    the scheduler does not answer. There are ``workers`` processes here, one a processor by default.
+    ``memory_gib`` is the limit of each, by default its share of the machine's: a process that takes
+    more is ended, which costs its drive one attempt. ``scheduler`` is the address of a Dask
+    scheduler, ``tcp://host:8786``, or the file that it has written.
     """
     import dask
     import distributed

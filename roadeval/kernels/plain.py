@@ -54,17 +54,9 @@ LEAVES: Final = 32
 def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
     """Look every pixel up by the sum and the minimum of its channels.
 
-    Parameters
-    ----------
-    planes
-        Red, green and blue, ``(H, W)`` uint8 each.
-    table
-        ``(766, 256)`` uint8, indexed by ``R + G + B`` and ``min(R, G, B)``.
-
-    Returns
-    -------
-    codes, histogram
-        ``(H, W)`` uint8, and ``(256,)`` int64: how often each code occurs.
+    ``planes`` are red, green and blue, ``(H, W)`` uint8 each; ``table`` is ``(766, 256)`` uint8,
+    indexed by ``R + G + B`` and ``min(R, G, B)``. Returned are the codes, ``(H, W)`` uint8, and how
+    often each occurs, ``(256,)`` int64.
     """
     codes = table[np.sum(planes, axis=0, dtype=np.int64), np.min(planes, axis=0)]
     return codes, np.bincount(codes.ravel(), minlength=256)
@@ -75,21 +67,11 @@ def mahalanobis(
 ) -> tuple[Values, Plane]:
     """Distance of Eq. 2, ``|W (x - m)|``, of every pixel.
 
-    Parameters
-    ----------
-    planes
-        Red, green and blue, ``(H, W)`` uint8 each.
-    mean, whitening
-        m, ``(3,)``, a colour in 0..255, and W, ``(3, 3)`` lower triangular: ``W^T W`` is the
-        inverse covariance.
-    greatest
-        Of the square, up to which a pixel is near: a finite number.
-
-    Returns
-    -------
-    distance, near
-        ``(H, W)`` float32, computed in that precision; and ``(H, W)`` uint8, 1 near and 0 far,
-        decided in float64.
+    ``planes`` are red, green and blue, ``(H, W)`` uint8 each; ``mean`` is m, ``(3,)``, a colour in
+    0..255, and ``whitening`` W, ``(3, 3)`` lower triangular: ``W^T W`` is the inverse covariance.
+    ``greatest`` is that of the square, up to which a pixel is near: a finite number. Returned are
+    the distance, ``(H, W)`` float32, computed in that precision, and ``(H, W)`` uint8, 1 near and 0
+    far, decided in float64.
     """
     near = _squared(planes, mean, whitening) <= greatest
     single = mean.astype(np.float32), whitening.astype(np.float32)
@@ -113,19 +95,10 @@ def _squared(
 def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     """Look every pixel up in a table over all colours, a bit each.
 
-    Parameters
-    ----------
-    planes
-        Red, green and blue, ``(H, W)`` uint8 each.
-    road, left
-        ``(2^18,)`` uint64 by the upper six bits of red, green and blue; of a word's bits the lower
-        two of each tell which: similar colours, as an image has them side by side, share it.
-        ``left`` may be empty.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(H, W)`` uint8: the bit in ``road``, and twice that in ``left``.
+    ``planes`` are red, green and blue, ``(H, W)`` uint8 each. ``road`` and ``left`` are ``(2^18,)``
+    uint64 by the upper six bits of red, green and blue; of a word's bits the lower two of each tell
+    which: similar colours, as an image has them side by side, share it. ``left`` may be empty.
+    Returned are ``(H, W)`` uint8: the bit in ``road``, and twice that in ``left``.
     """
     r, g, b = (plane.astype(np.int64) for plane in planes)
     word = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
@@ -173,19 +146,9 @@ def _element(reach: Reach) -> Plane:
 def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     """Sum the colours of every label's runs.
 
-    Parameters
-    ----------
-    planes
-        Red, green and blue, ``(H, W)`` uint8 each.
-    runs
-        ``(n, 4)`` int32, see `components`.
-    count
-        Number of labels, background included.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(count, 7)`` int64: pixels, sums of R, G, B, and sums of their squares.
+    ``planes`` are red, green and blue, ``(H, W)`` uint8 each; ``runs`` are ``(n, 4)`` int32, see
+    `components`; ``count`` is the number of labels, background included. Returned are int64,
+    ``(count, 7)``: pixels, sums of R, G, B, and sums of their squares.
     """
     y, x, label = _run_pixels(runs)
     return _sums(label, np.dstack(planes)[y, x], count)
@@ -194,24 +157,10 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """Sum the colours of every component's buffer ring (Eq. 10).
 
-    Parameters
-    ----------
-    planes
-        Red, green and blue, ``(H, W)`` uint8 each.
-    runs
-        ``(n, 4)`` int32, see `components`.
-    ring
-        ``(H, words)``: the pixels outside the shadow that some dilation reaches.
-    count
-        Number of labels, background included.
-    width
-        Number of 3x3 dilations: a ring pixel lies within this Chebyshev distance.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(count, 7)`` int64, as in `run_sums`. A pixel counts once in each component that
-        reaches it.
+    ``planes``, ``runs`` and ``count`` are those of `run_sums`. ``ring`` is ``(H, words)``: the
+    pixels outside the shadow that some dilation reaches. ``width`` is the number of 3x3 dilations:
+    a ring pixel lies within this Chebyshev distance. Returned are ``(count, 7)`` int64, as by
+    `run_sums`; a pixel counts once in each component that reaches it.
     """
     height, columns = planes[0].shape
     y, x = np.nonzero(unpack(ring, columns))
@@ -254,23 +203,11 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 
     A path goes from neighbour to neighbour, by sides and corners. A step costs the sum of its two
     pixels' costs times `STRAIGHT` or `ASLANT`: ten times the integral of the cost along it [1]_.
-    Rows are swept up and down by turns, paths within a row included, as raster scans do [2]_:
-    a path that turns back up or down more often than there are ``rounds`` may be missed for a
-    dearer one. Whole numbers make the order of sums irrelevant.
-
-    Parameters
-    ----------
-    cost
-        ``(H, W)`` uint16: of a step of length 1.
-    seeds
-        ``(H, W)`` uint8, nonzero where paths begin.
-    rounds
-        Of a sweep up and one down.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(H, W)`` int32, at most `FAR`.
+    Rows are swept up and down by turns, paths within a row included, as raster scans do [2]_: a
+    path that turns back up or down more often than there are ``rounds`` may be missed for a dearer
+    one. Whole numbers make the order of sums irrelevant. ``cost`` is ``(H, W)`` uint16: of a step
+    of length 1. ``seeds`` are ``(H, W)`` uint8, nonzero where paths begin; a round is a sweep up
+    and one down. Returned are ``(H, W)`` int32, at most `FAR`.
 
     References
     ----------
@@ -329,20 +266,9 @@ def filter_rows(rows: Plane, step: int) -> Plane:
     """Subtract from each byte of a PNG file's rows its Paeth predictor (section 9 of the standard).
 
     That is the byte to the left, above, or above the left one (the corner), whichever is nearest to
-    ``left + above - corner``; of equals the first in this order.
-
-    Parameters
-    ----------
-    rows
-        ``(H, B)`` uint8.
-    step
-        Bytes from a pixel to the next.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(H, 1 + B)`` uint8, each row after its filter's number, 4. The differences are taken
-        modulo 256; beyond the image all is 0.
+    ``left + above - corner``; of equals the first in this order. ``rows`` are ``(H, B)`` uint8,
+    ``step`` the bytes from a pixel to the next. Returned are ``(H, 1 + B)`` uint8, each row after
+    its filter's number, 4. The differences are taken modulo 256; beyond the image all is 0.
     """
     height, size = rows.shape
     seen = np.zeros((1 + height, step + size), np.int16)
@@ -357,17 +283,9 @@ def filter_rows(rows: Plane, step: int) -> Plane:
 def label_rows(labels: Plane, bits: int) -> Plane:
     """Pack labels, the leftmost into a byte's highest bits, without a filter.
 
-    Parameters
-    ----------
-    labels
-        ``(H, W)`` uint8; of each the lowest bits are taken.
-    bits
-        Of a label, one of `LABEL_BITS`.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's number, 0.
+    ``labels`` are ``(H, W)`` uint8, of each of which the lowest ``bits`` are taken, one of
+    `LABEL_BITS`. Returned are ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's
+    number, 0.
     """
     single = np.unpackbits(labels[..., None], axis=2)[..., 8 - bits :]
     return _unfiltered(single.reshape(len(labels), -1))
@@ -388,19 +306,11 @@ def _unfiltered(single: Plane) -> Plane:
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     """Label the connected components of a mask (Eq. 9).
 
-    Parameters
-    ----------
-    bits, width
-        The mask, see `roadeval.data.arrays`.
-    connectivity
-        8, or 4 where pixels that touch by a corner are not connected.
-
-    Returns
-    -------
-    runs, count
-        ``(n, 4)`` int32: row, first column, column after the last, and label of each of their
-        rows' stretches, row after row and from left to right; and how many components there are.
-        Labels count from 1, in the order of the components' first pixels.
+    ``bits`` and ``width`` are the mask, see `roadeval.data.arrays`; ``connectivity`` is 8, or 4
+    where pixels that touch by a corner are not connected. Returned are the runs, ``(n, 4)`` int32:
+    row, first column, column after the last, and label of each of their rows' stretches, row after
+    row and from left to right; and how many components there are. Labels count from 1, in the order
+    of the components' first pixels.
     """
     count, found = cv2.connectedComponents(unpack(bits, width), connectivity=connectivity)
     # The library numbers them by blocks of rows.
@@ -476,24 +386,12 @@ def tree_sum(
     """Compute the sum of what decision trees give for each pixel.
 
     A tree's leaves are numbered from the left. Each of its nodes whose feature is above the
-    threshold rules out the leaves on its left; the first that no node has ruled out is the
-    pixel's [1]_.
-
-    Parameters
-    ----------
-    features
-        ``(F, n)`` float32: of n pixels.
-    feature, threshold, kept
-        ``(T, N)`` each, int32, float32 and uint32, of N nodes of T trees: a feature's place, what
-        it is compared with, and a bit for each leaf that is left where it is above that. The
-        highest bit is always set.
-    values
-        ``(T, LEAVES)`` float32: what each leaf adds.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(n,)`` float32, summed in the trees' order.
+    threshold rules out the leaves on its left; the first that no node has ruled out is the pixel's
+    [1]_. ``features`` are ``(F, n)`` float32: of n pixels. ``feature``, ``threshold`` and ``kept``
+    are ``(T, N)`` each, int32, float32 and uint32, of N nodes of T trees: a feature's place, what
+    it is compared with, and a bit for each leaf that is left where it is above that; the highest
+    bit is always set. ``values`` are ``(T, LEAVES)`` float32: what each leaf adds. Returned are
+    ``(n,)`` float32, summed in the trees' order.
 
     References
     ----------

@@ -156,19 +156,10 @@ class Chain:
     ) -> Iterator[tuple[str, dict[str, Packed]]]:
         """Yield what the chain makes of an image once one of its stages is replaced by the truth.
 
-        Parameters
-        ----------
-        view, outputs
-            The argument and the outputs of `run`.
-        road, shadow
-            The truths, ``(H, W)`` uint8 (0, 1, 255). Without that of shadow no filter is replaced.
-        known
-            What is the same for all variants of the frame, filled as it is computed.
-
-        Yields
-        ------
-        stage, masks
-            The stage that was replaced, as it is reported, and the masks of those after it.
+        ``view`` and ``outputs`` are the argument and the outputs of `run`, ``road`` and ``shadow``
+        the truths, ``(H, W)`` uint8 (0, 1, 255); without that of shadow no filter is replaced.
+        ``known`` is what is the same for all variants of the frame, filled as it is computed.
+        Yielded are the stage that was replaced, as it is reported, and the masks of those after it.
         """
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road

@@ -49,17 +49,9 @@ def sums_of_products(
 ) -> Margins:
     """Return the margins ``sum_i weights[i] f_i(0, R) f_i(1, G) f_i(2, B) + offset``.
 
-    Parameters
-    ----------
-    weights
-        ``(m,)``.
-    factor
-        ``factor(channel, levels)``: the ``(n, m)`` factors f_i of that channel, each in 0..1,
-        at ``(n,)`` levels in 0..255, whole or not.
-    offset
-        Added to every sum.
-    rounding
-        How far a factor may be off as it is computed.
+    ``weights`` are ``(m,)``; ``factor(channel, levels)`` returns the ``(n, m)`` factors f_i of that
+    channel, each in 0..1, at ``(n,)`` levels in 0..255, whole or not. ``offset`` is added to every
+    sum; ``rounding`` is how far a factor may be off as it is computed.
     """
     total = float(np.abs(weights).sum())
     exact = factor(1, LEVELS), factor(2, LEVELS)
@@ -96,14 +88,10 @@ def _chebyshev(count: int) -> tuple[Floats, Floats]:
 class ColourTable:
     """Which colours have a positive margin, each decided as exactly as by `decide`.
 
-    Parameters
-    ----------
-    margins
-        The margin of every colour. It decides where it is further from 0 than its error bound.
-    decide
-        From ``(n, 3)`` uint8 colours to ``(n,)`` bool, for the colours that are left. There are
-        some twenty of them as a rule. Where a machine has learnt nothing and its margin is 0
-        everywhere they are all colours, and only those that are looked up are decided.
+    ``margins`` is the margin of every colour: it decides where it is further from 0 than its error
+    bound. ``decide`` is asked for the colours that are left, ``(n, 3)`` uint8 to ``(n,)`` bool:
+    some twenty as a rule. Where a machine has learnt nothing and its margin is 0 everywhere they
+    are all colours, and only those that are looked up are decided.
     """
 
     def __init__(self, margins: Margins, decide: Decide) -> None:

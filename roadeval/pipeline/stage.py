@@ -210,17 +210,10 @@ def check_arrays(
     """Check what the functions of a stage assume about its parameters.
 
     A `ValueError` if a field has another shape or type, or holds a number that is not finite, or is
-    beyond `GREATEST` in an array; a sentence that names the field.
-
-    Parameters
-    ----------
-    parameters
-        A dataclass.
-    dtype
-        The type of its arrays. Single numbers may be of any real type and any size.
-    shapes
-        The shape of each field. A letter stands for a length of one or more, the same wherever
-        it occurs; ``()`` is a single number.
+    beyond `GREATEST` in an array; a sentence that names the field. ``parameters`` is a dataclass,
+    ``dtype`` the type of its arrays; single numbers may be of any real type and any size.
+    ``shapes`` has the shape of each field: a letter stands for a length of one or more, the same
+    wherever it occurs; ``()`` is a single number.
     """
     lengths: dict[int | str, int] = {}
     for name, shape in shapes.items():

@@ -143,18 +143,11 @@ class NoSettings:
 def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     """Return the stage of a function from an image to a road mask.
 
-    A `TypeError` if it has other arguments.
-
-    Parameters
-    ----------
-    name
-        Of the stage.
-    function
-        Its arguments are given by their names: ``image``, ``(H, W, 3)`` uint8 RGB; ``moment``, a
-        `roadeval.data.Moment`, or None for an image by itself; and ``settings``, whose default is
-        an instance of a dataclass. It returns ``(H, W)`` bool or whole numbers, nonzero where road
-        is; or floats from 0 to 1, how probable road is, whose mask is what is above one half; or
-        an `Output` without layers other than its mask.
+    A `TypeError` if it has other arguments. The function's arguments are given by their names:
+    ``image``, ``(H, W, 3)`` uint8 RGB; ``moment``, a `roadeval.data.Moment`, or None for an image
+    by itself; and ``settings``, whose default is an instance of a dataclass. It returns ``(H, W)``
+    bool or whole numbers, nonzero where road is; or floats from 0 to 1, how probable road is, whose
+    mask is what is above one half; or an `Output` without layers other than its mask.
     """
     arguments = inspect.signature(function).parameters
     for argument, about in arguments.items():

@@ -217,16 +217,9 @@ class Recorder:
     """Writes one recording, under the name ``partial`` at first.
 
     A context manager: after `finish` the recording takes its name at the end. Left by an exception
-    it closes the partial recording, which stays readable.
-
-    Parameters
-    ----------
-    path
-        The name of the complete recording. A file of that name is replaced at the end only.
-    layout
-        What will come.
-    rule
-        Which images are kept, any but ``none``. Those of ``worst:K`` wait on disk until the end.
+    it closes the partial recording, which stays readable. ``path`` is the name of the complete
+    recording: a file of that name is replaced at the end only. ``rule`` says which images are kept,
+    any but ``none``; those of ``worst:K`` wait on disk until the end.
     """
 
     def __init__(self, path: Path, layout: Layout, rule: RecordRule = ALL) -> None:

@@ -61,23 +61,12 @@ def read_table(
 ) -> pd.DataFrame:
     """Read a table of a drive bit-exactly, and check that it is whole.
 
-    A `ResultsError` if the table is damaged, or is not the one that the summary states.
-
-    Parameters
-    ----------
-    name
-        Of the table, in `roadeval.results.schema.TABLES`.
-    source
-        A CSV file, or its text with the header line. A file that does not exist has no rows, like
-        an empty text.
-    stated
-        The number of rows and the SHA-256 that the summary states of each table, by name. One that
-        it does not state must be empty. None where there is no summary.
-
-    Returns
-    -------
-    DataFrame
-        Words are text, even if they look like numbers; rates are float64, all other numbers int64.
+    A `ResultsError` if the table is damaged, or is not the one that the summary states. ``name`` is
+    one of `roadeval.results.schema.TABLES`; ``source`` a CSV file, or its text with the header
+    line. A file that does not exist has no rows, like an empty text. ``stated`` are the number of
+    rows and the SHA-256 that the summary states of each table, by name: one that it does not state
+    must be empty. It is None where there is no summary. Words are text, even if they look like
+    numbers; rates are float64, all other numbers int64.
     """
     import pyarrow as pa
 

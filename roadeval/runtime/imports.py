@@ -57,14 +57,9 @@ def extension(name: str, *packages: str) -> ModuleType:
     """Return a compiled module of a library; an ImportError if there is none.
 
     In a version of the library that is laid out in another way, its packages are imported too.
-
-    Parameters
-    ----------
-    name
-        Of the module, as ``scipy.special._ufuncs``.
-    packages
-        Those that are not to be run, outer ones first: the module's own, and those of the compiled
-        modules that it needs. One that is imported already stays as it is.
+    ``name`` is the module's, as ``scipy.special._ufuncs``. ``packages`` are those that are not to
+    be run, outer ones first: its own, and those of the compiled modules that it needs. One that is
+    imported already stays as it is.
     """
     with _ONE_AT_A_TIME:
         if name in sys.modules:

@@ -47,17 +47,10 @@ def fit(
     """Train every variant that learns anything.
 
     A `TrainingError` if there is no frame, or if the frames show road alone or no road at all and
-    some variant has something to learn.
-
-    Parameters
-    ----------
-    frames
-        The training frames; with truth, unless ``settings.source`` allows the patch.
-    prior
-        Kept in the model for the baseline, see `Model`.
-    base
-        What the variants have learnt from other drives. Stages that can learn further do so, the
-        others stay as they are.
+    some variant has something to learn. The frames have truth, unless ``settings.source`` allows
+    the patch. ``prior`` is kept in the model for the baseline, see `Model`. ``base`` is what the
+    variants have learnt from other drives: stages that can learn further do so, the others stay as
+    they are.
     """
     learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)

@@ -49,25 +49,13 @@ def from_log(
 ) -> tuple[tuple[Model, ...], Schedule]:
     """Train on some frames of a log, with each seed of the settings.
 
-    A `TrainingError` if there is nothing to learn from, or nothing left to evaluate.
-
-    Parameters
-    ----------
-    frames
-        Returns the frames of the selected range, in order and from the first at each call. Only as
-        many are decoded as are needed.
-    on_frame
-        Called with the number of training frames decoded so far.
-    labelled
-        Whether the log's truth may be used; then only frames that have one train, and some must
-        be left to evaluate. Where no frame of the range has one, the first ones train.
-    base
-        What was learnt from other drives, on top of which to learn.
-
-    Returns
-    -------
-    models, schedule
-        The model of each seed, the first with the warnings of all, and which frames are left out.
+    A `TrainingError` if there is nothing to learn from, or nothing left to evaluate. ``frames``
+    returns the frames of the selected range, in order and from the first at each call; only as many
+    are decoded as are needed, and ``on_frame`` is called with the number of those so far.
+    ``labelled`` says that the log's truth may be used: then only frames that have one train, and
+    some must be left to evaluate. Where no frame of the range has one, the first ones train.
+    ``base`` is what was learnt from other drives. Returned are the model of each seed, the first
+    with the warnings of all, and which frames are left out.
     """
     if base is not None:
         _require_adaptable(pipelines)

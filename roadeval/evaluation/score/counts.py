@@ -46,19 +46,9 @@ Total = dict[str, Any]
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
     """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
 
-    Parameters
-    ----------
-    masks
-        ``(K, H, words)``: road.
-    truth
-        Ignored pixels are in no count.
-    regions
-        R of ``(H, words)``; they may overlap.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(K, 1 + R, 4)`` int64: of each mask the whole frame's four, then each region's.
+    ``masks`` are ``(K, H, words)``: road. Ignored pixels are in no count. ``regions`` are R of
+    ``(H, words)``, which may overlap. Returned are ``(K, 1 + R, 4)`` int64: of each mask the whole
+    frame's four, then each region's.
     """
     inside = flat([everywhere(truth.shape), *regions])
     classes = flat([truth.road, truth.other])
@@ -316,17 +306,9 @@ def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[
     """Compute the boundary F of some masks: ``F = 2 P R / (P + R)`` [1]_ [2]_.
 
     P is the share of the mask's edge pixels that lie within ``width`` of the truth's edge, R the
-    share of the truth's edge pixels within ``width`` of the mask's. 0 if only one of the two has
-    an edge, NaN if neither has.
-
-    Parameters
-    ----------
-    masks
-        ``(H, words)`` each, by name.
-    truth
-        Ignored pixels are on neither side of an edge.
-    width
-        The tolerance in pixels, Euclidean distance.
+    share of the truth's edge pixels within ``width`` of the mask's. 0 if only one of the two has an
+    edge, NaN if neither has. ``masks`` are ``(H, words)`` each, by name; ``width`` is the tolerance
+    in pixels, Euclidean distance. Ignored pixels are on neither side of an edge.
 
     References
     ----------

@@ -171,12 +171,9 @@ class Scoreboard:
     def repeats(self) -> dict[str, Any]:
         """Return the rates with each seed, in their order: first those of the run's own.
 
-        Returns
-        -------
-        dict
-            ``totals``, by variant and stage the mean and the pooled rates; ``difference``, by stage
-            the mean paired differences, filtered minus unfiltered. Empty without a further seed.
-            A mask that no training has to do with is not in it.
+        Returned are ``totals``, by variant and stage the mean and the pooled rates, and
+        ``difference``, by stage the mean paired differences, filtered minus unfiltered. It is empty
+        without a further seed; a mask that no training has to do with is not in it.
         """
         further = [masks.so_far() for _, masks in sorted(self._repeats.items())]
         if not further:

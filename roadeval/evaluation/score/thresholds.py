@@ -140,17 +140,11 @@ class Thresholds:
 def calibration(counts: Sums, bins: int = BINS) -> list[dict[str, float]]:
     """Return the bins of the reliability diagram that hold any pixel, from low to high.
 
-    Of each its ``pixels``, their mean ``probability``, and the share of them that is ``road``.
-    Bin ``b`` of ``B`` holds probabilities in ``(b / B, (b + 1) / B]``, and the first one 0, too.
-    In [1]_ bins are of the confidence in whichever class is called; here, with two classes, of the
-    probability of road, as in scikit-learn's ``calibration_curve``.
-
-    Parameters
-    ----------
-    counts
-        ``(2, 65536)``: non-road and road.
-    bins
-        How many there are.
+    Of each its ``pixels``, their mean ``probability``, and the share of them that is ``road``. Bin
+    ``b`` of ``B`` holds probabilities in ``(b / B, (b + 1) / B]``, and the first one 0, too. In
+    [1]_ bins are of the confidence in whichever class is called; here, with two classes, of the
+    probability of road, as in scikit-learn's ``calibration_curve``. ``counts`` are ``(2, 65536)``:
+    non-road and road.
 
     References
     ----------

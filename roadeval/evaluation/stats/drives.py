@@ -227,21 +227,11 @@ def strata(
     """Divide drives by each tag and each condition, and average every part.
 
     Their p-values are corrected together. A tag or a condition that does not divide the drives
-    makes no parts.
-
-    Parameters
-    ----------
-    drives
-        Those without a mean are left out.
-    tags, conditions
-        By name: each drive's value, in the order of ``drives``; None (or NaN) where it has none,
-        which leaves the drive out of this division. A condition's thirds are of the drives that
-        have it; drives of one value stay together, so that thirds may differ in size.
-
-    Returns
-    -------
-    list of Stratum
-        Tags first, in the order given, their values sorted; thirds from low to high.
+    makes no parts. ``tags`` and ``conditions`` are by name each drive's value, in the order of
+    ``drives``; None (or NaN) where it has none, which leaves the drive out of this division. A
+    condition's thirds are of the drives that have it, from low to high; drives of one value stay
+    together, so that thirds may differ in size. Tags come first, in the order given, their values
+    sorted. Drives without a mean are left out.
     """
     known = [place for place, each in enumerate(drives) if not np.isnan(each.mean)]
     parts = [part for by, values in tags.items() for part in _by_value(by, values, known)]

@@ -316,15 +316,9 @@ def strips_of(
 ) -> tuple[list[Strip], list[str]]:
     """Return frames with their pictures, and the variants whose layers had no room.
 
-    In the drive's order: the worst, the best, and others.
-
-    Parameters
-    ----------
-    count
-        How many. By default as many of `PICTURED` as keep the page below `BYTES`; where that would
-        be fewer than `FEWEST`, only the first variants have their layers.
-    taken
-        Bytes of the page without them.
+    In the drive's order: the worst, the best, and others. ``count`` is how many; by default as many
+    of `PICTURED` as keep the page below `BYTES`, of which ``taken`` are used without them. Where
+    that would be fewer than `FEWEST`, only the first variants have their layers.
     """
     if result.recording is None:
         return [], []

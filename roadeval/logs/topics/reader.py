@@ -245,16 +245,9 @@ class FileChannel:
 class TopicReader:
     """The messages of one topic, from all files and channels that carry it.
 
-    Reading is for one thread at a time.
-
-    Attributes
-    ----------
-    name, channels
-        The topic, and the channels that carry it.
-    limits
-        On the images that are decoded of it.
-    log_times
-        ``(n,)`` int64 nanoseconds, ascending; equal ones in the order of the file.
+    Reading is for one thread at a time. ``name`` and ``channels`` are the topic and the channels
+    that carry it, ``limits`` those on the images that are decoded of it. ``log_times`` are ``(n,)``
+    int64 nanoseconds, ascending; equal ones in the order of the file.
     """
 
     def __init__(

@@ -191,15 +191,10 @@ def understand(
     """Decide what the values of label pictures mean.
 
     A `LogError` if a given value does not occur, or none is given and the values are class ids.
-
-    Parameters
-    ----------
-    seen
-        The values, or packed colours, that occur in some of the pictures, once for each picture in
-        which they do.
-    several
-        Whether the labels are given for several logs at once. Then a mask that needs no settings
-        is understood by itself where none of the given values occurs in it.
+    ``seen`` are the values, or packed colours, that occur in some of the pictures, once for each
+    picture in which they do. ``several`` says that the labels are given for several logs at once:
+    then a mask that needs no settings is understood by itself where none of the given values occurs
+    in it.
     """
     pictures = Counter(seen)
     values = sorted(pictures)

@@ -123,17 +123,9 @@ def grow(values: Values, road: Flags, weights: Floats | None, growth: Growth, se
     """Grow trees with scikit-learn's gradient boosting on histograms [1]_.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
-
-    Parameters
-    ----------
-    values
-        ``(n, F)`` features, finite.
-    road
-        ``(n,)`` labels; both occur.
-    weights
-        ``(n,)`` of the pixels, above 0; None: all weigh the same.
-    growth, seed
-        How they are grown; of the draw of features.
+    ``values`` are ``(n, F)`` finite features, ``road`` ``(n,)`` labels, of which both occur;
+    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. ``seed`` is that of the
+    draw of features.
 
     References
     ----------
