@@ -17,7 +17,7 @@ from roadeval.config import RunConfig
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet
-from roadeval.training.fitting import sample
+from roadeval.training.learning import sample
 from tests.pipeline import reference
 
 Times = dict[str, list[float]]

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.config.document import config_toml, run_toml
     from roadeval.config.run import (
         OF_A_LOG,
         DriveSettings,
         RunConfig,
+        config_toml,
         configure,
         load_config,
         log_config,
+        run_toml,
     )
     from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
     from roadeval.config.tables import ConfigError, in_file, read_tables

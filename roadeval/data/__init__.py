@@ -42,6 +42,7 @@ from roadeval.data.result import (
     FrameResult,
     Health,
     Output,
+    Rows,
     StageResult,
     Tally,
     Transition,
@@ -49,7 +50,6 @@ from roadeval.data.result import (
     VariantResult,
     is_plain,
 )
-from roadeval.data.rows import Rows
 
 __all__ = [
     "BASELINE",

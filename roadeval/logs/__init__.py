@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     )
     from roadeval.logs.topics.reader import TopicInfo
     from roadeval.logs.truth.source import LabelSource, label_files
-    from roadeval.logs.writing.pack import PackResult, pack
-    from roadeval.logs.writing.writer import LogWriter, NoSidecar, SidecarWriter
+    from roadeval.logs.writing.writer import LogWriter, NoSidecar, PackResult, SidecarWriter, pack
 
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

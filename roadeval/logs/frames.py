@@ -17,9 +17,8 @@ from roadeval.data import ROAD, Frame, Rgb
 from roadeval.images import Limits, format_of
 from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError, LogError
 from roadeval.logs.messages.encoding import TopicKind
-from roadeval.logs.messages.pictures import CompressedPicture, Picture
+from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
 from roadeval.logs.messages.pixels import to_rgb
-from roadeval.logs.messages.video import PictureSequence, Video
 from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, oddities

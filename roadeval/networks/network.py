@@ -1,11 +1,18 @@
-"""A network's road mask of a frame."""
+"""A network's road mask of a frame; what its settings lack is read from its file, or asked for.
+
+A file's metadata may hold class names, the channels' order, their range, and a licence. The keys
+are those that exporters write: ``names`` (a dictionary in Python's or JSON's form, or a list) and
+ONNX's own ``Image.BitmapPixelFormat`` and ``Image.NominalPixelRange``.
+"""
 
 from __future__ import annotations
 
+import ast
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final, Self
+from typing import Any, Final, Literal, Self
 
 import cv2
 import numpy as np
@@ -13,15 +20,9 @@ import numpy.typing as npt
 
 from roadeval.data import Mask, Probability, Rgb
 from roadeval.data.arrays import Values
-from roadeval.networks.completion import (
-    as_scores,
-    class_names,
-    completed,
-    is_labels,
-    licence,
-)
 from roadeval.networks.onnx_file import OnnxFile, load
 from roadeval.networks.settings import NetSettings
+from roadeval.runtime.text import visible
 
 FULL: Final = 65535
 """The code of a probability of 1."""
@@ -218,3 +219,206 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> npt.NDArray[A
         values = np.clip(np.rint(values), limits.min, limits.max)
     planes = values.transpose(2, 0, 1) if settings.layout == "NCHW" else values
     return np.ascontiguousarray(planes[None], kind)
+
+
+FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
+"""Types of an input that takes an image."""
+NAMES: Final = ("names", "class_names", "classes", "labels")
+ROAD_NAMES: Final = frozenset({"road", "drivable", "drivable area", "driveable area", "roadway"})
+"""Names of classes that are road."""
+LONGEST: Final = 100_000
+"""Letters of a list of class names."""
+QUOTED: Final = 1000
+"""Letters of a licence that results quote."""
+_ORDERS: Final[Mapping[str, Literal["rgb", "bgr", "grey"]]] = {
+    "rgb8": "rgb",
+    "bgr8": "bgr",
+    "gray8": "grey",
+}
+_RANGES: Final[Mapping[str, tuple[float, float]]] = {
+    "nominalrange_0_255": (1.0, 0.0),
+    "normalized_0_1": (1 / 255, 0.0),
+    "normalized_1_1": (2 / 255, 1.0),
+}
+"""Scale and mean that bring 0..255 to the range."""
+
+
+def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
+    """Return settings without any missing value.
+
+    A `NetworkError` if the network cannot be used, or a value cannot be read from its file: one
+    line that asks for it and lists the network's inputs and outputs.
+    """
+    settings = replace(settings, sha256=file.sha256)
+    settings = _numbers(_input(settings, file), file)
+    known = tuple(output.name for output in file.outputs)
+    if settings.outputs is None and len(known) > 1:
+        raise file.question("gives several outputs: name those that show road by `net.outputs`")
+    outputs = settings.outputs or known
+    for name in outputs:
+        if name not in known:
+            raise file.question(f"has no output {name!r}: see `net.outputs`")
+    settings = replace(settings, outputs=outputs)
+    for name, array in zip(outputs, file.tried(settings.input_shape, outputs), strict=True):
+        settings = _meaning(settings, file, name, array)
+    return settings
+
+
+def class_names(metadata: Mapping[str, str]) -> dict[int, str]:
+    """Return the names of the classes by their numbers; none where the file lists none."""
+    text = next((metadata[key] for key in NAMES if key in metadata), "")
+    names = _read(text) if len(text) <= LONGEST else None
+    if isinstance(names, list | tuple):
+        names = dict(enumerate(names))
+    if not isinstance(names, dict):
+        return {}
+    return {int(key): visible(str(name)) for key, name in names.items() if str(key).isdecimal()}
+
+
+def licence(metadata: Mapping[str, str]) -> str | None:
+    """Return the file's licence in one line; None if it names none."""
+    text = " ".join((metadata.get("license") or metadata.get("licence") or "").split())
+    return visible(text if len(text) <= QUOTED else f"{text[:QUOTED]}...") if text else None
+
+
+def is_labels(output: npt.NDArray[Any]) -> bool:
+    """Return whether an output holds classes themselves, and not scores of each."""
+    return bool(output.dtype.kind in "iub")
+
+
+def as_scores(output: npt.NDArray[Any], layout: str | None) -> npt.NDArray[Any] | None:
+    """Return an output as classes, rows and columns; None where it is no map of the image.
+
+    It is of one image, ``(1, C, h, w)``, or ``(1, h, w, C)`` where the input's layout is ``NHWC``,
+    or without the length of 1, or without classes.
+    """
+    array = output[0] if output.ndim > 2 and len(output) == 1 else output
+    if array.ndim == 3 and layout == "NHWC" and len(array) != 1:
+        array = array.transpose(2, 0, 1)
+    if array.ndim == 2:
+        array = array[None]
+    return array if array.ndim == 3 and min(array.shape[1:]) > 1 else None
+
+
+# --- The input ------------------------------------------------------------------------------------
+
+
+def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
+    """Complete layout, channels and size."""
+    shape = file.inputs[0].shape if len(file.inputs) == 1 else ()
+    if len(shape) != 4 or shape[0] not in (None, 1) or file.inputs[0].dtype not in FED:
+        raise file.question("takes no image: that is one input of four lengths, the first one 1")
+    layout = settings.layout or ("NCHW" if shape[1] in (1, 3) else "NHWC")
+    _, count, rows, columns = shape if layout == "NCHW" else (1, shape[3], shape[1], shape[2])
+    if settings.layout is None and count not in (1, 3):
+        raise file.question("give the order of its input's lengths by `net.layout`")
+    width, height = settings.size or (columns, rows)
+    if width is None or height is None:
+        raise file.question(
+            "takes images of any size: give width and height by `net.size`, as [512, 256]"
+        )
+    if columns not in (None, width) or rows not in (None, height):
+        raise file.question(f"takes no input of {width}x{height}: see `net.size`")
+    order = _ORDERS.get(file.metadata.get("Image.BitmapPixelFormat", "").lower())
+    channels = settings.channels or order or ("grey" if count == 1 else "rgb")
+    settings = replace(settings, layout=layout, channels=channels, size=(width, height))
+    if count not in (None, settings.channel_count):
+        raise file.question(
+            f"its input has {count} channels, and {channels} has {settings.channel_count}"
+        )
+    return settings
+
+
+def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
+    """Complete scale, mean and deviation."""
+    default = (1.0 if file.inputs[0].dtype == "uint8" else 1 / 255, 0.0)
+    named = file.metadata.get("Image.NominalPixelRange", "").lower()
+    scale, mean = _RANGES.get(named, default)
+    settings = replace(
+        settings,
+        scale=settings.scale or scale,
+        mean=settings.mean or ((mean,) if settings.scale is None else (0.0,)),
+        deviation=settings.deviation or (1.0,),
+    )
+    for name in ("mean", "deviation"):
+        if len(getattr(settings, name)) not in (1, settings.channel_count):
+            raise file.error(
+                f"`net.{name}` must hold one number, or one for each of the "
+                f"{settings.channel_count} channels"
+            )
+    return settings
+
+
+# --- The outputs ----------------------------------------------------------------------------------
+
+
+def _meaning(
+    settings: NetSettings, file: OnnxFile, name: str, output: npt.NDArray[Any]
+) -> NetSettings:
+    """Complete what an output means."""
+    assert settings.size is not None
+    width, height = settings.size
+    scores = as_scores(output, settings.layout)
+    count, rows, columns = (0, 0, 0) if scores is None else scores.shape
+    # It has about the proportions of the input, and no more than one class of whole numbers.
+    is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
+    if not is_map or (is_labels(output) and count != 1):
+        raise file.question(f"its output {name!r} is no map of the image, but {output.shape}")
+    if is_labels(output):
+        road = _road(settings, file, None)
+        return replace(settings, road=road, activation="none", decide="argmax")
+    decide = settings.decide or ("threshold" if count == 1 else "argmax")
+    if decide == "argmax" and count == 1:
+        raise file.question(
+            f"its output {name!r} has one class, which beats no other: see `net.decide`"
+        )
+    is_probability = file.makers.get(name, "").lower() in ("softmax", "sigmoid")
+    usual: Literal["softmax", "sigmoid"] = "sigmoid" if count == 1 else "softmax"
+    activation = settings.activation or ("none" if is_probability else usual)
+    road = _road(settings, file, count)
+    if decide == "argmax" and len(road) == count:
+        raise file.question("all of its classes are road: see `net.road`")
+    return replace(settings, road=road, activation=activation, decide=decide)
+
+
+def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int, ...]:
+    """Return the numbers of the classes that are road, of ``count``; None: of labels."""
+    names = class_names(file.metadata)
+    if settings.road is not None:
+        road = tuple(_number(each, names, file) for each in settings.road)
+    elif count in (1, 2):
+        road = (count - 1,)
+    else:
+        road = tuple(n for n, name in names.items() if name.strip().lower() in ROAD_NAMES)
+    if not road:
+        of = "" if count is None else f" of its {count}"
+        listed = f", which are {_listed(names)}" if names else ""
+        raise file.question(f"name the classes{of} that are road by `net.road`, as [0]{listed}")
+    if count is not None and max(road) >= count:
+        raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
+    return road
+
+
+def _number(named: int | str, names: dict[int, str], file: OnnxFile) -> int:
+    if isinstance(named, int):
+        return named
+    found = next((number for number, name in names.items() if name == named), None)
+    if found is None:
+        known = f"it has {_listed(names)}" if names else "its file names none, so give numbers"
+        raise file.question(f"has no class {named!r}; {known}: see `net.road`")
+    return found
+
+
+def _listed(names: dict[int, str], most: int = 30) -> str:
+    shown = [f"{number} {name}" for number, name in list(names.items())[:most]]
+    return ", ".join(shown) + (", ..." if len(names) > most else "")
+
+
+def _read(text: str) -> Any:
+    """Return the data that a text writes in JSON's or Python's form; None if it is neither."""
+    for read in (json.loads, ast.literal_eval):
+        try:
+            return read(text)
+        except (ValueError, SyntaxError, MemoryError, RecursionError):
+            continue
+    return None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import Rows, is_plain
-from roadeval.data.rows import Cells
+from roadeval.data.result import Cells
 from roadeval.errors import RoadevalError
 from roadeval.results.schema import ARROW, KEY, TABLES, TAG, Column, Kind, TableSchema
 from roadeval.runtime.documents import BYTES, LONG, check_texts

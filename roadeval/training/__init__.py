@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.training.fitting import TrainingError, fit
+    from roadeval.training.learning import TrainingError, fit
     from roadeval.training.model import Model, load_model, save_model
     from roadeval.training.settings import TrainingSettings
 

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from roadeval.fleet.entry import entry_of
-from roadeval.fleet.folds import groups_of
+from roadeval.fleet.entry import entry_of, groups_of
 from roadeval.logs.container.records import MAGIC
 
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from roadeval.fleet.entry import FleetError
-from roadeval.fleet.folds import deal
+from roadeval.fleet.entry import FleetError, deal
 
 DRIVES = {f"drive{k}": f"day{k // 3}" for k in range(30)}
 

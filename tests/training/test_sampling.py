@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.training import TrainingSettings
-from roadeval.training.fitting import sample
+from roadeval.training.learning import sample
 
 HALF = np.repeat([[1], [0]], [4, 4], axis=0).repeat(10, axis=1).astype(np.uint8)
 

@@ -6,7 +6,7 @@ import pytest
 from roadeval.data import NON_ROAD, ROAD
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.training import TrainingSettings
-from roadeval.training.fitting import WIDTH, patch_truth
+from roadeval.training.learning import WIDTH, patch_truth
 
 HEIGHT = 120
 SETTINGS = TrainingSettings()

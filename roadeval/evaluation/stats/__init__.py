@@ -1,10 +1,10 @@
 """The statistics: differences with intervals, within a drive and over drives, and corrections."""
 
-from roadeval.evaluation.stats.autocorrelation import mean_distribution
-from roadeval.evaluation.stats.difference import (
+from roadeval.evaluation.stats.autocorrelation import (
     Difference,
     benjamini_hochberg,
     holm,
+    mean_distribution,
     within_drive,
 )
 from roadeval.evaluation.stats.drives import (

@@ -39,7 +39,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.evaluation.stats.difference import Difference, holm
+from roadeval.evaluation.stats.autocorrelation import Difference, holm
 from roadeval.runtime.imports import special
 
 Values = npt.NDArray[np.float64]

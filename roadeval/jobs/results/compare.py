@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, Rows
-from roadeval.data.rows import joined
+from roadeval.data.result import joined
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import comparison, score
 from roadeval.evaluation.comparison import (

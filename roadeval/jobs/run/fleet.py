@@ -16,8 +16,7 @@ from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison import Condition
 from roadeval.fleet.engine import ATTEMPTS, died, started
-from roadeval.fleet.entry import DriveEntry, FleetError
-from roadeval.fleet.folds import deal, groups_of, shuffled
+from roadeval.fleet.entry import DriveEntry, FleetError, deal, groups_of, shuffled
 from roadeval.fleet.sources import find_drives
 from roadeval.jobs.run.fleet_work import (
     Done,

@@ -22,12 +22,12 @@ from roadeval.logs.messages.pictures import (
     Decoder,
     LoggedPicture,
     RawPicture,
+    Video,
     codec_of,
     decoder_for,
     kind_of,
 )
 from roadeval.logs.messages.pixels import lossy_format, raw_format, size_of, to_labels
-from roadeval.logs.messages.video import Video
 from roadeval.logs.settings import NS
 
 PROBES: Final = 3

@@ -13,9 +13,8 @@ import numpy as np
 
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.messages.pictures import Picture, RawPicture
+from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import format_of, size_of
-from roadeval.logs.messages.video import PictureSequence
 from roadeval.logs.settings import LabelPlace, MaskSettings
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.meaning import (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, Rows, colours
-from roadeval.data.rows import Cells
+from roadeval.data.result import Cells
 from roadeval.data.words import in_percent, points
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import METRICS, SHORT

@@ -10,9 +10,8 @@ from roadeval.data import Frame
 from roadeval.images import Limits
 from roadeval.logs import FrameError, FrameSettings, LogConfig, TopicKind, open_log
 from roadeval.logs.errors import DamagedMessage
-from roadeval.logs.messages.pictures import CompressedPicture, Picture
+from roadeval.logs.messages.pictures import CompressedPicture, Picture, Video, is_keyframe
 from roadeval.logs.messages.pixels import to_rgb
-from roadeval.logs.messages.video import Video, is_keyframe
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar
 from tests.fixtures.make import make
 from tests.fixtures.shared import both
@@ -46,7 +45,7 @@ def test_a_start_amid_the_video_begins_at_the_keyframe_before(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = frames(log)
-    monkeypatch.setattr("roadeval.logs.messages.video.PATIENCE", 2)
+    monkeypatch.setattr("roadeval.logs.messages.pictures.PATIENCE", 2)
     with open_log(log) as opened:
         stream = opened.frames(opened.select())
         start = [frame.log_time_ns for frame in stream][7]

@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval.logs import LabelSettings, LogConfig, LogError, open_log, pack
-from roadeval.logs.writing.pack import CAMERA, TRUTH
+from roadeval.logs.writing.writer import CAMERA, TRUTH
 from tests.fixtures.shared import shared
 from tests.logs.making import grey, jpeg, png
 
