@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from itertools import chain
 from typing import Any, Final, NamedTuple, Protocol
 
 from mcap.records import Channel, Schema
@@ -153,7 +154,7 @@ class Decoder(NamedTuple):
 @cache
 def message_encodings() -> Mapping[str, Encoding]:
     """Return the message encodings of the folder, by name."""
-    return {encoding.name: encoding for encoding in found_in(encodings, "ENCODING")}
+    return {encoding.name: encoding for encoding in chain(*found_in(encodings, "ENCODINGS"))}
 
 
 def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:

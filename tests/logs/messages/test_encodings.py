@@ -21,8 +21,8 @@ def read(data):
     return SimpleNamespace(data=bytes.fromhex(bytes(data).decode()), format="png")
 
 
-ENCODING = Encoding(
-    "hexadecimal", lambda schema: MessageReader(read), {"Snapshot": TopicKind.COMPRESSED}
+ENCODINGS = (
+    Encoding("hexadecimal", lambda schema: MessageReader(read), {"Snapshot": TopicKind.COMPRESSED}),
 )
 """
 

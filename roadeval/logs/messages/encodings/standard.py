@@ -1,0 +1,158 @@
+"""The message encodings that logs are written in."""
+
+from __future__ import annotations
+
+import base64
+import json
+from functools import partial
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Any, Final
+
+from mcap.records import Schema
+
+from roadeval.logs.container.records import LARGEST, PADDING, Buffer
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.encoding import (
+    Encoding,
+    FieldReader,
+    Fields,
+    Layouts,
+    MessageReader,
+    TopicKind,
+    decode_by_library,
+    fields_of,
+    parts_of,
+)
+
+# --- CDR, the encoding of ROS 2: of either byte order, or XCDR2; compressed by rosbag2 or not -----
+
+_ZSTD: Final = b"\x28\xb5\x2f\xfd"
+
+
+def _cdr(schema: Schema | None) -> MessageReader | None:
+    from mcap_ros2.decoder import DecoderFactory
+
+    decode = decode_by_library(DecoderFactory(), "cdr", schema)
+    fields = fields_of(schema)
+    if fields is None:
+        return None if decode is None else MessageReader(lambda data: decode(_uncompressed(data)))
+    layouts = Layouts(fields, _after_head, PADDING)
+    return MessageReader(
+        lambda data: layouts.read(_uncompressed(data), decode),
+        lambda data: _cdr_stamp(fields, _uncompressed(data)),
+        lambda data: layouts.fits(fields, data),
+    )
+
+
+def _cdr_stamp(fields: Fields, data: Buffer) -> Any:
+    """Read only the first field, which is the stamp or a header that holds it."""
+    first = _after_head(data).read(fields[:1])
+    return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
+
+
+def _after_head(data: Buffer) -> FieldReader:
+    """Begin after the encapsulation: its second byte names byte order and version."""
+    if len(data) < 4:
+        raise BadMessage("a message without a head")
+    kind = data[1]
+    order = "<" if kind & 1 else ">"
+    version_2 = kind >= 6
+    delimited = kind in (8, 9)
+    start = 8 if delimited else 4
+    return FieldReader(data, order, start, aligned=True, widest=4 if version_2 else 8)
+
+
+def _uncompressed(data: Buffer) -> Buffer:
+    """Undo rosbag2's compression message by message; CDR itself never begins like zstd."""
+    if bytes(data[:4]) != _ZSTD:
+        return data
+    import zstandard
+
+    if not 0 <= zstandard.frame_content_size(data) <= LARGEST:
+        raise BadMessage("a compressed message of a size that cannot be")
+    message: bytes = zstandard.ZstdDecompressor().decompress(data)
+    return message
+
+
+# --- FlatBuffers, for Foxglove's image messages ---------------------------------------------------
+
+
+def _flatbuffer(schema: Schema | None) -> MessageReader | None:
+    import foxglove_schemas_flatbuffer as schemas
+
+    fields = fields_of(schema)
+    if schema is None or fields is None or not schema.name.startswith("foxglove"):
+        return None
+    name = parts_of(schema.name)[-1]
+    table = getattr(import_module(f"{schemas.__name__}.{name}"), name)
+    return MessageReader(partial(_flatbuffer_message, table, fields))
+
+
+def _flatbuffer_message(table: Any, fields: Fields, data: Buffer) -> SimpleNamespace:
+    message = table.GetRootAs(data)
+    return SimpleNamespace(
+        **{name: _flatbuffer_field(message, name, kind) for name, kind in fields}
+    )
+
+
+def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
+    """Read a field by its accessor: ``frame_id`` by ``FrameId``."""
+    accessor = name.title().replace("_", "")
+    if kind == "bytes":
+        return memoryview(getattr(message, f"{accessor}AsNumpy")())
+    value = getattr(message, accessor)()
+    if kind == "time":
+        return SimpleNamespace(sec=value.Sec(), nanosec=value.Nsec()) if value else None
+    return (value or b"").decode("utf-8", "replace") if kind == "str" else value
+
+
+# --- JSON: bytes in base 64, or as a list of numbers ----------------------------------------------
+
+
+def _json(_schema: Schema | None) -> MessageReader:
+    return MessageReader(_json_message)
+
+
+def _json_message(data: Buffer) -> SimpleNamespace:
+    message: SimpleNamespace = json.loads(
+        bytes(data), object_hook=lambda fields: SimpleNamespace(**fields)
+    )
+    if isinstance(message.data, str):
+        message.data = base64.b64decode(message.data, validate=True)
+    else:
+        message.data = bytes(message.data)
+    return message
+
+
+# --- Protocol Buffers, read by the descriptors that a schema holds --------------------------------
+
+
+def _protobuf(schema: Schema | None) -> MessageReader | None:
+    from mcap_protobuf.decoder import DecoderFactory
+
+    decode = decode_by_library(DecoderFactory(), "protobuf", schema)
+    return None if decode is None else MessageReader(decode)
+
+
+# --- The encoding of ROS 1: fields in the machine's order, without alignment ----------------------
+
+
+def _ros1(schema: Schema | None) -> MessageReader | None:
+    from mcap_ros1.decoder import DecoderFactory
+
+    decode = decode_by_library(DecoderFactory(), "ros1", schema)
+    fields = fields_of(schema)
+    if fields is None:
+        return None if decode is None else MessageReader(decode)
+    layouts = Layouts(fields, partial(FieldReader, order="<", start=0, aligned=False))
+    return MessageReader(lambda data: layouts.read(data, decode))
+
+
+ENCODINGS = (
+    Encoding("cdr", _cdr),
+    Encoding("flatbuffer", _flatbuffer),
+    Encoding("json", _json, without_schema=TopicKind.COMPRESSED),
+    Encoding("protobuf", _protobuf),
+    Encoding("ros1", _ros1),
+)
