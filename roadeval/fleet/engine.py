@@ -45,9 +45,7 @@ class Engine:
     """Worker processes."""
 
     executor: Executor
-    """Takes tasks."""
     workers: int | None
-    """How many work at once, if that is known."""
     dashboard: str | None = None
     """Address of a page that shows their work, if there is one."""
 

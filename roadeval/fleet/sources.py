@@ -224,7 +224,6 @@ class ManifestEntry:
     settings: DriveSettings | None
     """Settings of them alone, in place of those of all drives."""
     where: str
-    """Begins a message about the entry."""
 
 
 def is_manifest(path: Path) -> bool:

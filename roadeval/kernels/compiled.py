@@ -64,7 +64,6 @@ def _require(array: npt.NDArray[Any], *shape: int) -> None:
 
 
 def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
-    """See `plain.look_up_sum_min`."""
     _require(table, 766, 256)
     height, width = _shape(*planes)
     codes, histogram = np.empty((height, width), np.uint8), np.empty(256, np.int64)
@@ -76,7 +75,6 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
 def mahalanobis(
     planes: Planes, mean: Vector, whitening: Matrix, greatest: float
 ) -> tuple[Values, Plane]:
-    """See `plain.mahalanobis`."""
     _require(mean, 3)
     _require(whitening, 3, 3)
     shape = _shape(*planes)
@@ -86,7 +84,6 @@ def mahalanobis(
 
 
 def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
-    """See `plain.look_up_colours`."""
     height, width = _shape(*planes)
     result = np.empty((height, width), np.uint8)
     room = np.empty(width, np.int32), np.empty(width, np.uint8)
@@ -101,7 +98,6 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
 
 
 def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
-    """See `plain.run_sums`."""
     _require(runs, len(runs), 4)
     _, width = _shape(*planes)
     sums = np.zeros((count, 7), np.int64)
@@ -110,7 +106,6 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 
 
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
-    """See `plain.ring_sums`."""
     _require(runs, len(runs), 4)
     height, columns = _shape(*planes)
     _require(ring, height, -(-columns // 64))
@@ -125,7 +120,6 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
 
 
 def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
-    """See `plain.transfer`."""
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)
@@ -140,7 +134,6 @@ def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Mat
 
 
 def paint(runs: Runs, height: int, width: int) -> Labels:
-    """See `plain.paint`."""
     _require(runs, len(runs), 4)
     labels = np.zeros((height, width), np.int32)
     _loops.paint(runs, len(runs), width, labels)
@@ -148,7 +141,6 @@ def paint(runs: Runs, height: int, width: int) -> Labels:
 
 
 def label_runs(labels: Labels) -> Runs:
-    """See `plain.label_runs`."""
     height, width = labels.shape
     runs = np.empty((height * width, 4), np.int32)
     return runs[: _loops.label_runs(labels, height, width, runs)].copy()
@@ -158,7 +150,6 @@ def label_runs(labels: Labels) -> Runs:
 
 
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
-    """See `plain.components`."""
     room = _room_for_runs(bits, width)
     runs = np.empty((len(room[1]), 4), np.int32)
     count = _loops.components(bits, len(bits), width, connectivity == 8, *room, runs)
@@ -166,7 +157,6 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 
 def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
-    """See `plain.keep_region`."""
     if patch.size:
         _require(patch, len(bits), width)
     room, kept = _room_for_runs(bits, width), np.zeros_like(bits)
@@ -177,7 +167,6 @@ def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
 
 
 def fill_holes(bits: Bits, width: int) -> Bits:
-    """See `plain.fill_holes`."""
     room, filled = _room_for_runs(bits, width), bits.copy()
     outside = np.zeros(len(room[3]), np.uint8)
     _loops.fill_holes(bits, len(bits), width, *room, outside, filled)
@@ -197,7 +186,6 @@ def _room_for_runs(bits: Bits, width: int) -> tuple[npt.NDArray[Any], ...]:
 
 
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
-    """See `plain.count_bits`."""
     _, words = _shape(masks[:0], classes[:0], regions[:0])
     counts = np.empty((len(masks), len(classes), len(regions)), np.int64)
     sized = [given for each in (masks, classes, regions) for given in (each, len(each))]
@@ -206,12 +194,10 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
 
 
 def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
-    """See `plain.dilate`."""
     return _by_element(_loops.dilate, bits, reach, width)
 
 
 def erode(bits: Bits, reach: Reach, width: int) -> Bits:
-    """See `plain.erode`."""
     return _by_element(_loops.erode, bits, reach, width)
 
 
@@ -230,7 +216,6 @@ def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) 
 
 
 def outcomes(mask: Plane, truth: Plane) -> Plane:
-    """See `plain.outcomes`."""
     shape = _shape(mask, truth)
     errors = np.empty(shape, np.uint8)
     _loops.outcomes(mask, truth, errors.size, errors)
@@ -238,7 +223,6 @@ def outcomes(mask: Plane, truth: Plane) -> Plane:
 
 
 def add_outcomes(errors: Plane, totals: Image) -> None:
-    """See `plain.add_outcomes`."""
     _require(totals, 3, *errors.shape)
     _loops.add_outcomes(errors, errors.size, totals)
 
@@ -247,7 +231,6 @@ def add_outcomes(errors: Plane, totals: Image) -> None:
 
 
 def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
-    """See `plain.geodesics`."""
     shape = _shape(cost, seeds)
     distance = np.empty(shape, np.int32)
     _loops.geodesics(cost, seeds, *shape, rounds, distance)
@@ -260,7 +243,6 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 def tree_sum(
     features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
 ) -> Values:
-    """See `plain.tree_sum`."""
     count, pixels = features.shape
     trees, nodes = _shape(feature, threshold, kept)
     _require(values, trees, plain.LEAVES)
@@ -274,7 +256,6 @@ def tree_sum(
 
 
 def filter_rows(rows: Plane, step: int) -> Plane:
-    """See `plain.filter_rows`."""
     height, width = rows.shape
     lines = np.empty((height, 1 + width), np.uint8)
     _loops.filter_rows(rows, height, width, step, lines)
@@ -282,7 +263,6 @@ def filter_rows(rows: Plane, step: int) -> Plane:
 
 
 def label_rows(labels: Plane, bits: int) -> Plane:
-    """See `plain.label_rows`."""
     if bits not in plain.LABEL_BITS:
         raise ValueError(f"labels of {bits} bits")
     height, width = labels.shape
@@ -292,7 +272,6 @@ def label_rows(labels: Plane, bits: int) -> Plane:
 
 
 def mask_rows(mask: Bits, width: int) -> Plane:
-    """See `plain.mask_rows`."""
     _require(mask, len(mask), -(-width // 64))
     lines = np.empty((len(mask), 1 + -(-width // 8)), np.uint8)
     _loops.mask_rows(mask, len(mask), width, lines)

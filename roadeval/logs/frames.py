@@ -225,7 +225,6 @@ class LoggedFrame:
     labels: Mapping[str, Label]
     """The labels that belong to it, by their names in `Selection.labels`."""
     selection: Selection
-    """How it is decoded."""
     accounting: Accounting
     """Where decoding counts what it finds."""
 

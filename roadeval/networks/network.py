@@ -148,9 +148,7 @@ class Placement:
     """Where frames of one size lie in a network's input; sizes are width and height."""
 
     frame: tuple[int, int]
-    """Size of the frame."""
     size: tuple[int, int]
-    """Size of the input."""
     inner: tuple[int, int]
     """Size that the frame is brought to."""
 

@@ -44,7 +44,6 @@ class EncodedFrame:
     number: int
     stamp_ns: int
     payloads: Mapping[str, bytes]
-    """Image files."""
     scalars: Mapping[str, float] = field(default_factory=dict)
     counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     states: Mapping[str, str] = field(default_factory=dict)
@@ -54,7 +53,6 @@ class EncodedFrame:
     tables: Mapping[str, str] = field(default_factory=dict)
     """Lines of CSV."""
     worst_error: float = -1.0
-    """See `worst_error`."""
 
 
 def encode_frame(

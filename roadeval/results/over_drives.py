@@ -237,7 +237,6 @@ class DriveJudgement:
 
     drive: str
     condition: str
-    """Which."""
     holds: bool | None
     """Whether it holds; None where it was not judged."""
     sentence: str

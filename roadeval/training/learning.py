@@ -439,7 +439,6 @@ class Chosen:
     """The frames that train, and what that means for the others."""
 
     held: HeldFrames
-    """The training frames, decoded."""
     gap: frozenset[int]
     """Numbers of the frames beside them that are not evaluated."""
     first: int | None

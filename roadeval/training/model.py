@@ -56,7 +56,6 @@ class Model:
     evaluated.
     """
     pixels: int
-    """Number of training pixels."""
     prior: npt.NDArray[np.float32] | None = None
     """``(H, W)`` float32: the share of training frames in which a pixel was road, which is what the
     blind baseline thresholds; None without truth.

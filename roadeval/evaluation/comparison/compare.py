@@ -121,7 +121,6 @@ class DriveChange:
     variant: str
     stage: str
     drive: str
-    """Its name."""
     frames: int
     base: float
     new: float
@@ -156,7 +155,6 @@ class RegionChange:
     variant: str
     region: str
     title: str
-    """For people."""
     frames: int
     base: float
     new: float

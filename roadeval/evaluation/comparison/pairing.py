@@ -54,7 +54,6 @@ class Side:
     label: str
     """What it is called in tables; its own among all."""
     parts: Sequence[Part]
-    """Its drives."""
     variants: Mapping[str, str] | None = None
     """What the variants to compare are called here, by their own names; None: all as they are."""
 

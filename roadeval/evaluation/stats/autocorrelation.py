@@ -77,12 +77,10 @@ class MeanDistribution:
     """Distribution of the mean of a process, given a series that is a stretch of it."""
 
     mean: float
-    """Of the series."""
     errors: Series
     weights: Series
     """``(g,)``: the mean's standard error under each model, and the models' weights; sum 1."""
     degrees: int
-    """Degrees of freedom of Student's distribution."""
     frames: float
     """Independent values that would determine the mean as well."""
     scale: float
@@ -221,7 +219,6 @@ class Difference:
     p: float | None
     """Two-sided p-value of no difference."""
     confidence: float
-    """Of the interval."""
     unit: Literal["frames", "drives"]
     """What is averaged: the frames of one drive, or the means of drives."""
     units: int

@@ -59,7 +59,6 @@ class DriveMean:
     """The mean difference of a rate on one drive, new minus base."""
 
     drive: str
-    """Its identity."""
     group: str
     """A name shared with other drives, as of a day or a route; its own identity without one."""
     mean: float

@@ -255,7 +255,6 @@ class ComparedMask:
     """A final mask that is compared."""
 
     name: str
-    """Its name on the page."""
     result: str
     variant: str
     own: str

@@ -31,12 +31,9 @@ class WorstFrame:
     drive: str
     frame: int
     stamp_ns: int
-    """Which."""
     variant: str
     stage: str
-    """Whose final mask."""
     rates: Mapping[str, float | None]
-    """Of the final mask."""
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of ERR by stage, see `roadeval.evaluation.score.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()

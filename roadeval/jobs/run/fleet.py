@@ -75,9 +75,7 @@ class FleetOutcome:
     """The result of replaying a fleet."""
 
     folder: Path
-    """Where it lies."""
     counts: Mapping[str, int]
-    """Drives by their status."""
     replayed: int
     """How many of them this command has replayed."""
     problems: Mapping[str, str]
@@ -199,11 +197,8 @@ class FleetRun:
     folder: Path
     entries: tuple[DriveEntry, ...]
     config: RunConfig
-    """Every option, those of the fleet included."""
     on_progress: OnFleetProgress
-    """Called in the caller's thread as drives are done."""
     retry: bool
-    """Whether drives that failed before are tried again."""
     done: dict[str, Done] = field(default_factory=dict)
     """What is known of each drive that is done, by its ID."""
     pruned: set[str] = field(default_factory=set)

@@ -71,7 +71,6 @@ class DriveTask:
     fold: int | None = None
     """Whose model that is; None without folds."""
     recorded: bool = False
-    """Whether a recording is made."""
     required: bool = False
     """Whether a drive without a recording is not done."""
     retry: bool = False
@@ -373,13 +372,11 @@ class FoldTask:
     """The task of a worker that trains the model of a fold."""
 
     folder: Path
-    """Of the fleet."""
     fold: int
     """Whose drives the model will score."""
     candidates: tuple[tuple[DriveEntry, RunConfig], ...]
     """Drives of the other folds, with their configurations, in the order of being asked."""
     config: RunConfig
-    """Of the fleet."""
     software: Mapping[str, str]
     """That of the program that asks."""
 
@@ -398,7 +395,6 @@ class FoldModel:
     sha256: str
     """Of its file; empty where there is none."""
     problem: str = ""
-    """Why there is none."""
 
 
 def train_fold(task: FoldTask) -> FoldModel:

@@ -68,20 +68,16 @@ class Run:
     """A prepared run: its frames, the chains that run on them, and the score so far."""
 
     log: logs.Log
-    """The open log."""
     config: RunConfig
-    """Every option."""
     selection: logs.Selection
     """The topics that are replayed, and why."""
     frames: logs.FrameStream
     """The frames that are read, and the account of them."""
     variants: tuple[Variant, ...]
-    """The variants whose chains run."""
     model: Model
     schedule: Schedule
     """What they learnt, and which frames are not evaluated because of it."""
     chains: Mapping[str, Chain]
-    """The variants' chains, ready to run, by name."""
     repeats: Mapping[int, Mapping[str, Chain]]
     """The same for each further seed of the training, by the seed."""
     layouts: tuple[VariantLayout, ...]
@@ -91,7 +87,6 @@ class Run:
     the first frame: a file that they name may be gone after the last.
     """
     board: Scoreboard
-    """The score so far."""
     beside: set[int] = field(default_factory=set)
     """The training frames of a model file that show a place of this drive, so far."""
     failures: Failures = field(default_factory=Failures)

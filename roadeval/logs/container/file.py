@@ -322,7 +322,6 @@ class Damage:
 
     path: Path
     offset: int
-    """The byte where it begins."""
     reason: str
     lossy: bool = True
     """Whether messages are, or may be, lost or wrong by it."""

@@ -36,7 +36,6 @@ GAP: Final = 2.5
 """A step of more than so many median periods is a gap."""
 
 Size = tuple[int, int]
-"""Width and height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,6 @@ class TopicInfo:
 
     name: str
     schema: str
-    """Its name."""
     encoding: str
     """Of the messages: ``cdr``, ``protobuf``, ..."""
     kind: TopicKind

@@ -143,7 +143,6 @@ class Segments:
     """An image file whose colours are the numbers of segments: red + 256 green + 65536 blue."""
 
     image: str
-    """As of `Drawing`."""
     size: Size | None
     file: Path
     labels: Mapping[int, str]
@@ -188,7 +187,6 @@ class LabelFormat:
     """
 
     name: str
-    """For people."""
     ending: str
     """Of its files, in lower case."""
     holds: Callable[[Path, Any], bool]

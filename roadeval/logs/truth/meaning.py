@@ -65,7 +65,6 @@ class ClassMap:
     by_color: bool
     """Whether colours are looked up instead of values."""
     words: str
-    """The meaning in words."""
     tolerance: int = 0
     """How far a value may lie from one in ``meaning`` to mean the same."""
 
@@ -129,7 +128,6 @@ class Confidence:
 
     @property
     def words(self) -> str:
-        """The meaning in words."""
         return f"a confidence map: road is {self.threshold:g} or more"
 
     def road(self, probability: Probability) -> Mask:

@@ -57,9 +57,7 @@ class LabelSource:
     """The topic, the folder, or the topic and its log, for a person."""
     pictures: LabelPictures
     meaning: Meaning
-    """How they are read."""
     pairing: Pairing
-    """How they are paired with images."""
     why: str
     """Why they were chosen, or how they are paired, in words."""
     digest: Callable[[], str] | None = None

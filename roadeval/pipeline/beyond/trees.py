@@ -288,7 +288,6 @@ class Blend:
 
     forest: Forest
     network: HiddenLayer
-    """They see the same features."""
 
     def __post_init__(self) -> None:
         if self.forest.inputs != self.network.inputs:
@@ -319,7 +318,6 @@ class Stack:
     top: Blend
     """Its last feature is what the base gives, where there is one."""
     base: Blend | None = None
-    """None: there is none."""
 
     def __post_init__(self) -> None:
         if self.base is not None and self.top.inputs != self.base.inputs + 1:
