@@ -128,6 +128,7 @@ class Confidence:
 
     @property
     def words(self) -> str:
+        """The meaning in words."""
         return f"a confidence map: road is {self.threshold:g} or more"
 
     def road(self, probability: Probability) -> Mask:
