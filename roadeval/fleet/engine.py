@@ -62,14 +62,14 @@ def started(
     more is ended, which costs its drive one attempt. ``scheduler`` is the address of a Dask
     scheduler, ``tcp://host:8786``, or the file that it has written.
     """
-    import dask
+    import dask.system
     import distributed
 
     with ExitStack() as stack:
         if scheduler is None:
             stack.enter_context(_safe_path())
             stack.enter_context(dask.config.set(_LOCAL))
-            count = workers or _processors()
+            count = workers or dask.system.CPU_COUNT
             client = stack.enter_context(_local(distributed, count, memory_gib))
         else:
             client = stack.enter_context(_connected(distributed, scheduler))
@@ -147,9 +147,3 @@ def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
             yield client
     finally:
         log.setLevel(before)
-
-
-def _processors() -> int:
-    """Return how many processors this process may use."""
-    allowed = getattr(os, "sched_getaffinity", None)
-    return len(allowed(0)) if allowed else os.cpu_count() or 1

@@ -17,6 +17,7 @@ from urllib.request import url2pathname
 from roadeval.config import DriveSettings
 from roadeval.errors import RoadevalError
 from roadeval.logs import METADATA, files_of, natural
+from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import public_url, visible, without_secrets
 
 BUCKETS: Final = ("s3", "gs")
@@ -228,13 +229,8 @@ def _alike(entries: Sequence[DriveEntry]) -> list[list[DriveEntry]]:
     for logs in same_size.values():
         for entry, files in logs if len(logs) > 1 else ():
             with suppress(OSError):
-                same[tuple(map(_content, files))].append(entry)
+                same[tuple(map(sha256_of, files))].append(entry)
     return [drives for drives in same.values() if len(drives) > 1]
-
-
-def _content(file: Path) -> str:
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:

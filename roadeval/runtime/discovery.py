@@ -66,6 +66,8 @@ def code_of(names: Iterable[str]) -> Code:
     """
     from importlib.metadata import packages_distributions, version
 
+    from roadeval.runtime.files import sha256_of
+
     roots = {name.partition(".")[0] for name in names}
     installed = packages_distributions() if roots else {}
     files: dict[str, Path] = {}
@@ -80,7 +82,7 @@ def code_of(names: Iterable[str]) -> Code:
             else:
                 files |= _files(name, places)
         todo = {name for path in files.values() for name in _imported(path)}
-    parts = [f"{name} {_digest(files[name])}" for name in sorted(files)]
+    parts = [f"{name} {sha256_of(files[name])}" for name in sorted(files)]
     parts += [f"{name}=={packages[name]}" for name in sorted(packages)]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest() if files else ""
     return Code(tuple(sorted(roots)), digest, tuple(sorted(files)), dict(sorted(packages.items())))
@@ -115,8 +117,3 @@ def _imported(path: Path) -> Iterator[str]:
     for found in _IMPORTS.findall(path.read_text(errors="replace")) if path.suffix == ".py" else ():
         for name in "".join(found).split(","):
             yield from re.findall(r"\w+", name)[:1]
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -108,6 +108,12 @@ def own_names(path: Path, *, hidden: bool = True) -> list[Path]:
     return sorted(found, key=lambda each: each.lstat().st_mtime_ns)
 
 
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def leads_outside(path: Path, folder: Path) -> bool:
     """Return whether a path in a folder leads out of it, by links or by its name."""
     return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,7 +36,7 @@ from roadeval.results.fleet import FleetWriter, recording_path
 from roadeval.results.over_drives import check_conditions
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.discovery import code_of
-from roadeval.runtime.files import AnyPath, Paths, listed
+from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
 from roadeval.version import VERSION
 
 
@@ -64,10 +63,6 @@ class FleetProgress:
 
 
 OnFleetProgress = Callable[[FleetProgress], None]
-
-
-def _ignore(_progress: FleetProgress) -> None:
-    """Show nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +112,7 @@ def replay_fleet(
     executor: Executor | None = None,
     fail_if: Sequence[str] = (),
     retry_failed: bool = False,
-    on_progress: OnFleetProgress = _ignore,
+    on_progress: OnFleetProgress = lambda _: None,
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
@@ -168,26 +163,18 @@ def replay_fleet(
     facts = writer.finish(
         members, config.evaluation, config.as_dict(), text, conditions=conditions, asked=asked
     )
-    _judge_failures(run, config.fleet.max_failures)
     counts = Counter(each.status for each in run.done.values())
+    if (allowed := config.fleet.max_failures) is not None:
+        most = float(allowed.removesuffix("%"))
+        if counts[FAILED] > (most * len(entries) / 100 if allowed.endswith("%") else most):
+            raise FleetError(
+                f"{run.folder}: {counts[FAILED]} of {len(entries)} drives failed, more than "
+                f"`fleet.max_failures` {allowed} allows; their reasons are in drives.parquet"
+            )
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not each.repeated for each in run.done.values())
     unused = config.unused(entry.source for entry in entries)
     return FleetOutcome(writer.folder, counts, replayed, problems, facts, unused)
-
-
-def _judge_failures(run: FleetRun, allowed: str | None) -> None:
-    """Raise a `FleetError` where more drives failed than may."""
-    if allowed is None:
-        return
-    count = sum(each.status == FAILED for each in run.done.values())
-    share = allowed.endswith("%")
-    most = float(allowed.removesuffix("%")) * (len(run.entries) / 100 if share else 1)
-    if count > most:
-        raise FleetError(
-            f"{run.folder}: {count} of {len(run.entries)} drives failed, more than "
-            f"`fleet.max_failures` {allowed} allows; their reasons are in drives.parquet"
-        )
 
 
 @dataclass(slots=True)
@@ -209,11 +196,20 @@ class FleetRun:
     def replay_all(self, executor: Executor | None) -> None:
         """Replay every drive that is not done."""
         self.show("looking")
-        _check_unchanged(self.config)
+        for name, code in self.config.others_code().items():
+            if code_of(code.modules).digest != code.digest:  # workers would import another one
+                raise FleetError(
+                    f"stage {name!r}: its code has changed since this program imported it; start "
+                    "the program again"
+                )
         configs = {entry.id: self._of(entry) for entry in self.entries}
         if self.config.fleet.folds is None:
-            model = self.config.training.model
-            digest = _sha256(model) if model else ""
+            digest, model = "", self.config.training.model
+            if model:
+                try:
+                    digest = sha256_of(Path(model))
+                except OSError as error:
+                    raise FleetError(f"{model}: cannot read the model: {error.strerror}") from error
             tasks = [self._task(e, configs[e.id], digest, None) for e in self.entries]
             waiting = self._waiting(tasks) or self._unrecorded(tasks)
             if waiting:
@@ -401,20 +397,3 @@ class FleetRun:
         with ending_the_run(self.folder):
             record.write(self.folder)
         self.done[record.drive] = done(record)
-
-
-def _check_unchanged(config: RunConfig) -> None:
-    """Raise a `FleetError` if workers would import other code of stages than this program has."""
-    for name, code in config.others_code().items():
-        if code_of(code.modules).digest != code.digest:
-            raise FleetError(
-                f"stage {name!r}: its code has changed since this program imported it; start the "
-                "program again"
-            )
-
-
-def _sha256(model: str) -> str:
-    try:
-        return hashlib.sha256(Path(model).read_bytes()).hexdigest()
-    except OSError as error:
-        raise FleetError(f"{model}: cannot read the model: {error.strerror}") from error

@@ -44,7 +44,7 @@ from roadeval.results.rows import Key, cells, drive_row
 from roadeval.results.schema import FAILED, TABLES
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, own_names, put
+from roadeval.runtime.files import alone, own_names, put, sha256_of
 from roadeval.training import TrainingError, learning, save_model
 from roadeval.training.learning import HeldFrames
 
@@ -107,7 +107,7 @@ def replay_drive(task: DriveTask) -> Done:
     """
     _check(task.software, task.config)
     model = task.config.training.model
-    if task.model and hashlib.sha256(Path(model or "").read_bytes()).hexdigest() != task.model:
+    if task.model and sha256_of(Path(model or "")) != task.model:
         raise FleetError(f"{model}: has changed since the command began; give it again")
     own = [record_path(task.folder, task.entry.id), frames_path(task.folder, task.entry.id)]
     with ending_the_run(task.folder), alone(*own):
@@ -198,25 +198,16 @@ def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
                 for name, (size, tag) in stamp(entry.source).items()
             }
         elif entry.path.is_dir():
-            found = {METADATA: _note(entry.path)}
+            note = entry.path / METADATA
+            found = {METADATA: note.read_text(errors="replace") if note.exists() else None}
             files += sorted(entry.path.glob("*.mcap"))
         else:
             found = {}
             files.append(entry.path)
-        return found | {str(file): _times(file) for file in files}
+        facts = {str(file): file.stat() for file in files}
+        return found | {n: [f.st_size, f.st_mtime_ns, f.st_ctime_ns] for n, f in facts.items()}
     except (OSError, RoadevalError):
         return None
-
-
-def _note(folder: Path) -> str | None:
-    """Return what a recorder noted of the files in a folder; None without a note."""
-    note = folder / METADATA
-    return note.read_text(errors="replace") if note.exists() else None
-
-
-def _times(file: Path) -> list[int]:
-    facts = file.stat()
-    return [facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns]
 
 
 def _check(asking: Mapping[str, str], config: RunConfig) -> None:
@@ -243,7 +234,12 @@ def _made(task: DriveTask) -> tuple[Record, bool]:
     attempts(task).write_text(str(_begun(task) + 1))
     try:
         with staged(task.entry.source) as path:
-            if earlier is not None and _is_same(task, path, earlier, before):
+            if (
+                earlier is not None
+                and not earlier.failed
+                and (earlier.stamp or {}).get(METADATA) == (before or {}).get(METADATA)
+                and content_of(path, task.config, task.model) == earlier.value("identity")
+            ):
                 return replace(earlier, stamp=before), True
             return _replayed(task, path, before), False
     except Exception as error:
@@ -255,20 +251,20 @@ def _made(task: DriveTask) -> tuple[Record, bool]:
         return failed(task, reason, 1 if known else 70), False
 
 
-def _is_same(task: DriveTask, path: Path, earlier: Record, now: Mapping[str, Any] | None) -> bool:
-    """Return whether an earlier record is of the same content, which is read whole."""
-    if earlier.failed or (earlier.stamp or {}).get(METADATA) != (now or {}).get(METADATA):
-        return False
-    return bool(content_of(path, task.config, task.model) == earlier.value("identity"))
-
-
 def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> Record:
     memory.forget_peak()
     started = time.perf_counter()
     drive, folder = task.entry.id, task.folder
-    results = results_path(folder, drive)
+    record = task.config.output.record if task.recorded else "none"
+    output = OutputSettings(
+        save=str(recording_path(folder, drive)) if record != "none" else None,
+        reports=str(results_path(folder, drive)),
+        record=record,
+        figures=False,
+    )
+    own_config = replace(task.config, drives=(), output=output, run=ExecutionSettings(jobs=1))
     with FrameGatherer(folder, drive) as gatherer:
-        outcome = replay(path, _config(task, results), on_frame=gatherer.add)
+        outcome = replay(path, own_config, on_frame=gatherer.add)
         _remove(task, PICTURES, *(() if task.recorded else (RECORDINGS,)))
         gatherer.finish()
     if not outcome.facts.frames.evaluated:
@@ -311,18 +307,6 @@ def _remove(task: DriveTask, *folders: str) -> None:
             shutil.rmtree(path, ignore_errors=True)
         else:
             path.unlink(missing_ok=True)
-
-
-def _config(task: DriveTask, results: Path) -> RunConfig:
-    """Return the configuration of the replay: one thread, its outputs in the fleet's folder."""
-    record = task.config.output.record if task.recorded else "none"
-    output = OutputSettings(
-        save=str(recording_path(task.folder, task.entry.id)) if record != "none" else None,
-        reports=str(results),
-        record=record,
-        figures=False,
-    )
-    return replace(task.config, drives=(), output=output, run=ExecutionSettings(jobs=1))
 
 
 # --- The fleet's disk -----------------------------------------------------------------------------
@@ -416,7 +400,7 @@ def train_fold(task: FoldTask) -> FoldModel:
 def _trained_before(task: FoldTask, about: Path, wanted: str) -> FoldModel | None:
     try:
         told = read_json(read_bounded(about))
-        digest = hashlib.sha256(task.path.read_bytes()).hexdigest()
+        digest = sha256_of(task.path)
     except (OSError, ValueError):
         return None
     if not isinstance(told, dict) or (told.get("asked"), told.get("sha256")) != (wanted, digest):
@@ -439,7 +423,7 @@ def _trained(task: FoldTask, about: Path, wanted: str) -> FoldModel:
     except TrainingError as error:
         return FoldModel(task.fold, "", str(error))
     save_model(model, task.path)
-    digest = hashlib.sha256(task.path.read_bytes()).hexdigest()
+    digest = sha256_of(task.path)
     told = {
         "fold": task.fold,
         "asked": wanted,

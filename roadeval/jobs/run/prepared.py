@@ -28,6 +28,7 @@ from roadeval.recording import Layout
 from roadeval.results.rows import Key, csv_lines, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
+from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model, TrainingSettings, learning
@@ -269,7 +270,7 @@ def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None =
     fails.
     """
     model = config.training.model
-    digest = hashlib.sha256(Path(model).read_bytes()).hexdigest() if model else ""
+    digest = sha256_of(Path(model)) if model else ""
     return asked(config, digest, of=log.sha256, masks=masks)
 
 
