@@ -100,10 +100,6 @@ class DriveSettings:
         return {"path": self.path, **self.tables}
 
 
-def _paper() -> Pipeline:
-    return pipeline_of(None, PRESETS["paper"])
-
-
 @dataclass(frozen=True, slots=True)
 class RunConfig(LogConfig):
     """Every option of a run.
@@ -116,7 +112,7 @@ class RunConfig(LogConfig):
 
     preset: str = "paper"
     """The preset that it started from."""
-    pipeline: Pipeline = field(default_factory=_paper)
+    pipeline: Pipeline = field(default_factory=lambda: pipeline_of(None, PRESETS["paper"]))
     """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings."""
     extra: tuple[Variant, ...] = ()
     """Further variants."""
@@ -294,6 +290,7 @@ class RunConfig(LogConfig):
 
         A setting that is None has no value in such a file, and is left out there.
         """
+        masks = {name: dataclasses.asdict(own) for name, own in self.masks.items()}
         return {
             "preset": self.preset,
             **({"only": list(self.only)} if self.only else {}),
@@ -301,13 +298,10 @@ class RunConfig(LogConfig):
             "variants": {
                 each.name: {"preset": each.preset, **each.pipeline.as_dict()} for each in self.extra
             },
-            **({"masks": masks} if (masks := self._masks()) else {}),
+            **({"masks": masks} if masks else {}),
             **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
             **({"drives": [drive.as_dict() for drive in self.drives]} if self.drives else {}),
         }
-
-    def _masks(self) -> dict[str, Any]:
-        return {name: dataclasses.asdict(own) for name, own in self.masks.items()}
 
     def _with_variants(self, tables: Any) -> tuple[Variant, ...]:
         if not isinstance(tables, Mapping):

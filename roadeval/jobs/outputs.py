@@ -55,15 +55,13 @@ class Outputs:
         The older ones are removed.
         """
         with holding(self.recording, self.mcap, folder=self.reports, inputs=inputs) as certain:
-            yield self._partial() if certain else None
-
-    def _partial(self) -> Path | None:
-        there = own_names(target_of(self.recording), hidden=False) if self.recording else []
-        newest = [each for each in there if each.is_file() and each.stat().st_size][-1:]
-        for each in there:
-            if each not in newest:
-                remove(each)
-        return newest[0] if newest else None
+            ours = certain and self.recording
+            there = own_names(target_of(ours), hidden=False) if ours else []
+            newest = [each for each in there if each.is_file() and each.stat().st_size][-1:]
+            for each in there:
+                if each not in newest:
+                    remove(each)
+            yield newest[0] if newest else None
 
 
 @contextmanager

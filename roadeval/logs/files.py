@@ -226,16 +226,12 @@ def of_ids(labels: Sequence[Path]) -> Sequence[Path]:
 
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
     """Find for each label the image of its name, as it is or as `bare`."""
-    exact, loose = ({name(image): image for image in images} for name in (_stem, bare))
+    exact, loose = {each.stem: each for each in images}, {bare(each): each for each in images}
     found = {
         label: exact.get(label.stem) or exact.get(bare(label)) or loose.get(bare(label))
         for label in labels
     }
     return {label: image for label, image in found.items() if image is not None}
-
-
-def _stem(file: Path) -> str:
-    return file.stem
 
 
 def bare(file: Path) -> str:

@@ -228,17 +228,16 @@ class Record:
             "asked": self.asked,
             "stamp": self.stamp,
             "rows": {
-                name: [[_finite(cell) for cell in row] for row in rows]
+                name: [
+                    [None if isinstance(c, float) and not math.isfinite(c) else c for c in row]
+                    for row in rows
+                ]
                 for name, rows in self.rows.items()
             },
         }
         content["digest"] = digest_of(content, _KEPT)
         # All in ASCII: the name of a file may hold bytes that are no text.
         put(record_path(folder, self.drive), json.dumps(content, allow_nan=False).encode())
-
-
-def _finite(cell: Any) -> Any:
-    return None if isinstance(cell, float) and not math.isfinite(cell) else cell
 
 
 def read_record(folder: Path, drive: str) -> Record | None:

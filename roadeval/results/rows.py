@@ -52,11 +52,8 @@ class Key(NamedTuple):
 
     def cells(self) -> str:
         """Return both as cells of CSV, with the comma behind them."""
-        return "".join(f"{_quoted(visible(each))}," for each in self)
-
-
-def _quoted(text: str) -> str:
-    return f'"{text.replace(chr(34), chr(34) * 2)}"' if set(text) & {",", '"'} else text
+        texts = ((text, text.replace('"', '""')) for text in map(visible, self))
+        return "".join(f'"{own}",' if set(text) & {",", '"'} else f"{text}," for text, own in texts)
 
 
 def frame_rows(result: FrameResult) -> dict[str, list[Row]]:

@@ -228,7 +228,13 @@ class TableFile:
     """
 
     def __init__(self, path: Path, name: str, tags: Iterable[str] = ()) -> None:
-        self._schema: Final = _of_a_fleet(name, tags)
+        import pyarrow as pa
+
+        schema = TABLES[name].arrow()
+        for tag in tags:
+            schema = schema.append(pa.field(f"{TAG}{tag}", pa.string()))
+        about = {"roadeval": json.dumps(FLEET_FORMAT), "about": TABLES[name].doc}
+        self._schema: Final = schema.with_metadata(about)
         self._file: Final = NewFile(path)
         self._rows: list[Any] = []
         self._writer: parquet.ParquetWriter | None = None
@@ -275,15 +281,6 @@ class TableFile:
         ]
         self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
         self._rows = []
-
-
-def _of_a_fleet(name: str, tags: Iterable[str]) -> pa.Schema:
-    import pyarrow as pa
-
-    schema = TABLES[name].arrow()
-    for tag in tags:
-        schema = schema.append(pa.field(f"{TAG}{tag}", pa.string()))
-    return schema.with_metadata({"roadeval": json.dumps(FLEET_FORMAT), "about": TABLES[name].doc})
 
 
 def read_parquet(

@@ -581,7 +581,13 @@ class _Against:
                 for each, q in zip(own, values, strict=True)
                 if (base := each.base)
             ]
-            yield from sorted(rows, key=_surest)
+            yield from sorted(
+                rows,
+                key=lambda row: (
+                    *(2.0 if row.q is None else row.q, -abs(np.nan_to_num(row.difference.mean))),
+                    row.drive,
+                ),
+            )
 
     def strata(self) -> Iterator[StratumChange]:
         """Yield the changes of final masks by the new result's tags."""
@@ -639,8 +645,3 @@ def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
             if name in other and own[name] != other[name]:
                 found.setdefault(name, (own[name], other[name]))
     return found
-
-
-def _surest(row: DriveChange) -> tuple[float, float, str]:
-    known = 2.0 if row.q is None else row.q
-    return known, -abs(np.nan_to_num(row.difference.mean)), row.drive

@@ -140,14 +140,25 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     again = partial(log.frames, selection)
     variants = config.variants()
     labelled = selection.truth is not None
-    if note := _sparse(selection, len(again())):
+    frames = len(again())
+    truths = frames if selection.truth is None else len(selection.truth.pictures)
+    if frames > SPARSE * truths:
+        note = f"at most {truths} of {frames} frames have road truth: "
+        note += "`frames.labelled` reads these alone"
         on_progress(Progress(0, None, "opening", note))
     # Without truth no rate could tell the trainings apart.
     training = config.training if labelled else replace(config.training, seeds=1)
     (model, *others), schedule = _learn(again, variants, training, on_progress, labelled=labelled)
-    chains, *repeats = (_bind(variants, each, training.model) for each in (model, *others))
+    try:
+        chains, *repeats = (bind(variants, each) for each in (model, *others))
+    except MisfitError as error:
+        raise ModelError(f"{training.model}: {error}") from error
     trim()
-    layouts = (*(variant.layout() for variant in variants), *_external(selection))
+    masks = selection.masks
+    layouts = (
+        *(each.layout() for each in variants),
+        *(external_layout(n, m.where, probable=m.is_confidence) for n, m in masks.items()),
+    )
     prior = None if model.prior is None else BlindPrior(model.prior)
     board = Scoreboard(config.evaluation, [layout.name for layout in layouts], prior)
     return Run(
@@ -163,16 +174,6 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
-    )
-
-
-def _sparse(selection: logs.Selection, frames: int) -> str:
-    """Return a note where few of the frames that are read can have truth; else empty."""
-    truths = frames if selection.truth is None else len(selection.truth.pictures)
-    if frames <= SPARSE * truths:
-        return ""
-    return (
-        f"at most {truths} of {frames} frames have road truth: `frames.labelled` reads these alone"
     )
 
 
@@ -198,21 +199,6 @@ def _learn(
         lambda done: on_progress(Progress(done, total, "training")),
         labelled=labelled and settings.source != "patch",
         base=base,
-    )
-
-
-def _bind(variants: tuple[Variant, ...], model: Model, path: str | None) -> Mapping[str, Chain]:
-    try:
-        return bind(variants, model)
-    except MisfitError as error:
-        raise ModelError(f"{path}: {error}") from error
-
-
-def _external(selection: logs.Selection) -> tuple[VariantLayout, ...]:
-    """Describe the variants whose masks another system has made."""
-    return tuple(
-        external_layout(name, mask.where, probable=mask.is_confidence)
-        for name, mask in selection.masks.items()
     )
 
 

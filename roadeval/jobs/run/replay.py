@@ -114,7 +114,12 @@ def replay(
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)) as left:
             outcome = _written(log, config, to, on_progress, on_frame)
-            warnings = (*outcome.warnings, *_unwritten(config, to), *_superseded(left))
+            warnings = (*outcome.warnings, *_unwritten(config, to))
+            if left is not None:
+                with suppress(OSError):
+                    left.unlink()
+                removed = f"removed {left}, the partial recording of an earlier run"
+                warnings = (*warnings, f"{removed}: this one is whole")
     scores = [{"drive": log.name, **row} for row in outcome.rows["scores"]]
     judged = judge_drives(scores, conditions, config.evaluation.least_frames)
     return replace(outcome, warnings=warnings, judgements=tuple(judged))
@@ -206,15 +211,6 @@ def _unwritten(config: RunConfig, to: Outputs) -> tuple[str, ...]:
     if to.recording is not None or config.output.save is None:
         return ()
     return (f"`output.save` {config.output.save} is not written: `output.record` is none",)
-
-
-def _superseded(left: Path | None) -> tuple[str, ...]:
-    """Remove the partial recording that an earlier run has left, and say so."""
-    if left is None:
-        return ()
-    with suppress(OSError):
-        left.unlink()
-    return (f"removed {left}, the partial recording of an earlier run: this one is whole",)
 
 
 SHOWN: Final = 4

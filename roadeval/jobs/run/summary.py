@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, Final
 
-from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.results.facts import (
@@ -210,14 +209,15 @@ def _constant(run: Run) -> Iterator[str]:
 def _accounting(run: Run) -> FrameAccount:
     """Account for every frame of the image topic: evaluated, or skipped and why."""
     seen, roles = run.frames.accounting, Counter(run.board.roles())
+    labelled, is_first = run.config.frames.labelled, run.config.training.placement == "first"
     skipped = {
         "outside the range": seen.in_log - seen.in_range,
-        _unread(run.config): seen.in_range - seen.read,
+        f"not read ({'no truth, ' * labelled}stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
         "failed in a stage": len(run.failures.reasons),
         "trained on": roles[Role.TRAINING],
         "copies of training frames": roles[Role.COPY],
-        _gap(run.config): roles[Role.GAP],
+        f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
     }
     return FrameAccount(
@@ -229,11 +229,3 @@ def _accounting(run: Run) -> FrameAccount:
         evaluated=roles[Role.EVALUATED],
         skipped={reason: number for reason, number in skipped.items() if number},
     )
-
-
-def _unread(config: RunConfig) -> str:
-    return f"not read ({'no truth, ' if config.frames.labelled else ''}stride or limit)"
-
-
-def _gap(config: RunConfig) -> str:
-    return f"gap {'after' if config.training.placement == 'first' else 'beside'} training"

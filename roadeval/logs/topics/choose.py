@@ -120,7 +120,8 @@ def choose_truth(
 
 def _clear_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
     """Return the topics of the first kind that there is, in the order of preference."""
-    by_name = [t for t in roads if _is_truth(words(t.name))]
+    named = [(t, words(t.name)) for t in roads]
+    by_name = [t for t, n in named if n & LABEL_WORDS or (n & MASK_WORDS and n & ROAD_WORDS)]
     coloured, single = ([t for t in by_name if t.channels == n] for n in (3, 1))
     # A mask whose name does not say that it masks something other than the road.
     no_others = MASK_WORDS | PLAIN_WORDS | words(image.name)
@@ -232,10 +233,6 @@ def _looks_like_label(topic: TopicInfo) -> bool:
 def _looks_like_depth(topic: TopicInfo) -> bool:
     named_depth = bool(words(topic.name) & {"depth", "disparity"})
     return named_depth or topic.format.lower() in DEPTH_FORMATS or "depth" in topic.format.lower()
-
-
-def _is_truth(name: frozenset[str]) -> bool:
-    return bool(name & LABEL_WORDS or (name & MASK_WORDS and name & ROAD_WORDS))
 
 
 def _only(

@@ -44,7 +44,8 @@ def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
     """Return the gains ``(3,)`` that bring the patch of an ``(H, W, 3)`` image to the level."""
     rows, columns, patch = _box(*image.shape[:2], settings.patch)
     around = image[rows, columns]
-    medians = np.array([_median(around, channel, patch) for channel in range(3)])
+    counts = [cv2.calcHist([around], [each], patch, [256], [0, 256]).cumsum() for each in range(3)]
+    medians = np.array([float(np.searchsorted(own, own[-1] / 2)) for own in counts])  # the lower
     if settings.channels == "alike":
         medians = np.full(3, medians.mean())
     gain = settings.level / np.maximum(medians, 1.0)
@@ -58,12 +59,6 @@ def _box(height: int, width: int, patch: ReferencePatch) -> tuple[slice, slice, 
     x, y, columns, rows = cv2.boundingRect(mask)
     here = slice(y, y + rows), slice(x, x + columns)
     return *here, mask[here]
-
-
-def _median(image: Rgb, channel: int, patch: Mask) -> float:
-    """Return the lower median of a channel over the patch."""
-    counts = cv2.calcHist([image], [channel], patch, [256], [0, 256]).ravel().cumsum()
-    return float(np.searchsorted(counts, counts[-1] / 2))
 
 
 def expose(image: Rgb, gain: npt.NDArray[np.float64], level: float) -> Rgb:

@@ -147,7 +147,10 @@ def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
     within a tenth of the true one, where the colour of road finds a third.
     """
     height, width = image.shape[:2]
-    total = _brightness(image)
+    red, green, blue = cv2.split(image)
+    total: npt.NDArray[np.uint16] = cv2.add(
+        cv2.add(red, green, dtype=cv2.CV_16U), blue, dtype=cv2.CV_16U
+    )
     share: Values = cv2.resize(place.astype(np.float32), (width, height))
     likely = share > 0.5
     counted = np.cumsum(np.bincount(total[likely], share[likely], minlength=1))
@@ -156,15 +159,6 @@ def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
     lit = np.asarray(cv2.mean(image, shining.view(np.uint8))[:3])
     candidates = (total < settings.darkness * level) & (share > settings.place)
     return Look(image, level, lit, share, likely, candidates)
-
-
-def _brightness(image: Rgb) -> npt.NDArray[np.uint16]:
-    """Return ``R + G + B`` of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` uint16."""
-    red, green, blue = cv2.split(image)
-    total: npt.NDArray[np.uint16] = cv2.add(
-        cv2.add(red, green, dtype=cv2.CV_16U), blue, dtype=cv2.CV_16U
-    )
-    return total
 
 
 def features_of(seen: Look) -> Values:

@@ -110,10 +110,6 @@ def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
 # --- JSON: bytes in base 64, or as a list of numbers ----------------------------------------------
 
 
-def _json(_schema: Schema | None) -> MessageReader:
-    return MessageReader(_json_message)
-
-
 def _json_message(data: Buffer) -> SimpleNamespace:
     message: SimpleNamespace = json.loads(
         bytes(data), object_hook=lambda fields: SimpleNamespace(**fields)
@@ -152,7 +148,9 @@ def _ros1(schema: Schema | None) -> MessageReader | None:
 ENCODINGS = (
     Encoding("cdr", _cdr),
     Encoding("flatbuffer", _flatbuffer),
-    Encoding("json", _json, without_schema=TopicKind.COMPRESSED),
+    Encoding(
+        "json", lambda _schema: MessageReader(_json_message), without_schema=TopicKind.COMPRESSED
+    ),
     Encoding("protobuf", _protobuf),
     Encoding("ros1", _ros1),
 )

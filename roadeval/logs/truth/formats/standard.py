@@ -97,10 +97,6 @@ def lengths_in(text: str) -> Sequence[int]:
 _CVAT_NO_AREAS = ("polyline", "points", "tag", "skeleton")
 
 
-def _is_cvat(_: Path, content: Any) -> bool:
-    return bool(content.tag == "annotations")
-
-
 def _cvat(path: Path, content: Element, _: Size | None) -> Iterator[Drawing]:
     if content.find("track") is not None:
         raise LogError(f"{path}: tracks of a video; export it as CVAT for images")
@@ -145,7 +141,8 @@ def _label_studio(
 ) -> Iterator[Drawing]:
     for task in content:
         if "annotations" in task:
-            results = [each["result"] for each in task["annotations"] if not _is_void(each)]
+            made = [each for each in task["annotations"] if not each.get("was_cancelled")]
+            results = [each["result"] for each in made]
             values = [[{**r, **r["value"]} for r in result if "value" in r] for result in results]
         else:
             values = [[r for v in task.values() if isinstance(v, list) for r in v]]
@@ -155,10 +152,6 @@ def _label_studio(
             yield Drawing(
                 _label_studio_image(task), size, [_label_studio_shape(each, path) for each in areas]
             )
-
-
-def _is_void(annotation: Mapping[str, Any]) -> bool:
-    return bool(annotation.get("was_cancelled"))
 
 
 def _label_studio_image(task: Mapping[str, Any]) -> str:
@@ -301,7 +294,7 @@ def _yolo_names_in(file: Path) -> Mapping[int, str]:
 
 FORMATS = (
     LabelFormat("COCO", ".json", _is_coco, _coco),
-    LabelFormat("CVAT for images", ".xml", _is_cvat, _cvat),
+    LabelFormat("CVAT for images", ".xml", lambda _, root: root.tag == "annotations", _cvat),
     LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio),
     LabelFormat("LabelMe", ".json", _is_labelme, _labelme),
     LabelFormat("OpenLABEL", ".json", _is_openlabel, _openlabel),
