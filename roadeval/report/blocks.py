@@ -15,6 +15,8 @@ from roadeval.report.chart import Chart, HeatMap, legend
 from roadeval.report.drawing import drawn, span_of_frames
 from roadeval.runtime.text import as_markdown
 
+CELLS: Final = 40, 30
+"""Columns and rows in which a page knows where a picture's errors are."""
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
 
@@ -290,6 +292,8 @@ class Picture(Block):
     title: str
     """What it shows, in a few words."""
     image: ImageFile
+    wrong: Mapping[str, str] = field(default_factory=dict)
+    """Of errors by outcome, ``FP`` and ``FN``: the cells of `CELLS` with any, as bits in base64."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,6 +116,8 @@ class Series:
     low: Sequence[float] = ()
     high: Sequence[float] = ()
     """Ends of an interval around each, or none at all."""
+    frames: Sequence[Sequence[int]] = ()
+    """The frames behind each, the most telling first; or none at all."""
 
     def points(self) -> Iterator[tuple[float, float]]:
         """Yield the points that are defined."""
@@ -198,6 +200,8 @@ class HeatMap:
     """The value of the darkest shade."""
     colour: colours.Colour
     """Half-way from white to the darkest shade."""
+    variant: str = ""
+    """Whose it is."""
 
     kind = ChartKind.MAP
     unit = "% of the frames"
@@ -254,6 +258,7 @@ def thinned(series: Series, most: int = POINTS) -> Series:
         y=[_mean(series.y[place : place + size]) for place in places],
         low=(),
         high=(),
+        frames=(),
     )
 
 

@@ -88,6 +88,7 @@ def span_of_frames(charts: Iterable[Chart | HeatMap]) -> Span:
 class Shape:
     """The parts of a series."""
 
+    name: str
     look: Look
     runs: Sequence[Sequence[Point]] = ()
     """Points joined by a line, which breaks where a value is undefined."""
@@ -119,6 +120,8 @@ class Shape:
 class Mark:
     """A number in a row."""
 
+    name: str
+    """Of its series."""
     look: Look
     at: float
     text: str
@@ -127,6 +130,8 @@ class Mark:
     """Ends of the interval, within the chart."""
     cut: str = ""
     """``left``, ``right`` or ``both``, where the interval reaches beyond the chart."""
+    frames: Sequence[int] = ()
+    """The frames behind it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +156,8 @@ class Drawing:
     across: str
     """What the axis at the bottom shows; empty where its names say it."""
     x: Span
+    y: Span
+    """The ranges of the axes."""
     x_ticks: Sequence[Tick]
     y_ticks: Sequence[Tick]
     zero: float | None
@@ -202,6 +209,7 @@ def drawn(chart: Chart | HeatMap, frames: Span | None = None) -> Drawing | MapDr
         f"{chart.title}, {chart.unit}",
         "frame" if chart.of_frames else across,
         x,
+        y,
         x_ticks,
         numbers,
         zero=y.percent(0) if y.low < 0 < y.high else None,
@@ -254,14 +262,14 @@ def _shape(kind: ChartKind, series: Series, x: Span, y: Span) -> Shape:
             (round(at - width / 2, 3), width, min(top, zero), round(abs(zero - top), 3))
             for at, top in marks
         ]
-        return Shape(series.look, bars=bars)
+        return Shape(series.name, series.look, bars=bars)
     seen = [(at, top) for at, top in marks if -0.5 <= at <= 100.5 and -0.5 <= top <= 100.5]
     if kind is ChartKind.POINTS:
         found = zip(series.x, series.low, series.high, strict=False)
         ends = [
             (x.percent(at), y.down(low), y.down(high)) for at, low, high in found if low <= high
         ]
-        return Shape(series.look, ends=ends, marks=seen)
+        return Shape(series.name, series.look, ends=ends, marks=seen)
     runs: list[list[Point]] = [[]]
     for at, value in zip(series.x, series.y, strict=True):
         if math.isfinite(value):
@@ -269,7 +277,7 @@ def _shape(kind: ChartKind, series: Series, x: Span, y: Span) -> Shape:
         elif runs[-1]:
             runs.append([])
     shown = seen if len(marks) <= MARKED else ()
-    return Shape(series.look, [run for run in runs if run], marks=shown)
+    return Shape(series.name, series.look, [run for run in runs if run], marks=shown)
 
 
 def _rows(chart: Chart, values: Span) -> Iterator[MarkRow]:
@@ -286,13 +294,14 @@ def _mark(chart: Chart, series: Series, place: int, values: Span) -> Mark | None
         return None
     middle, text = values.percent(value), f"{series.name}: {value:.2f} {chart.unit}"
     low, high = (ends[at] if ends else math.nan for ends in (series.low, series.high))
+    frames = series.frames[at] if series.frames else ()
     if not (math.isfinite(low) and math.isfinite(high)):
-        return Mark(series.look, middle, text)
+        return Mark(series.name, series.look, middle, text, frames=frames)
     text += f" ({low:.2f} to {high:.2f})"
     beyond = low < values.low, high > values.high
     cut = {(True, False): "left", (False, True): "right", (True, True): "both"}.get(beyond, "")
     left, right = (min(max(values.percent(end), 0.0), 100.0) for end in (low, high))
-    return Mark(series.look, middle, text, left, right, cut)
+    return Mark(series.name, series.look, middle, text, left, right, cut, frames)
 
 
 # --- Values ---------------------------------------------------------------------------------------
@@ -323,6 +332,7 @@ def values(chart: Chart | HeatMap, drawing: Drawing | MapDrawing) -> dict[str, A
         "across": chart.across,
         "names": [*chart.names],
         "x": [drawing.x.low, drawing.x.high],
+        "y": [drawing.y.low, drawing.y.high],
         "level": level and {"name": level.name} | {e: _number(getattr(level, e)) for e in ends},
         "series": [
             {"name": each.name, "colour": each.look.colour, "x": [*each.x]}
@@ -331,6 +341,7 @@ def values(chart: Chart | HeatMap, drawing: Drawing | MapDrawing) -> dict[str, A
                 for name in ("y", "low", "high")
                 if (own := getattr(each, name))
             }
+            | ({"frames": [*map(list, each.frames)]} if each.frames else {})
             for each in chart.series
         ],
     }

@@ -13,6 +13,7 @@ from roadeval.data import BASELINE, Rows
 from roadeval.data.words import defined
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import ImageFile
+from roadeval.report.charts.standard import Behind
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, FleetFacts, Totals
 from roadeval.results.schema import FAILED
@@ -125,6 +126,8 @@ class Findings:
     """Frames to look at."""
     coverage: Mapping[str, Mapping[int, float]]
     """Without truth: by variant and frame the share of the image called road."""
+    behind: Behind = field(default_factory=dict)
+    """The frames behind the numbers of stages and regions."""
 
     @property
     def name(self) -> str:

@@ -150,4 +150,4 @@ def test_a_page_shows_them_as_text(folder, told, watched):
         assert seen.complaints == []
     tab = watched((folder / "page.html").as_uri()).tab
     assert tab.locator("h1").inner_text() == visible(DRIVE)
-    assert SCRIPT in tab.locator("main").inner_text()
+    assert SCRIPT in tab.locator("main").text_content()

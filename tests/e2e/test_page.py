@@ -7,6 +7,7 @@ import shutil
 import pandas as pd
 import pytest
 
+from roadeval import Recording
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 from roadeval.report.page.render import write_page
@@ -103,13 +104,14 @@ def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(drive, watched)
 def test_frames_are_filtered_by_variant_rate_and_condition(drive, watched):
     tab = watched(drive.as_uri()).tab
     everything = tab.locator(".frames tbody tr").count()
-    tab.select_option("[name=variant]", "unfiltered")
+    tab.locator(".choice select").first.select_option("unfiltered")
     assert shown(tab, ".frames thead th[data-variant]") == ["unfiltered"] * 3
     tab.fill("[name=least]", "20")
     rates = [float(text) for text in shown(tab, ".frames tbody td:nth-child(4)")]
     assert 0 < len(rates) < everything
     assert min(rates) >= 20
     tab.click(".filters [type=reset]")
+    tab.locator(".choice select").first.select_option("")
     wait_until(tab, "document.querySelectorAll('.frames tr[hidden]').length === 0")
     tab.select_option("[name=condition]", label="the filter helps")
     notes = shown(tab, ".frames tbody td:last-child")
@@ -281,6 +283,110 @@ def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(dr
     assert low <= min(numbers) <= max(numbers) <= low + size
     tab.locator(".whole:visible").first.click()
     assert tab.locator(".frames tbody tr:not([hidden])").count() == everything
+
+
+def offered(tab):
+    """The frames that are offered behind a number, and which of them have a thumbnail."""
+    links = tab.locator("dialog .behind a")
+    links.first.wait_for()
+    numbers = [int(text.split()[-1]) for text in links.all_inner_texts()]
+    return numbers, [each.locator("img").count() for each in links.all()]
+
+
+def highest(rows, count=12):
+    """The numbers of the frames with the highest ``value``, of equal ones the first."""
+    ranked = rows[rows["value"] > 0].sort_values("value", ascending=False, kind="stable")
+    return ranked["frame"].tolist()[:count]
+
+
+def test_behind_a_region_are_the_frames_with_most_wrong_pixels_there(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    row = tab.locator(".rows").first.locator(".row", has_text="in light")
+    row.locator("circle").last.dispatch_event("click")
+    numbers, thumbnails = offered(tab)
+    name = row.locator("circle").last.get_attribute("data-told").partition(":")[0]
+    rows = pd.read_csv(demo.reports / "regions.csv")
+    rows = rows[(rows["region"] == "lit") & (rows["variant"] == name) & (rows["stage"] == "post")]
+    assert numbers == highest(rows.assign(value=rows["FP"] + rows["FN"]))
+    held = {int(each.get_attribute("data-frame")) for each in tab.locator(".strip").all()}
+    assert thumbnails == [number in held for number in numbers]
+    tab.locator("dialog a").nth(1).click()
+    tab.locator("dialog").wait_for(state="hidden")
+    assert frame(tab) == numbers[1]
+    assert tab.url.endswith(f"#frame-{numbers[1]}")
+
+
+def test_behind_a_stage_are_the_frames_with_its_highest_rate(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    area = tab.locator("#which-stage-broke-it .area").first
+    area.focus()
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("Enter")
+    title = tab.locator("dialog h3").inner_text()
+    mask = re.match(r"(\w+), (\w+): (.*) %", title)
+    rows = pd.read_csv(demo.reports / "frames.csv")
+    rows = rows[(rows["variant"] == mask[1]) & (rows["stage"] == mask[2])]
+    rates = (rows["FP"] + rows["FN"]) / rows[["TP", "TN", "FP", "FN"]].sum(axis=1)
+    assert float(mask[3]) == pytest.approx(100 * rates.mean(), abs=0.01)
+    numbers, _ = offered(tab)
+    assert numbers == highest(rows.assign(value=rates))
+
+
+def test_behind_a_point_of_the_paper_s_figure_are_the_frames_of_its_window(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    tab.locator("summary", has_text="figures 2, 3a and 3b").click()
+    area = tab.locator("#over-the-drive .area").first
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    tab.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.2 * box["height"])
+    numbers, _ = offered(tab)
+    windows = pd.read_csv(demo.reports / "windows.csv")
+    spans = set(zip(windows["first_frame"], windows["last_frame"], strict=True))
+    assert (numbers[0], numbers[-1]) in spans
+    assert numbers == list(range(numbers[0], numbers[-1] + 1))
+
+
+def test_behind_a_place_of_a_map_are_the_pictured_frames_that_are_wrong_there(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    shown_map = tab.locator(".panel", has=tab.locator(".map")).filter(has_text="FN of unfiltered")
+    area = shown_map.locator(".area")
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    place = (0.5 + 0.5 / 40, 0.7 + 0.5 / 30)
+    tab.mouse.click(box["x"] + place[0] * box["width"], box["y"] + place[1] * box["height"])
+    numbers, thumbnails = offered(tab)
+    assert all(thumbnails)
+    recording = Recording(demo.recording)
+    wrong = []
+    for each in tab.locator(".strip").all():
+        number = int(each.get_attribute("data-frame"))
+        mask, truth = recording.layer("unfiltered", "post", number), recording.truth(number)
+        high, wide = truth.shape
+        rows, columns = slice(21 * high // 30, 22 * high // 30), slice(wide // 2, 21 * wide // 40)
+        if ((mask == 0) & (truth == 1))[rows, columns].any():
+            wrong.append(number)
+    assert numbers == wrong != []
+
+
+def test_two_variants_are_chosen_for_the_whole_page(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    one, other = tab.locator(".choice select").all()
+    assert other.is_disabled()
+    one.select_option("unfiltered")
+    other.select_option("blind")
+    assert set(shown(tab, ".legend li")) & {"filtered", "unfiltered", "blind"} == {
+        *("unfiltered", "blind")
+    }
+    assert not [each for each in tab.locator("g[data-of=filtered]").all() if each.is_visible()]
+    assert shown(tab, "#summary tbody th") == ["unfiltered", "blind"]
+    maps = shown(tab, ".panel:has(.map) .axis")
+    assert maps
+    assert all("of unfiltered" in title for title in maps)
+    assert tab.locator("select.left").input_value() == "unfiltered: errors"
+    tab.locator(".rows").first.locator(".row").nth(2).hover()
+    assert "\nfiltered" not in tab.locator(".tip:visible").inner_text()
+    one.select_option("")
+    assert shown(tab, "#summary tbody th") == ["filtered", "unfiltered", "blind"]
 
 
 def test_a_map_tells_the_same_place_of_every_mask(drive, demo, watched):

@@ -11,14 +11,17 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import Packed, Rows, TruthBits
+from roadeval.data.rows import Cells
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
+from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.frames import FramePicker, browsed, evenly, strips_of
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Document, ImageFile
+from roadeval.report.charts.standard import BEHIND, WRONG
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import (
     Commands,
@@ -179,7 +182,28 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         helped=picker.moved(paired, [], harmed=False),
         harmed=picker.moved(paired, worst, harmed=True),
         coverage=_coverage(result, pictured),
+        behind=dict(_behind(rows, score.finals(result.table("regions")))) if len(rows) else {},
     )
+
+
+def _behind(rows: Rows, regions: Rows) -> Iterator[tuple[tuple[str, str, str], list[int]]]:
+    """Yield the frames behind the rates of every mask, and behind the errors in every region."""
+
+    def most(frames: Cells, values: Cells) -> list[int]:
+        ranked = np.argsort(-np.nan_to_num(values), kind="stable")[:BEHIND]
+        found: list[int] = frames[ranked[values[ranked] > 0]].tolist()
+        return found
+
+    for variant, stage, places in rows.masks():
+        own = rows.take(places)
+        for rate, metric in SHORT.items():
+            values = 1 - own[rate] if metric.higher_is_better else own[rate]
+            yield (variant, stage, rate), most(own["frame"], values)
+    for variant in regions.distinct("variant"):
+        own = regions.of_variant(variant)
+        for region in own.distinct("region"):
+            there = own.take(own["region"] == region)
+            yield (variant, region, WRONG), most(there["frame"], there["FP"] + there["FN"])
 
 
 # --- Tables ---------------------------------------------------------------------------------------

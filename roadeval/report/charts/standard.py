@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -37,6 +38,13 @@ if TYPE_CHECKING:
     from roadeval.results.facts import Totals
 
 
+Behind = Mapping[tuple[str, str, str], Sequence[int]]
+"""The frames behind a number, by the variant, the stage or region, and the rate."""
+UNKNOWN: Final[Behind] = MappingProxyType({})
+BEHIND: Final = 12
+"""Frames behind a number, at most."""
+WRONG: Final = "wrong"
+"""Pixels of a region that are, in `Behind`."""
 LEAST_SHARE: Final = 1.0
 """Percent of the frames to which a heat map's shades reach at least."""
 
@@ -83,7 +91,19 @@ def over_windows(
     if not len(windows):
         return []
     final = score.finals(windows)
-    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
+    made = _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
+    ends = zip(final["first_frame"].tolist(), final["last_frame"].tolist(), strict=True)
+    behind = {
+        (first + last) / 2: range(first, last + 1, -(-(last + 1 - first) // BEHIND))
+        for first, last in ends
+    }
+    return [
+        replace(
+            chart,
+            series=[replace(s, frames=[behind.get(x, ()) for x in s.x]) for s in chart.series],
+        )
+        for chart in made
+    ]
 
 
 def over_frames(
@@ -133,15 +153,21 @@ def coverage(shares: Mapping[str, Mapping[int, float]]) -> Chart:
 # --- By stage, by region, over the image ----------------------------------------------------------
 
 
-def stages(totals: Totals) -> list[Chart]:
-    """Return a chart a rate: each stage's mask, a line a variant."""
+def stages(totals: Totals, behind: Behind = UNKNOWN) -> list[Chart]:
+    """Return a chart a rate: each stage's mask, a line a variant.
+
+    ``behind`` has the frames with the highest rate, by variant, stage and rate.
+    """
     names = merged(own for variant, own in totals.items() if variant != BASELINE)
     return [
         Chart(
             f"{rate}: {metric.in_words}",
             ChartKind.LINES,
             [
-                _of_stages(variant, look, totals[variant], names, rate)
+                _with_frames(
+                    _of_stages(variant, look, totals[variant], names, rate),
+                    [behind.get((variant, stage, rate), ()) for stage in totals[variant]],
+                )
                 for variant, look in looks([*totals]).items()
             ],
             names=names,
@@ -162,6 +188,11 @@ def _of_stages(
     return series(variant, look, [names.index(stage) for stage in own], values)
 
 
+def _with_frames(each: Series, frames: Sequence[Sequence[int]]) -> Series:
+    """Return a series with the frames behind its numbers; of one for all, behind each."""
+    return replace(each, frames=[*frames] * (len(each.x) // len(frames)) if any(frames) else ())
+
+
 _OF_REGIONS: Final = {"ERR": "ERR within the region", "errors": "Share of the wrong pixels"}
 
 
@@ -169,6 +200,7 @@ def regions(
     found: Mapping[tuple[str, str], Mapping[str, float]],
     variants: Sequence[str],
     titles: Mapping[str, str],
+    behind: Behind = UNKNOWN,
 ) -> list[Chart]:
     """Return the error rate in each region, and its share of the errors beside that of pixels.
 
@@ -180,6 +212,8 @@ def regions(
         Those to draw, in order.
     titles
         The regions to draw, from top to bottom, with their titles.
+    behind
+        The frames with most wrong pixels, by variant, region and ``wrong``.
     """
 
     def column(name: str, variant: str) -> list[float]:
@@ -190,7 +224,10 @@ def regions(
             title,
             ChartKind.MARKS,
             [
-                series(variant, look, range(len(titles)), column(name, variant))
+                _with_frames(
+                    series(variant, look, range(len(titles)), column(name, variant)),
+                    [behind.get((variant, region, WRONG), ()) for region in titles],
+                )
                 for variant, look in looks(variants).items()
             ],
             names=[*titles.values()],
@@ -215,7 +252,7 @@ def heat(maps: Sequence[ErrorHeatmap]) -> Iterator[HeatMap]:
             ("FN", each.fn, fn, colours.FN),
         ):
             title = f"{outcome} of {each.variant}"
-            yield HeatMap(title, 100 * shares, max(top, LEAST_SHARE), colour)
+            yield HeatMap(title, 100 * shares, max(top, LEAST_SHARE), colour, each.variant)
 
 
 def series(name: str, look: Look, x: Any, y: Any) -> Series:
@@ -399,7 +436,8 @@ def _intervals(
 ) -> Series:
     """Return means and the ends of their intervals, all as fractions, as a series."""
     columns = ([in_percent(each) for each in column] for column in zip(*found, strict=True))
-    return Series(name, look, [*places], *(columns if found else ([],)))
+    mean, low, high = columns if found else ([], (), ())
+    return Series(name, look, [*places], mean, low, high)
 
 
 LEAST_AXIS: Final = 50

@@ -14,20 +14,23 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
+from roadeval.data.words import MINUS
 from roadeval.report.blocks import (
     Block,
     Cell,
     Document,
+    FrameBrowser,
     Heading,
     ImageFile,
     KeepTogether,
     Table,
     TableOfContents,
+    plain,
 )
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import drawn, span_of_frames, values
@@ -38,7 +41,9 @@ from roadeval.runtime.text import visible
 STYLE: Final = "page.css"
 SCRIPT: Final = "page.js"
 """Names of the files with a page's style and script, where they are not inside it."""
-_SCRIPTS: Final = ("tables.js", "charts.js", "places.js", "pictures.js", "frames.js", "start.js")
+_SCRIPTS: Final = (
+    *("tables.js", "choice.js", "charts.js", "places.js", "pictures.js", "frames.js", "start.js"),
+)
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
@@ -133,8 +138,10 @@ def _hash(code: str) -> str:
 
 
 def _rendered(template: str, place: Place, document: Document | None, **given: Any) -> bytes:
-    parts = document.parts() if document else ()
+    parts = [*document.parts()] if document else []
     span = span_of_frames(part for part in parts if isinstance(part, Chart))
+    browsers = (part for part in parts if isinstance(part, FrameBrowser))
+    variants = next((part.variants for part in browsers), ())
     own_frame = "#frame-{}" if place.frames is None else place.frames
     made = (
         _environment()
@@ -146,6 +153,8 @@ def _rendered(template: str, place: Place, document: Document | None, **given: A
             source=lambda image: _source(image, place),
             frame_link=own_frame.format,
             filled=_filled,
+            variants=variants,
+            variant_of=partial(_variant_of, variants),
             unknown=_unknown,
             is_live=place.frames is not None,
             has_forms=place.forms,
@@ -155,6 +164,13 @@ def _rendered(template: str, place: Place, document: Document | None, **given: A
         )
     )
     return str(made).encode("utf-8")
+
+
+def _variant_of(variants: Sequence[str], text: Cell | str) -> str:
+    """Return the variant that a text begins with, as "a", "a: its mask" or a difference from a."""
+    words = plain(text)
+    whole = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
+    return next(whole, "")
 
 
 @cache

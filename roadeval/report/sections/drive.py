@@ -207,7 +207,10 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
     yield Heading("Where the errors are")
     names = titles([*dict.fromkeys(region for region, _ in findings.regions)], findings.height)
     yield Figure(
-        charts.regions(findings.regions, [*findings.finals], names),
+        charts.regions(
+            *(findings.regions, [*findings.finals], names),
+            findings.behind if isinstance(findings, Findings) else charts.UNKNOWN,
+        ),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
@@ -235,7 +238,7 @@ def stages(findings: Findings) -> Iterator[Block]:
     """Yield what each stage did to the mask, and which part of the error is whose."""
     yield Heading("Which stage broke it")
     yield Figure(
-        charts.stages(findings.totals),
+        charts.stages(findings.totals, findings.behind),
         f"Rates of each stage's mask, means over the frames; {BASELINE}, which has no stages, for "
         "scale.",
     )

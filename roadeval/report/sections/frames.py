@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
-from roadeval.data import BASELINE
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import BASELINE, ERRORS
+from roadeval.data.arrays import FN, FP
 from roadeval.data.words import defined, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import FILTER
 from roadeval.report.blocks import (
+    CELLS,
     Block,
     Command,
     FrameBrowser,
@@ -292,4 +298,16 @@ def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
 
 def _picture(image: LayerImage, name: str, width: int) -> Picture:
     title = image.spec.title if image.spec else image.title
-    return Picture(name, title, jpeg(image, width))
+    wrong = {} if image.array is None or image.spec is not ERRORS else _wrong(image.array)
+    return Picture(name, title, jpeg(image, width), wrong)
+
+
+def _wrong(errors: npt.NDArray[Any]) -> dict[str, str]:
+    """Return in which cells of `CELLS` a mask has errors, see `Picture.wrong`."""
+    import cv2
+
+    found = {}
+    for name, outcome in (("FP", FP), ("FN", FN)):
+        shares = cv2.resize(np.float32(errors == outcome), CELLS, interpolation=cv2.INTER_AREA)
+        found[name] = base64.b64encode(np.packbits(shares > 0).tobytes()).decode()
+    return found

@@ -84,7 +84,10 @@ class Browser {
     for (const each of along) each.mark(frame);
     for (const each of this.held.values()) each.hidden = Number(each.dataset.frame) !== frame;
     this.position();
-    if (!this.held.has(frame) && this.live && row?.classList.contains("pictured")) await this.fetch(frame);
+    if (!this.held.has(frame) && this.live && row?.classList.contains("pictured")) {
+      this.where.textContent = `Frame ${frame} \u2026`;
+      await this.fetch(frame);
+    }
     if (this.frame !== frame) return;
     const strip = this.held.get(frame);
     this.stage.offer(strip ? [...strip.querySelectorAll(".tile")] : []);
@@ -116,10 +119,38 @@ class Browser {
     if (command) this.absent.append(" In the viewer: ", words);
   }
 
+  /** The frames, of those with pictures here, that are wrong in a cell of an image. */
+  wrongAt(name, outcome, cell) {
+    const isWrong = (strip) => {
+      const cells = [...strip.querySelectorAll(".tile")].find((each) => each.dataset.name === name)?.dataset[outcome];
+      return cells && atob(cells).charCodeAt(cell >> 3) & (128 >> (cell & 7));
+    };
+    return [...this.held].filter(([, strip]) => isWrong(strip)).map(([frame]) => frame);
+  }
+
+  /** A link to a frame, with a picture as soon as there is one. */
+  thumbnail(frame, variant) {
+    const link = document.createElement("a");
+    link.href = `#frame-${frame}`;
+    link.textContent = `frame ${frame}`;
+    link.addEventListener("click", (event) => {
+      event.preventDefault();
+      dialog.close();
+      this.show(frame, { scroll: true });
+    });
+    const draw = () => {
+      const tiles = [...(this.held.get(frame)?.querySelectorAll(".tile") ?? [])];
+      const tile = tiles.find((each) => each.dataset.name === `${variant}: errors`) ?? tiles[0];
+      if (tile) link.prepend(tile.querySelector("img").cloneNode());
+    };
+    if (this.live && !this.held.has(frame) && this.byFrame.get(frame).classList.contains("pictured")) this.fetch(frame).then(draw);
+    else draw();
+    return link;
+  }
+
   /** Ask the server for a frame's pictures. */
   async fetch(frame) {
     const address = this.byFrame.get(frame).querySelector("a").href;
-    this.where.textContent = `Frame ${frame} \u2026`;
     const answer = await fetch(`${address}/part`);
     const made = document.createElement("template");
     made.innerHTML = await answer.text();
@@ -162,7 +193,7 @@ class Browser {
     const [least, most] = [wanted.least, wanted.most].map((text) => (text ? Number(text) : NaN));
     const places = this.columns.flatMap((title, place) => {
       const { variant, rate } = title.dataset;
-      return rate === wanted.rate && (!wanted.variant || variant === wanted.variant) ? [place] : [];
+      return rate === wanted.rate && isShown(variant) ? [place] : [];
     });
     const fits = (value) => !(value < least) && !(value > most) && !(Number.isNaN(value) && (least >= 0 || most >= 0));
     for (const row of this.rows) {
@@ -171,22 +202,21 @@ class Browser {
       const inRange = !range.whole || (frame >= range.low && frame <= range.high) || range.low === range.high;
       row.hidden = !(inRate && inRange && hasCondition(row, wanted.condition));
     }
-    this.hideColumns(wanted.variant);
+    this.hideColumns();
     const shown = this.rows.filter((row) => !row.hidden).length;
     this.told.textContent = shown === this.rows.length ? "" : `${shown} of ${this.rows.length} frames`;
     if (this.frame !== undefined) this.position();
   }
 
-  /** With one variant chosen only its columns are there. */
-  hideColumns(variant) {
-    const table = this.element.querySelector(".frames");
+  /** Only the chosen variants' columns are there. */
+  hideColumns() {
     for (const [place, title] of this.columns.entries()) {
-      const hidden = Boolean(variant) && title.dataset.variant !== undefined && title.dataset.variant !== variant;
-      title.hidden = hidden;
-      for (const row of this.rows) row.cells[place].hidden = hidden;
+      title.hidden = !isShown(title.dataset.variant);
+      for (const row of this.rows) row.cells[place].hidden = title.hidden;
     }
-    const each = new Set(this.columns.map((title) => title.dataset.variant).filter(Boolean)).size;
-    for (const group of table.querySelectorAll(".groups th")) group.colSpan = variant ? 1 : each;
+    const shown = this.columns.filter((title) => title.dataset.variant && !title.hidden);
+    const each = new Set(shown.map((title) => title.dataset.variant)).size;
+    for (const group of this.element.querySelectorAll(".frames .groups th")) group.colSpan = each;
   }
 }
 

@@ -27,8 +27,9 @@ class RowsView {
       row.marks = [...row.querySelectorAll("circle")].map((mark) => {
         const told = mark.dataset.told;
         mark.querySelector("title").remove();
-        return [told, mark.getAttribute("fill")];
+        return [told, mark.getAttribute("fill"), mark];
       });
+      row.addEventListener("click", (event) => this.showBehind(row, event.clientX));
       row.addEventListener("pointermove", () => this.point(number));
     }
     element.addEventListener("pointerleave", () => this.point(null));
@@ -38,12 +39,21 @@ class RowsView {
 
   key(event) {
     const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+    if (event.key === "Enter" && this.rows[this.pointed]) this.showBehind(this.rows[this.pointed], 0);
     if (!step) return;
     const next = (this.pointed ?? (step > 0 ? -1 : this.rows.length)) + step;
     this.point(Math.min(Math.max(next, 0), this.rows.length - 1));
     this.rows[this.pointed].scrollIntoView({ block: "nearest" });
     event.preventDefault();
     event.stopPropagation();
+  }
+
+  /** Show the frames behind the mark of a row that is nearest to a place on the screen. */
+  showBehind(row, x) {
+    const far = (mark) => Math.abs(mark.getBoundingClientRect().left - x);
+    const known = row.marks.filter(([told, , mark]) => mark.dataset.frames && isShown(told));
+    const [nearest] = known.sort(([, , a], [, , b]) => far(a) - far(b));
+    if (nearest) showFrames(`${row.querySelector(".name").textContent}, ${nearest[0]}`, nearest[0].slice(0, nearest[0].lastIndexOf(": ")), nearest[2].dataset.frames.split(" ").map(Number));
   }
 
   point(number) {
@@ -53,10 +63,11 @@ class RowsView {
     if (number === null) return;
     const row = this.rows[number];
     row.classList.add("pointed");
-    const lines = row.marks.map(([told, colour]) => {
+    const lines = row.marks.filter(([told]) => isShown(told)).map(([told, colour]) => {
       const [, name, value] = /^(.*?): ([^:]*)$/s.exec(told) ?? [null, told, ""];
       return tipLine(name, value, colour);
     });
+    if (row.marks.some(([, , mark]) => mark.dataset.frames)) lines.push(tipHead("click: the frames behind it", "hint"));
     this.tip.replaceChildren(tipHead(row.querySelector(".name").textContent), ...lines);
     const below = row.offsetTop + row.offsetHeight;
     place(this.tip, this.element, this.element.clientWidth * 0.5, below);
@@ -91,9 +102,20 @@ class MapView {
     this.area.addEventListener("pointerleave", () => this.point(null));
     this.area.addEventListener("blur", () => this.point(null));
     this.area.addEventListener("keydown", (event) => this.key(event));
+    this.area.addEventListener("click", () => this.showBehind());
+  }
+
+  /** Show the frames whose pictures are here and that are wrong at the place pointed at. */
+  showBehind() {
+    if (!this.pointed) return;
+    const [outcome, variant] = [this.title.slice(0, 2).toLowerCase(), this.title.slice(6)];
+    const [x, y] = this.pointed;
+    const cell = Math.floor(((y + 0.5) / this.rows) * 30) * 40 + Math.floor(((x + 0.5) / this.columns) * 40);
+    showFrames(`${this.title} here, of the frames with pictures`, variant, browser?.wrongAt(`${variant}: errors`, outcome, cell) ?? []);
   }
 
   key(event) {
+    if (event.key === "Enter") this.showBehind();
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     if (!step) return;
     const [x, y] = this.pointed ?? [this.columns >> 1, this.rows >> 1];
@@ -121,7 +143,8 @@ class MapView {
     }
     const share = [(100 * (x + 0.5)) / this.columns, (100 * (y + 0.5)) / this.rows];
     const head = tipHead(`${share[0].toFixed(0)} % from the left, ${share[1].toFixed(0)} % from the top`);
-    this.tip.replaceChildren(head, ...this.all.map((each) => tipLine(each.title, each.value(x, y))));
+    const shown = this.all.filter((each) => isShown(each.title.slice(6)));
+    this.tip.replaceChildren(head, ...shown.map((each) => tipLine(each.title, each.value(x, y))));
     const box = this.area.getBoundingClientRect();
     place(this.tip, this.element, (box.width * share[0]) / 100, (box.height * share[1]) / 100 + 16);
   }

@@ -49,6 +49,10 @@ let browser = null;
 startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), { scroll: true }));
 startPlaces();
 if (element) browser = new Browser(element);
+startChoice(() => {
+  browser.filter();
+  browser.stage.prefer(chosen);
+});
 fitOutline();
 followOutline();
 
