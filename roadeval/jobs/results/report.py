@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import Packed, Rows, TruthBits
-from roadeval.data.rows import Cells
+from roadeval.data.result import Cells
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
