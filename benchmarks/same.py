@@ -72,7 +72,7 @@ def _file(old: Path, new: Path, name: str) -> Iterator[str]:
 
 def _found(summary: dict[str, Any]) -> dict[str, Any]:
     kept = {key: value for key, value in summary.items() if key not in OF_THE_RUN}
-    return {**kept, "log": summary["log"]["sha256"], "frames": _counts(summary["frames"])}
+    return {**kept, "log": summary["log"]["digest"], "frames": _counts(summary["frames"])}
 
 
 def _counts(frames: dict[str, Any]) -> dict[str, Any]:

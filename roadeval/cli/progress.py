@@ -78,10 +78,10 @@ class Watch:
         if not progress.done:
             return progress.stage
         of = f" of {progress.total}" if progress.total is not None else ""
-        parts = [f"{progress.done}{of} frames"]
+        parts = [f"{progress.done}{of} {progress.unit}"]
         (task,) = self._display.tasks
         if task.speed:
-            parts.append(f"{task.speed:.1f} frames/s")
+            parts.append(f"{task.speed:.1f} {progress.unit}/s")
             if task.time_remaining is not None:
                 parts.append(f"{task.time_remaining:.0f} s left")
         return f"{progress.stage}: {', '.join(parts)}"

@@ -9,18 +9,43 @@ from typing import Final
 from roadeval import logs
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
+from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.runtime.files import AnyPath, put, writing
 
+MB: Final = 1_000_000
 
-def info(drive: str | Path, config: logs.LogConfig | None = None) -> logs.LogDescription:
+
+def info(
+    drive: str | Path,
+    config: logs.LogConfig | None = None,
+    *,
+    verify: bool = False,
+    on_progress: OnProgress = ignore,
+) -> logs.LogDescription:
     """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
+
+    Parameters
+    ----------
+    drive
+        The log.
+    config
+        What a replay would be asked for.
+    verify
+        Whether the log is read whole, so that all damage is found; one of at most 50 MB is in any
+        case.
+    on_progress
+        Called now and then while the log is read whole, in megabytes.
 
     Raises
     ------
     RoadevalError
         If it is no log, or cannot be read.
     """
-    return logs.describe(drive, config)
+
+    def step(done: int, total: int) -> None:
+        on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
+
+    return logs.describe(drive, config, verify=verify, on_bytes=step)
 
 
 def pack(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 class Progress:
     """How far a job is: ``done`` of ``total`` frames of ``stage``.
 
-    ``stage`` is ``training``, ``hashing``, ``replaying``, ``writing`` or ``rendering``; ``total``
+    ``stage`` is ``training``, ``replaying``, ``writing``, ``rendering`` or ``verifying``; ``total``
     is None where it is not known.
     """
 
@@ -19,6 +19,7 @@ class Progress:
     stage: str
     note: str = ""
     """A sentence that the user should read now, not at the end."""
+    unit: str = "frames"
 
 
 OnProgress = Callable[[Progress], None]

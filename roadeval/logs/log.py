@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from roadeval.logs.truth.named import with_keys
 from roadeval.logs.truth.pairing import frames_of
 from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
 from roadeval.runtime.text import visible
+
+SMALL: Final = 50_000_000
+"""Bytes of a log that is read whole where its checksums are of use: that takes a moment."""
 
 
 def open_log(path: str | Path, config: LogConfig | None = None) -> Log:
@@ -97,10 +100,12 @@ class Log:
     def losses(self) -> tuple[str, ...]:
         """The losses of the log, a sentence each; empty if nothing is lost.
 
-        Damage inside chunks is found when they are read, or by `verify`.
+        Damage inside chunks is found when they are read, or by `verify`. The checksum of all data
+        is looked at where chunks have none of their own, and in a log of at most `SMALL` bytes.
         """
         for container in self._containers:
-            container.verify_data()
+            if self.size <= SMALL or not container.is_covered:
+                container.verify_data()
         lost = [str(damage) for damage in self.damage if damage.lossy]
         images = [topic for topic in self.topics if topic.is_image] if lost else []
         return (*lost, *map(self._kept, images))
@@ -110,6 +115,11 @@ class Log:
         """Bytes of all its files."""
         return sum(len(container.source) for container in self._containers)
 
+    @property
+    def is_covered(self) -> bool:
+        """Whether all messages lie in chunks that have a checksum of their own."""
+        return all(container.is_covered for container in self._containers)
+
     def _kept(self, topic: TopicInfo) -> str:
         reader = self._readers[topic.name]
         total = max(reader.expected(), len(reader))
@@ -117,24 +127,45 @@ class Log:
         until = (topic.last_ns or self.start_ns) - self.start_ns
         return f"{topic.name}: {reader.readable()}{known} images kept, up to {until / NS:.3f} s"
 
-    def verify(self) -> None:
-        """Read the whole log once, so that `damage` knows all of it."""
-        for container in self._containers:
-            container.verify()
-
     @cached_property
-    def sha256(self) -> str:
-        """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal.
+    def digest(self) -> str:
+        """What tells this log from another, in hexadecimal: its messages are not read for it.
 
-        The first time the whole log is read for it. A `LogError` if the disk fails.
+        SHA-256 of sizes, of the places and log times of messages, and of the chunks' own checksums.
+        Equal wherever the log lies. A `LogError` if the disk fails.
         """
-        digests = {container.path: hashlib.sha256() for container in self._containers}
+        try:
+            parts = [container.fingerprint() for container in self._containers]
+        except BadRecord as error:
+            raise LogError(f"{self.path}: {error}") from error
+        return hashlib.sha256(b"\n".join(parts)).hexdigest()
+
+    def verify(self, on_bytes: Callable[[int, int], object] | None = None) -> str | None:
+        """Read the whole log, so that `damage` knows all of it; return its SHA-256 in hexadecimal.
+
+        Of a folder it is the SHA-256 of its files' sums; None if the disk fails. ``on_bytes`` is
+        called now and then with the bytes that were read, and with all that will be.
+        """
+        sums = {container.path: hashlib.sha256() for container in self._containers}
+        done = 0
+
+        def step(size: int) -> None:
+            nonlocal done
+            done += size
+            if on_bytes is not None:
+                on_bytes(done, 2 * self.size)  # chunk by chunk, and as a whole for the sum
+
         for container in self._containers:
+
+            def take(block: bytes, path: Path = container.path) -> None:
+                sums[path].update(block)
+                step(len(block))
+
             try:
-                container.read_all(digests[container.path].update)
-            except BadRecord as error:
-                raise LogError(f"{container.path}: {error}") from error
-        found = [digest.hexdigest() for digest in digests.values()]
+                container.verify(step, take)
+            except BadRecord:
+                return None
+        found = [each.hexdigest() for each in sums.values()]
         return found[0] if len(found) == 1 else hashlib.sha256("".join(found).encode()).hexdigest()
 
     def select(self, *, several: bool = False) -> Selection:
@@ -195,7 +226,7 @@ class Log:
         reader = other._readers[named(other.topics, topic, "topic").name]
         same = other.path.resolve() == self.path.resolve()
         name = "" if same else other.name
-        return beside_log(reader, settings, camera, lambda: other.sha256, name, several=several)
+        return beside_log(reader, settings, camera, lambda: other.digest, name, several=several)
 
     def frames(self, selection: Selection) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.
@@ -265,16 +296,43 @@ class LogDescription:
     damage: tuple[str, ...]
     losses: tuple[str, ...]
     """The damage of the files, and the losses by it, a sentence each."""
+    digest: str
+    """What tells the log from another, see `Log.digest`."""
+    verified: bool
+    """Whether the log was read whole: of one that was not, damage inside chunks is not known."""
+    sha256: str | None
+    """Of a log that was read whole."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON has it: text, numbers, lists, objects."""
         return asdict(self)
 
 
-def describe(path: str | Path, config: LogConfig | None = None) -> LogDescription:
-    """Read a log whole, so that all damage is found, and describe it.
+def describe(
+    path: str | Path,
+    config: LogConfig | None = None,
+    *,
+    verify: bool = False,
+    on_bytes: Callable[[int, int], object] | None = None,
+) -> LogDescription:
+    """Describe a log by its summary and indexes.
 
-    A `LogError` if it is missing, unreadable, or no MCAP log.
+    Parameters
+    ----------
+    path
+        The log.
+    config
+        What a replay would be asked for.
+    verify
+        Whether the log is read whole, so that all damage is found. One of at most `SMALL` bytes is
+        in any case.
+    on_bytes
+        Called now and then with the bytes that were read, and with all that will be.
+
+    Raises
+    ------
+    LogError
+        If it is missing, unreadable, or no MCAP log.
     """
     with open_log(path, config) as log:
         picks: tuple[str, ...] = ()
@@ -287,7 +345,8 @@ def describe(path: str | Path, config: LogConfig | None = None) -> LogDescriptio
             picks, oddities = selection.reasons, tuple(f"{images.name}: {each}" for each in odd)
         except LogError as error:
             problem = str(error)
-        log.verify()
+        verified = verify or log.size <= SMALL
+        sha256 = log.verify(on_bytes) if verified else None
         return LogDescription(
             path=str(path),
             bytes=log.size,
@@ -299,4 +358,7 @@ def describe(path: str | Path, config: LogConfig | None = None) -> LogDescriptio
             oddities=oddities,
             damage=tuple(map(str, log.damage)),
             losses=log.losses,
+            digest=log.digest,
+            verified=verified,
+            sha256=sha256,
         )

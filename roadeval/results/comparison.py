@@ -168,7 +168,7 @@ def _told(note: Note) -> str:
         Kind.LOG_UNKNOWN: f"{drives} left out of {one} (log unknown): {names}",
         Kind.SAME_LOGS: (
             f"{count} drives have other names in {one} and {other}, and are taken for the same by "
-            "the SHA-256 of their logs"
+            "the digests of their logs"
         ),
         Kind.FRAMES: (
             f"{count} frames that {one} evaluated are left out against {other}, which lacks them "

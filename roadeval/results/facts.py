@@ -85,10 +85,10 @@ class TrainingFacts:
 
 @dataclass(frozen=True, slots=True)
 class LogFacts:
-    """The log's file and the SHA-256 of its content."""
+    """The log's file, and what tells it from another (`roadeval.logs.Log.digest`)."""
 
     path: str
-    sha256: str
+    digest: str
 
 
 class _Document:
@@ -249,9 +249,9 @@ class Facts(_Document):
         return found
 
     @property
-    def sha256(self) -> str | None:
-        """The SHA-256 of the log, where it is known."""
-        return self.log.sha256 if self.log else None
+    def log_digest(self) -> str | None:
+        """What tells the log from another, where it is known."""
+        return self.log.digest if self.log else None
 
 
 def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:

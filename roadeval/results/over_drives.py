@@ -78,9 +78,9 @@ def summarise(
 
 
 def _copies(drives: Rows) -> dict[str, str]:
-    """Return drives whose log is another one's, byte for byte, and the first of these."""
-    firsts = {row["sha256"]: row["drive"] for row in reversed(drives) if row["sha256"]}
-    known = {row["drive"]: firsts[row["sha256"]] for row in drives if row["sha256"]}
+    """Return drives whose log has the digest of another one's, and the first of these."""
+    firsts = {row["log_digest"]: row["drive"] for row in reversed(drives) if row["log_digest"]}
+    known = {row["drive"]: firsts[row["log_digest"]] for row in drives if row["log_digest"]}
     return {drive: first for drive, first in known.items() if drive != first}
 
 
@@ -90,7 +90,7 @@ def _of_copies(copies: Mapping[str, str]) -> Iterator[str]:
         count = len(copies)
         more = f", and {count - 1} more are copies, too" if count > 1 else ""
         yield (
-            f"{copy} is a copy of {of}, byte for byte{more}: differences count copies as one "
+            f"{copy} is a copy of {of}{more}: differences count copies as one "
             "drive, the means of rates do not"
         )
 

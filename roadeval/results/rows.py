@@ -197,7 +197,7 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
         "status": status,
         "exit_code": LOST if facts.losses else 0,
         "reason": None if facts.totals else next(iter(facts.warnings), None),
-        "sha256": facts.sha256,
+        "log_digest": facts.log_digest,
         **{column: getattr(facts.drive, column) for column in ("rate_hz", "width", "height")},
         **{column: getattr(facts.frames, column) for column in ACCOUNT},
         "losses": "\n".join(facts.losses) or None,

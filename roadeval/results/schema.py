@@ -247,7 +247,9 @@ _OF_DRIVES: Final = (
             Column("attempts", Kind.COUNT, "how often it was begun"),
             Column("seconds", Kind.NUMBER, "that the last attempt took"),
             Column("peak_memory_mib", Kind.NUMBER, "the most memory that its process held"),
-            Column("sha256", Kind.NAME, "of the log"),
+            Column(
+                "log_digest", Kind.NAME, "tells the log from another: of its index and checksums"
+            ),
             Column("size_bytes", Kind.COUNT, "of the log"),
             Column("start_ns", Kind.TIME, "header stamp of the first evaluated frame"),
             Column("end_ns", Kind.TIME, "of the last one"),

@@ -37,7 +37,7 @@ def words(made):
 
 def test_the_log_is_named_by_its_hash_with_the_command_that_makes_the_results_again(words, demo):
     log = demo.summary["log"]
-    assert log["sha256"] in words
+    assert log["digest"] in words
     assert f"roadeval replay {log['path']} --config drive.rrd" in words
 
 

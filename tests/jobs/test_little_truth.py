@@ -177,9 +177,9 @@ def test_the_summary_says_where_truth_lies(places, tmp_path):
     assert found["meaning"].startswith("a mask of 0 255: road is 255")
     assert found["frames"] == 6
     other = shutil.copytree(places, tmp_path / "other")
-    assert stated(other, "b")["sha256"] == found["sha256"]
+    assert stated(other, "b")["digest"] == found["digest"]
     cv2.imwrite(str(other / "6" / "5.png"), np.full((24, 32), 255, np.uint8))
-    assert stated(other, "c")["sha256"] != found["sha256"]
+    assert stated(other, "c")["digest"] != found["digest"]
 
 
 @pytest.fixture

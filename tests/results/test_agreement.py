@@ -49,7 +49,7 @@ def a_fleet_of(rows, folder):
     effects, _ = replayed(rows)
     about = "", DriveFacts("street"), FrameAccount(), score.totals(rows)
     facts = Facts(*about, **as_parts(effects))
-    about = {"status": "scored", "evaluated": len(rows.distinct("frame")), "sha256": "d1"}
+    about = {"status": "scored", "evaluated": len(rows.distinct("frame")), "log_digest": "d1"}
     tables = {
         "drives": [about],
         "scores": score_rows(facts, {}),

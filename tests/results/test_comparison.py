@@ -103,7 +103,7 @@ def test_drives_that_changed_are_counted_by_direction():
         ),
         (
             Note(Kind.SAME_LOGS, "a", "b", 3),
-            "3 drives have other names in a and b, and are taken for the same by the SHA-256 of "
+            "3 drives have other names in a and b, and are taken for the same by the digests of "
             "their logs",
         ),
         (

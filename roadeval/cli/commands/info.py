@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Annotated, Final
 
-from roadeval.cli import arguments, console, messages
+import typer
+
+from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
 
 
 @takes("truth", "topics", "labels", "frames.keep_corrupt", "frames.max_pixels")
-def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) -> int:
+def info(
+    drive: arguments.Drive,
+    *,
+    given: Given,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Read the whole log, so that all damage is found.")
+    ] = False,
+    json: arguments.Json = False,
+) -> int:
     """Show what is in a log and what replay would pick.
 
     Topics with their kind, size, number and rate of messages, gaps and damage; and why replay
-    would pick what it picks, or what it would ask for.
+    would pick what it picks, or what it would ask for. Of a log of more than 50 MB only the
+    indexes are read, unless --verify asks for all of it.
     """
     config = arguments.of_a_log(given)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe
 
-    found = describe(drive, config)
+    with progress.watched(quiet=json or not verify) as watch:
+        found = describe(drive, config, verify=verify, on_progress=watch)
     if json:
         from roadeval.results.facts import json_text
 

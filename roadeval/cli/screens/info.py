@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
 NS = 1_000_000_000
-NAME = 50
-"""Letters of a topic's name that stand in a line, at most."""
+NAME = 28
+"""Letters of a topic's name that stay in a line, so that the numbers beside it have room."""
 
 
 def show(found: Mapping[str, Any], out: Console) -> None:
     """Print what `roadeval.logs.describe` found, as plain data."""
     out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
     out.print()
-    out.print(_topics(found["topics"]))
+    out.print(_topics(found["topics"], out.width))
     for topic in found["topics"]:
         if topic["problem"]:
             out.print(f"{topic['name']} cannot be read: {topic['problem']}", soft_wrap=True)
@@ -43,7 +43,9 @@ def show(found: Mapping[str, Any], out: Console) -> None:
 
 def _extent(found: Mapping[str, Any]) -> str:
     start, end = found["start_ns"], found["end_ns"]
-    return f"{(end - start) / NS:.1f} s from {timestamp(start)}"
+    known = "" if found["verified"] else "; not read whole, --verify looks for all damage"
+    size = f"{found['bytes'] / 1e6:.1f} MB"
+    return f"{(end - start) / NS:.1f} s from {timestamp(start)}, {size}{known}"
 
 
 def _gap(gap: tuple[int, int], start: int) -> str:
@@ -51,14 +53,15 @@ def _gap(gap: tuple[int, int], start: int) -> str:
     return f"gap of {(after - before) / NS:.2f} s, {(before - start) / NS:.2f} s after the start"
 
 
-def _topics(topics: list[dict[str, Any]]) -> RenderableType:
+def _topics(topics: list[dict[str, Any]], room: int) -> RenderableType:
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
     longest = max((len(visible(topic["name"])) for topic in topics), default=0)
-    table.add_column("topic", overflow="fold", min_width=min(longest, NAME), max_width=NAME)
-    table.add_column("carries", overflow="fold")
+    table.add_column("topic", overflow="fold", min_width=min(longest, NAME))
+    # The longest word would be kept whole, and push the numbers out.
+    table.add_column("carries", overflow="fold", max_width=room // 5)
     for name in ("size", "messages", "rate"):
         table.add_column(name, justify="right", no_wrap=True)
     for topic in topics:

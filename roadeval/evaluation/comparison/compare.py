@@ -73,8 +73,8 @@ class ComparedResult:
     scored: int
     """Drives that it has, and how many of them are scored."""
     drive: str | None
-    sha256: str | None
-    """The one drive's name and its log's SHA-256; None for several, or where it is not known."""
+    log_digest: str | None
+    """The one drive's name and its log's digest; None for several, or where it is not known."""
     frames: int
     """Evaluated frames of the drives that are compared."""
     scale: float | None
@@ -302,7 +302,7 @@ def _result(side: Side, frames: int) -> ComparedResult:
         drives=len(side.parts),
         scored=len(side.scored),
         drive=only.name if only else None,
-        sha256=only.digest if only else None,
+        log_digest=only.digest if only else None,
         frames=frames,
         scale=scales.pop() if len(scales) == 1 else None,
     )

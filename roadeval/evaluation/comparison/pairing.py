@@ -30,7 +30,7 @@ class Part:
     name: str
     """Its name for people."""
     digest: str | None
-    """The log's SHA-256, None where the result does not know it."""
+    """What tells the log from another, None where the result does not know it."""
     scored: bool
     """Whether any frame of it was."""
     asked: Mapping[str, Any]

@@ -92,10 +92,10 @@ class DriveResult:
         if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None
         try:
-            other = DriveResult(path).facts.sha256
+            other = DriveResult(path).facts.log_digest
         except RoadevalError:
             return None
-        return path if other == self.facts.sha256 else None
+        return path if other == self.facts.log_digest else None
 
     @cached_property
     def facts(self) -> Facts:
@@ -353,7 +353,7 @@ def _own(result: DriveResult, name: str) -> pd.DataFrame:
 
 def _alone(result: DriveResult) -> Part:
     return Part(
-        *(result.name, result.name, result.facts.sha256),
+        *(result.name, result.name, result.facts.log_digest),
         *(len(result.rows) > 0, asked(result.facts.run), result.table),
     )
 
@@ -365,7 +365,7 @@ def _members(fleet: FleetFolder) -> Iterator[Part]:
         yield Part(
             drive=member.drive,
             name=fleet.names[member.drive],
-            digest=row["sha256"] or None,
+            digest=row["log_digest"] or None,
             scored=bool(row["evaluated"]),
             asked=settings,
             rows=partial(_rows_of_member, fleet, member.drive),

@@ -269,14 +269,16 @@ def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> 
         gatherer.finish()
     if not outcome.facts.frames.evaluated:
         _remove(task, FRAMES)
-    masks = {name: each["sha256"] for name, each in outcome.facts.masks.items()}
+    masks = {name: each["digest"] for name, each in outcome.facts.masks.items()}
     row = (
         drive_row(outcome.facts, task.entry.name, task.entry.shown)
         | gatherer.facts()
         | {
             "fold": task.fold,
             "model": task.model or None,
-            "identity": asked(task.config, task.model, of=outcome.facts.sha256 or "", masks=masks),
+            "identity": asked(
+                task.config, task.model, of=outcome.facts.log_digest or "", masks=masks
+            ),
             "size_bytes": sum(
                 each.stat().st_size for each in ([path] if path.is_file() else path.iterdir())
             ),

@@ -257,7 +257,7 @@ def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None =
     """
     model = config.training.model
     digest = sha256_of(Path(model)) if model else ""
-    return asked(config, digest, of=log.sha256, masks=masks)
+    return asked(config, digest, of=log.digest, masks=masks)
 
 
 def asked(
@@ -265,7 +265,7 @@ def asked(
 ) -> str:
     """Return a digest of the settings, the software and the SHA-256 of a model, in hexadecimal.
 
-    With ``of``, the SHA-256 of a log, and those of masks that lie beside it, it is that of all that
+    With ``of``, the digest of a log, and those of masks that lie beside it, it is that of all that
     decides what a run finds.
     """
     plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
@@ -280,11 +280,18 @@ def asked(
 
 
 def content_of(path: Path, config: RunConfig, model: str) -> str | None:
-    """Return the `identity` of a replay of a log, which is read whole; None if it cannot be."""
+    """Return the `identity` of a replay of a log, which is read whole.
+
+    None if it cannot be, is damaged, or has messages without a checksum, for its digest does not
+    show whether these have changed.
+    """
     try:
         with logs.open_log(path, config) as log:
+            log.verify()
+            if log.damage or not log.is_covered:
+                return None
             masks = log.select().digests() if config.masks or config.truth.path else {}
-            return asked(config, model, of=log.sha256, masks=masks)
+            return asked(config, model, of=log.digest, masks=masks)
     except RoadevalError:
         return None
 

@@ -131,7 +131,6 @@ def _written(
     """Run over the log. All outputs are whole before the first of them takes its name."""
     run = prepare(log, config, on_progress)
     rule = RecordRule.parse(config.output.record)
-    on_progress(Progress(0, None, "hashing"))
     with (
         logs.SidecarWriter(to.mcap) if to.mcap else logs.NoSidecar() as sidecar,
         recorder_for(to.recording, run.layout(), rule) as recorder,

@@ -61,7 +61,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         settings={each.name: each.pipeline.as_dict() for each in run.variants},
         methods=run.methods,
         versions=versions(),
-        log=LogFacts(str(run.log.path), run.log.sha256),
+        log=LogFacts(str(run.log.path), run.log.digest),
         masks=_masks(run),
         tables=tables,
     )
@@ -159,7 +159,7 @@ def _masks(run: Run) -> dict[str, Any]:
         assert source is not None
         found[name] = {
             "path": run.config.masks.get(name, run.config.truth).path,
-            "sha256": digest,
+            "digest": digest,
             "pairing": source.why,
             "meaning": source.meaning.words,
             "frames": seen.masks[name] if name in run.selection.masks else seen.labelled,

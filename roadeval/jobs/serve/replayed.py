@@ -78,7 +78,7 @@ def recording_of(
         )
     config = _configuration(fleet, drive, row["fold"])
     on_replay(f"{drive}: no recording was kept, so it is replayed from {source}")
-    if _replayed(named, config, recording, on_progress) == row["sha256"]:
+    if _replayed(named, config, recording, on_progress) == row["log_digest"]:
         return recording, ()
     warning = f"{source}: has changed since the fleet was run, and its results may have, too"
     return recording, (warning,)
@@ -98,7 +98,7 @@ def _configuration(fleet: FleetFolder, drive: str, fold: int | None) -> RunConfi
 def _replayed(
     source: str, config: RunConfig, recording: Path, on_progress: OnProgress
 ) -> str | None:
-    """Replay a drive for its recording alone; return its log's SHA-256.
+    """Replay a drive for its recording alone; return the digest of its log.
 
     The fleet's results stay as they are.
     """
@@ -108,7 +108,7 @@ def _replayed(
             save=str(recording), reports=str(Path(reports, "reports")), record=record, figures=False
         )
         made = replay(path, replace(config, output=output), on_progress=on_progress)
-        return made.facts.sha256
+        return made.facts.log_digest
 
 
 # --- In a thread beside the server ----------------------------------------------------------------

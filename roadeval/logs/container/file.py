@@ -33,6 +33,8 @@ from roadeval.logs.container.scan import Scan, StampOf, definitions, entries_of
 from roadeval.logs.errors import BadRecord
 from roadeval.logs.settings import NS
 
+BEGIN: Final = 4096
+"""Bytes of a chunk without a checksum that take part in a log's fingerprint."""
 BLOCK: Final = 1 << 20
 """Bytes to take at a time of a whole file."""
 OUTSIDE: Final = -1
@@ -162,13 +164,34 @@ class Container:
         """Whether a chunk was found to be unreadable."""
         return chunk != OUTSIDE and self.chunks[chunk].offset in self.reader.bad
 
-    def verify(self) -> None:
-        """Read everything once, so that all damage is known."""
-        for number in range(len(self.chunks)):
+    def verify(self, on_bytes: Callable[[int], object], take: Callable[[bytes], object]) -> None:
+        """Read everything, so that all damage is known; a `BadRecord` if the disk fails.
+
+        ``take`` is given the whole log in blocks, ``on_bytes`` how many more bytes were read.
+        """
+        for number, chunk in enumerate(self.chunks):
             if number not in self._checked:
                 with suppress(BadRecord):
                     self._records(number)
-        self.verify_data()
+            on_bytes(chunk.data_size)
+        self.read_all(take)
+
+    def fingerprint(self) -> bytes:
+        """Return what tells this log from another without its messages: sizes, places, checksums.
+
+        Of a chunk without a checksum its first bytes take part. A `BadRecord` if the disk fails.
+        """
+        parts = [b"%d %d" % (len(self.source), self.scan.data_crc)]
+        for chunk, index in zip(self.chunks, self.scan.indexes, strict=True):
+            parts.append(
+                b"%d %d %d %d" % (chunk.offset, chunk.size, chunk.data_size, chunk.crc or 0)
+            )
+            if not chunk.crc:
+                begin = chunk.data_offset
+                parts.append(self.source[begin : begin + min(chunk.data_size, BEGIN)])
+            parts += [entries.tobytes() for _, entries in sorted((index or {}).items())]
+        parts += [values.tobytes() for _, values in sorted(self.scan.loose.items())]
+        return b"\n".join(parts)
 
     def read_all(self, take: Callable[[bytes], object]) -> None:
         """Pass the whole log to ``take`` in blocks, and check the checksum of all data."""
@@ -179,6 +202,11 @@ class Container:
             if self.scan.data_crc and offset < end:
                 crc = zlib.crc32(block[: end - offset], crc)
         self.data_is_right = crc == self.scan.data_crc
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether all messages lie in chunks that have a checksum of their own."""
+        return not self.scan.loose and all(chunk.crc for chunk in self.chunks)
 
     def verify_data(self) -> None:
         """Check the checksum of all data, unless that was done or the file has none."""

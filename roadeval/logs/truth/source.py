@@ -61,7 +61,7 @@ class LabelSource:
     why: str
     """Why they were chosen, or how they are paired, in words."""
     digest: Callable[[], str] | None = None
-    """Computes the SHA-256 of what lies beside the log, in hexadecimal."""
+    """Computes the digest of what lies beside the log, in hexadecimal."""
     notes: tuple[str, ...] = ()
     """Warnings about labels beside the log, a sentence each."""
 

@@ -25,12 +25,12 @@ def section(findings: Findings) -> Iterator[Block]:
     yield Heading("How to reproduce this")
     if facts.log:
         yield Text(f"Log: {facts.log.path}")
-        yield Text(f"SHA-256: {facts.log.sha256}")
+        yield Text(f"Digest of its index and checksums: {facts.log.digest}")
         if findings.commands and findings.commands.again:
             yield Command(findings.commands.again(facts.log.path))
             yield Text("The same log, configuration and versions give the same numbers.", "note")
     for name, labels in facts.masks.items():
-        yield Text(f"{name}: {labels['path']}, SHA-256: {labels['sha256']}", "note")
+        yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
     yield from _methods(facts)
     about: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
     # The digest of the input says less than the log's checksum and the settings around it.

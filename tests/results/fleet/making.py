@@ -80,7 +80,12 @@ def _broken(i, member):
         reason = REASONS[i // 10 % 2].format(f"{member.name}.mcap")
         own = row | {"status": "failed", "exit_code": 1, "reason": reason}
     elif i % 20 == 9:
-        own = row | {"status": "unscored", "exit_code": 0, "reason": "no truth", "sha256": f"{i:x}"}
+        own = row | {
+            "status": "unscored",
+            "exit_code": 0,
+            "reason": "no truth",
+            "log_digest": f"{i:x}",
+        }
     else:
         return None
     return {"drives": [own], "scores": [], "effects": [], "worst": []}
@@ -96,7 +101,7 @@ def _scored(i, drive, masks, rng, *, lost):
         "losses": f"frame {i} cannot be decoded\n3 records are cut off" if lost else None,
         "attempts": 1,
         "seconds": 10.0 + i % 7,
-        "sha256": f"{i:064x}",
+        "log_digest": f"{i:064x}",
         "size_bytes": 10**6,
         "evaluated": n,
         "trained_on": 10,
