@@ -263,7 +263,7 @@ def test_outlines_side_by_side_share_no_pixel_and_leave_none(top, bottom):
 
 @given(arrays(bool, (HEIGHT, WIDTH)))
 def test_runs_are_those_of_pycocotools(mask):
-    from roadeval.logs.truth.formats.standard import lengths_in
+    from roadeval.logs.truth.formats.coco import lengths_in
 
     encoded = coco.encode(np.asfortranarray(mask.astype(np.uint8)))
     lengths = lengths_in(encoded["counts"].decode())
@@ -274,7 +274,7 @@ def test_runs_are_those_of_pycocotools(mask):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_long_runs_are_those_of_pycocotools(seed):
-    from roadeval.logs.truth.formats.standard import lengths_in
+    from roadeval.logs.truth.formats.coco import lengths_in
 
     rng = np.random.default_rng(seed)
     mask = np.repeat(rng.random(40) < 0.5, rng.integers(1, 60_000, 40))

@@ -1,0 +1,81 @@
+"""Label format: COCO, with polygons or runs of pixels, and COCO panoptic."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from roadeval.logs.errors import LogError
+from roadeval.logs.truth.drawn import (
+    Drawing,
+    Drawn,
+    LabelFormat,
+    Outline,
+    Runs,
+    Segments,
+    Shape,
+    Size,
+)
+
+
+def _holds(_: Path, content: Any) -> bool:
+    keys = {"images", "annotations", "categories"}
+    return isinstance(content, dict) and keys <= content.keys()
+
+
+def _read(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawn]:
+    names = {each["id"]: str(each["name"]) for each in content["categories"]}
+    own = defaultdict(list)
+    for annotation in content["annotations"]:
+        own[annotation["image_id"]].append(annotation)
+    for image in content["images"]:
+        annotations = own.pop(image["id"], [])
+        size = int(image["width"]), int(image["height"])
+        if annotations and "segments_info" in annotations[0]:
+            for each in annotations:
+                segments = {int(s["id"]): names[s["category_id"]] for s in each["segments_info"]}
+                bare = Path(each["file_name"]).name
+                places = (path.with_suffix("") / bare, path.parent / bare)
+                file = next((place for place in places if place.exists()), places[0])
+                yield Segments(str(image["file_name"]), size, file, segments)
+        else:
+            shapes = [s for each in annotations for s in _shapes(each, names[each["category_id"]])]
+            yield Drawing(str(image["file_name"]), size, shapes)
+    if own:
+        raise LogError(f"{path}: annotations are of image {next(iter(own))}, which is not listed")
+
+
+def _shapes(annotation: Mapping[str, Any], label: str) -> Iterator[Shape]:
+    match annotation.get("segmentation"):
+        case {"counts": str(text)}:
+            yield Runs(label, lengths_in(text), by_columns=True)
+        case {"counts": counts}:
+            yield Runs(label, counts, by_columns=True)
+        case [*polygons]:
+            yield from (Outline(label, ring) for ring in polygons)
+
+
+def lengths_in(text: str) -> Sequence[int]:
+    """Return the lengths of the runs that COCO writes as a text.
+
+    A number has five bits in each letter, the lowest ones first, and from the fourth number on it
+    is the difference from the last but one.
+    """
+    lengths: list[int] = []
+    value = shift = 0
+    for letter in text.encode():
+        code = letter - 48
+        value |= (code & 31) << shift
+        shift += 5
+        if code & 32 and shift < 60:  # no number is longer
+            continue
+        if code & 16:
+            value -= 1 << shift
+        lengths.append(value + (lengths[-2] if len(lengths) > 2 else 0))
+        value = shift = 0
+    return lengths
+
+
+FORMAT = LabelFormat("COCO", ".json", _holds, _read)
