@@ -38,7 +38,7 @@ def test_it_tells_what_replay_would_pick_and_why(write, capsys):
     assert main(["info", write({"/camera": None, "/road_mask": [0, 255]})]) == 0
     shown = capsys.readouterr().out
     assert "drive.mcap: 3.0 s from 2023-11-14 22:13:20.000 UTC" in shown
-    assert "/camera      jpeg (protobuf)    8x6          4   1 Hz" in shown
+    assert "/camera     jpeg (protobuf)   8x6         4  1 Hz" in shown
     assert "image: /camera (the only camera image)" in shown
     assert "truth: /road_mask (" in shown
 
@@ -64,6 +64,13 @@ def test_json_holds_the_same(write, capsys):
     assert [topic["name"] for topic in found["topics"]] == ["/left", "/right"]
     assert found["start_ns"] == START
     assert "`topics.image`" in found["problem"]
+
+
+def test_numbers_have_room_beside_long_names_and_types(write, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    main(["info", write({f"/camera/{'front_' * 8}raw/compressed": None})])
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("/camera/")]
+    assert row.split()[-4:] == ["8x6", "4", "1", "Hz"]
 
 
 def test_damage_is_told_and_has_its_exit_code(tmp_path, capsys):

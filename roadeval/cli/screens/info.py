@@ -70,9 +70,15 @@ def _topics(topics: list[dict[str, Any]], room: int) -> RenderableType:
             _carries(topic),
             "x".join(str(side) for side in topic["size"] or ()),
             str(topic["count"]),
-            f"{topic['rate_hz']:.4g} Hz" if topic["rate_hz"] else "",
+            _rate(topic["rate_hz"]),
         )
     return table
+
+
+def _rate(rate: float | None) -> str:
+    if not rate:
+        return ""
+    return f"{rate:.4g} Hz" if rate >= 0.01 else "< 0.01 Hz"
 
 
 def _carries(topic: Mapping[str, Any]) -> str:
