@@ -409,7 +409,7 @@ def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
     assert (effect["units"], effect["groups"]) == (7, 1)
     assert "in 1 group " in outcome.summary["verdict"]
     assert re.search(
-        "copy0-.* is a copy of a-.*, byte for byte, and 5 more are", outcome.summary["warnings"][0]
+        "copy0-.* is a copy of a-.*, and 5 more are", outcome.summary["warnings"][0]
     )
 
 
