@@ -18,6 +18,7 @@ from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
 from roadeval.runtime.discovery import found_in
+from roadeval.runtime.text import debug, defect
 
 FIRST: Final = (
     *("replay", "fleet", "report", "serve", "inspect", "compare"),
@@ -102,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is not None:
         return _run(arguments)
-    streams.take_over(debug=messages.debug())
+    streams.take_over(debug=debug())
     streams.leave_word(f"{messages.PROGRAM}: error: {with_flags(memory.LACKING)}")
     gc.set_threshold(COLLECT_EVERY)
     # NumPy and SciPy bring an OpenBLAS each, whose threads spin for a twentieth of a second of a
@@ -157,11 +158,7 @@ def _known(error: BaseException) -> tuple[bool, str]:
         case _ if memory.is_lacking(error):
             return True, memory.LACKING
         case _:
-            what = messages.one_line(f"{type(error).__name__}: {error}")
-            return False, (
-                f"{what} (a defect of {messages.PROGRAM}, not of your input: run again with "
-                "ROADEVAL_DEBUG=1 to see where, and please report it)"
-            )
+            return False, defect(error)
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:

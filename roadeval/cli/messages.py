@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import Final
@@ -11,7 +10,7 @@ from roadeval import kernels
 from roadeval.cli import console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
-from roadeval.runtime.text import visible, visible_lines, without_secrets
+from roadeval.runtime.text import debug, visible, visible_lines, without_secrets
 
 PROGRAM: Final = "roadeval"
 LONGEST: Final = 5_000
@@ -47,11 +46,6 @@ def conditions(held: Sequence[str], unjudged: Sequence[str], otherwise: ExitCode
     if held:
         return ExitCode.CONDITION_HELD
     return ExitCode.FAILED if unjudged else otherwise
-
-
-def debug() -> bool:
-    """Return whether tracebacks are asked for, by ``ROADEVAL_DEBUG=1`` in the environment."""
-    return os.environ.get("ROADEVAL_DEBUG") == "1"
 
 
 def traceback(text: str) -> None:

@@ -267,6 +267,6 @@ class Rows:
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """Return rows one after the other, with the columns of the first."""
-    names = parts[0].columns
+    """Return rows one after the other, with the columns that all have, in the first's order."""
+    names = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
     return Rows({name: np.concatenate([part[name] for part in parts]) for name in names})

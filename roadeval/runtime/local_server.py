@@ -14,12 +14,15 @@ import hmac
 import re
 import secrets
 import sys
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Final
 from urllib.parse import urlsplit
+
+from roadeval.runtime.text import debug, defect
 
 HOST: Final = "127.0.0.1"
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{,199}")
@@ -129,7 +132,16 @@ class _Handler(BaseHTTPRequestHandler):
         elif not self._is_ours(acts=acts) or (request := self._request(acts=acts)) is None:
             self._send(_REFUSED)
         else:
-            self._send(self.server.answer(request))
+            self._send(self._answer(request))
+
+    def _answer(self, request: Request) -> Response:
+        """Return the answer, or the sentence on a defect of the program."""
+        try:
+            return self.server.answer(request)
+        except Exception as error:
+            if debug():
+                traceback.print_exc()
+            return told(HTTPStatus.INTERNAL_SERVER_ERROR, defect(error))
 
     def _is_ours(self, *, acts: bool) -> bool:
         """Return whether the request comes from a page of this server, or from the user."""

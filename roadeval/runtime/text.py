@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import json
+import os
 import re
 from typing import Final
 from unicodedata import category
@@ -22,6 +23,20 @@ _URL: Final = re.compile(
 
 UNENCODABLE: Final = "roadeval.visible"
 """An error handler for streams: letters that the encoding lacks are escaped as by `visible`."""
+
+
+def debug() -> bool:
+    """Return whether tracebacks are asked for, by ``ROADEVAL_DEBUG=1`` in the environment."""
+    return os.environ.get("ROADEVAL_DEBUG") == "1"
+
+
+def defect(error: BaseException) -> str:
+    """Return the sentence on an error that is a mistake of the program itself."""
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return (
+        f"{visible(what)} (a defect of roadeval, not of your input: run again with "
+        "ROADEVAL_DEBUG=1 to see where, and please report it)"
+    )
 
 
 def visible(text: str) -> str:

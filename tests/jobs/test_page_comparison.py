@@ -1,8 +1,12 @@
 """The frames of compared results on a page."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from roadeval.evaluation.comparison import Side, compare
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.jobs.results.compare import Compared, browsed
+from roadeval.jobs.results.compare import Compared, browsed, over_drive
 from tests.evaluation.making import a_part
 
 
@@ -37,3 +41,18 @@ def test_a_variant_with_few_masks_takes_no_frame_from_the_others():
 def test_results_without_a_variant_in_common_have_no_frames_to_show():
     blind = {("blind", "post"): [5] * 12}
     assert page_of({("net", "post"): [1] * 12, **blind}, {("other", "post"): [2], **blind}) is None
+
+
+def test_a_fleet_whose_rows_name_their_drives_stands_beside_a_drive():
+    masks = {("net", "post"): [1] * 12}
+    part = a_part(masks)
+
+    def with_drive(table):
+        rows = part.rows(table)
+        return rows.replace(drive=np.full(len(rows), "street"))
+
+    named = replace(part, rows=with_drive)
+    sides = Side("fleet", [named]), Side("drive", [part])
+    compared = Compared(compare(sides, EvaluationSettings()), (), sides, {})
+    assert browsed(compared, None, lambda _: 0).variants == ["fleet: net", "drive: net"]
+    assert len(over_drive(compared)) == 1

@@ -19,7 +19,7 @@ def echo(request):
     if request.parts == ("large",):
         return Response(bytes(1 << 26))
     if request.parts == ("defect",):
-        raise ZeroDivisionError
+        raise ZeroDivisionError("by")
     return Response(repr((request.parts, request.acts, request.folder)).encode())
 
 
@@ -119,13 +119,22 @@ def test_no_path_leads_anywhere_else(server, path):
     assert ask(server, path)[0] == 403
 
 
-@pytest.mark.parametrize(("path", "said"), [("large", ""), ("defect", "ZeroDivisionError")])
-def test_of_a_browser_that_leaves_nothing_is_said_and_of_a_defect_something(
-    server, path, said, capsys
+@pytest.mark.parametrize("debug", ["0", "1"])
+def test_a_defect_is_one_line_and_its_traceback_is_shown_where_it_is_asked_for(
+    server, debug, monkeypatch, capsys
 ):
+    monkeypatch.setenv("ROADEVAL_DEBUG", debug)
+    status, _, text = ask(server, "defect")
+    assert (status, text.count("\n")) == (500, 1)
+    assert text.startswith("ZeroDivisionError: by (a defect of roadeval")
+    err = capsys.readouterr().err
+    assert ("in echo" in err) if debug == "1" else not err
+
+
+def test_of_a_browser_that_leaves_nothing_is_said(server, capsys):
     before = threading.active_count()
     address = urlsplit(server.address)
-    asked = f"GET {address.path}{path} HTTP/1.1\r\nHost: {address.netloc}\r\n\r\n"
+    asked = f"GET {address.path}large HTTP/1.1\r\nHost: {address.netloc}\r\n\r\n"
     with socket.create_connection((address.hostname, address.port)) as connection:
         connection.sendall(asked.encode())
         connection.recv(1)
@@ -133,8 +142,7 @@ def test_of_a_browser_that_leaves_nothing_is_said_and_of_a_defect_something(
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     while threading.active_count() > before:
         time.sleep(0.01)
-    err = capsys.readouterr().err
-    assert said in err if said else not err
+    assert not capsys.readouterr().err
     assert ask(server, "0/")[0] == 200
 
 
