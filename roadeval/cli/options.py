@@ -14,7 +14,7 @@ import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
 
@@ -136,10 +136,11 @@ def _options() -> Iterator[Option]:
             hint = hints[field.name]
             flag = next((each for each in get_args(hint)[1:] if isinstance(each, Flag)), None)
             if flag is not None:
-                kind, read = _kind(hint)
+                flags = tuple(flag.names.split())
+                kind, read = _kind(hint, f"{flags[-1]} {flag.metavar.partition('=')[0]}")
                 yield Option(
                     f"{table}.{field.name}".removeprefix("."),
-                    tuple(flag.names.split()),
+                    flags,
                     flag.metavar or None,
                     _help(texts[field.name], kind, field.default),
                     kind,
@@ -159,8 +160,11 @@ def _help(meaning: str, kind: Any, default: Any) -> str:
     return " ".join(shown)
 
 
-def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
-    """Return what is typed for a value of a type, and how its words are read."""
+def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:
+    """Return what is typed for a value of a type, and how its words are read.
+
+    ``names`` is the flag and the placeholder of its value's name, as ``--net NAME``.
+    """
     kind = _bare(hint)
     match get_origin(kind):
         case None:
@@ -171,7 +175,7 @@ def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
             readers: Mapping[type, Callable[[str], Any]] = {str: str, int: value_or_name}
             return list[str], readers.get(_bare(get_args(kind)[0]), color)
         case _:
-            return list[str], named if get_args(kind)[1] is str else _maybe_named
+            return list[str], partial(named if get_args(kind)[1] is str else _maybe_named, names)
 
 
 def _bare(hint: Any) -> Any:
@@ -196,16 +200,20 @@ def color(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in parts)
 
 
-def named(text: str) -> tuple[str, str]:
-    """Read ``NAME=VALUE``."""
-    name, _, value = text.partition("=")
-    if not name or not value:
-        raise typer.BadParameter(f"{text!r} is not NAME=...")
-    return name, value
+def named(names: str, text: str) -> tuple[str, str]:
+    """Read ``NAME=VALUE``; ``names`` is that of `_kind`."""
+    *name, value = text.split("=", 1)
+    if not value:
+        raise typer.BadParameter(f"{text!r} has nothing after '='")
+    if not any(name):
+        flag = names.partition(" ")[0]
+        raise typer.BadParameter(f"{text!r}: write {names}={value}, as {flag} mine={value}")
+    return name[0], value
 
 
-def _maybe_named(text: str) -> tuple[str, str | None]:
-    return named(text) if "=" in text else (text, None)
+def _maybe_named(names: str, text: str) -> tuple[str, str | None]:
+    is_path = "=" in text or Path(text).suffix or Path(text).name != text
+    return named(names, text) if is_path else (text, None)
 
 
 OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option.group)))

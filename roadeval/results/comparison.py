@@ -136,8 +136,8 @@ def changed_drives(comparison: Comparison) -> list[str]:
         changed = [row for row in own if row.changed]
         worse = sum(row.difference.mean > 0 for row in changed)
         lines.append(
-            f"{_whose(*mask)}: {TESTED} changed on {len(changed)} of {tested} drives (worse on "
-            f"{worse}, better on {len(changed) - worse}; false discovery rate "
+            f"{_whose(*mask)}: {TESTED} surely changed on {len(changed)} of {tested} drives "
+            f"(worse on {worse}, better on {len(changed) - worse}; false discovery rate "
             f"{percent(FALSE, 0)} %)"
         )
     return lines

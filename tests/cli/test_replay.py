@@ -217,6 +217,21 @@ def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--masks masks/", "'masks/': write --masks NAME=masks/, as --masks mine=masks/"),
+        ("--masks =masks/", "'=masks/': write --masks NAME=masks/, as --masks mine=masks/"),
+        ("--net n.onnx", "'n.onnx': write --net NAME=n.onnx, as --net mine=n.onnx"),
+        ("--variant a.toml", "'a.toml': write --variant NAME=a.toml, as --variant mine=a.toml"),
+        ("--mask-topic mine=", "'mine=' has nothing after '='"),
+    ],
+)
+def test_a_path_without_a_name_is_shown_with_one(words, said, capsys):
+    assert main(["replay", "d.mcap", *words.split()]) == 2
+    assert capsys.readouterr().err == (f"roadeval: error: {said}; see 'roadeval replay --help'\n")
+
+
 def test_every_preset_is_named_in_the_help():
     (preset,) = (option for option in OPTIONS if option.setting == "preset")
     assert (preset.metavar or "").split("|") == [*PRESETS]

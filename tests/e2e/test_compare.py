@@ -193,7 +193,7 @@ def test_a_worse_fleet_ends_with_4_and_the_sentence_that_says_why(fleets):
     assert run.returncode == 4
     assert "new against base: 8 drives in common" in run.stdout
     told = " ".join(run.stdout.split())
-    assert "filtered of new: ERR changed on 3 of 8 drives (worse on 3, better on 0" in told
+    assert "filtered of new: ERR surely changed on 3 of 8 drives (worse on 3, better on 0" in told
     assert "drive_0003" in run.stdout
     assert max(map(len, run.stdout.splitlines())) <= 80
     assert "post.filtered.ERR of new changed by" in run.stderr

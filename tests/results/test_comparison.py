@@ -71,8 +71,8 @@ def test_drives_that_changed_are_counted_by_direction():
 
     rows = (a_drive(0.02, 0.01), a_drive(-0.02, 0.02), a_drive(0.01, 0.3), a_drive(0.01, None))
     assert where(a_comparison(a_change(WORSE), drives=rows)) == [
-        "filtered of new: ERR changed on 2 of 3 drives (worse on 1, better on 1; false discovery "
-        "rate 5 %)"
+        "filtered of new: ERR surely changed on 2 of 3 drives (worse on 1, better on 1; false "
+        "discovery rate 5 %)"
     ]
 
 
