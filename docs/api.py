@@ -64,7 +64,8 @@ def main(folder: str = "build/api") -> None:
     warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)
     footer = f"roadeval {roadeval.__version__}"
     pdoc.render.configure(docformat="numpy", show_source=False, footer_text=footer)
-    pdoc.pdoc("roadeval", output_directory=Path(folder))
+    # By its place: a bare name is ambiguous where the working folder has a `roadeval`, too.
+    pdoc.pdoc(Path(roadeval.__file__).parent, output_directory=Path(folder))
 
 
 if __name__ == "__main__":

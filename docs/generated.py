@@ -1,4 +1,8 @@
-"""What the site takes from the code and from other files of the project, as Markdown."""
+"""What the pages take from the code: ``python docs/generated.py`` writes it between their marks.
+
+A mark is ``<!-- generated exit_codes: ... -->``; what it names ends at ``<!-- end -->``. The site
+also takes pages from other files of the project, and adds the links that only it can have.
+"""
 
 from __future__ import annotations
 
@@ -33,16 +37,30 @@ PAGES: Final = {path: DOCS / f"{name}.md" for name, path in COPIES.items()}
 LINK: Final = re.compile(r"(!?)\[([^\]]+)\]\((?!https?:|#)([^)#\s]+)(#[^)\s]*)?\)")
 COMMENT: Final = re.compile(r"(^# (?!\w+ =).*\n)+", re.MULTILINE)
 """The meaning of a setting; a setting without a value is none."""
-MARK: Final = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
+END: Final = "<!-- end -->"
+BLOCK: Final = re.compile(rf"^<!-- generated (\w+):[^\n]*-->\n.*?^{END}$", re.DOTALL | re.MULTILINE)
+PUBLIC: Final = re.compile(r"^\| `(\w+)` \|", re.MULTILINE)
+"""A name in the table of `python`."""
+
+
+def written(text: str) -> str:
+    """Return a page's text with everything between marks made anew."""
+    return BLOCK.sub(lambda block: _between_marks(block[1]), text)
+
+
+def _between_marks(name: str) -> str:
+    made = GENERATED[name]().strip()
+    return f"<!-- generated {name}: python docs/generated.py -->\n\n{made}\n\n{END}"
 
 
 def page(name: str, text: str) -> str:
     """Return a page's text as the site shows it."""
     path = COPIES.get(name, DOCS / f"{name}.md")
     text = path.read_text(encoding="utf-8") if name in COPIES else text
-    made = MARK.sub(lambda mark: GENERATED[mark[1]](), text)
     here = (DOCS / name).parent
-    return LINK.sub(lambda link: _linked(link, path.parent, here), made)
+    if name == "reference/python":
+        text = PUBLIC.sub(r'| <a href="../api/roadeval.html#\1"><code>\1</code></a> |', text)
+    return LINK.sub(lambda link: _linked(link, path.parent, here), text)
 
 
 def _linked(link: re.Match[str], origin: Path, here: Path) -> str:
@@ -150,13 +168,13 @@ def rates() -> str:
 
 
 def python() -> str:
-    """Return the public names with the first sentence of each, linked to the API pages."""
+    """Return the public names with the first sentence of each."""
     return _table(("name", "what it is"), map(_name, roadeval.__all__))
 
 
 def _name(name: str) -> tuple[str, str]:
     first = (getdoc(getattr(roadeval, name)) or "").partition("\n\n")[0]
-    return f'<a href="../api/roadeval.html#{name}"><code>{name}</code></a>', first
+    return _code(name), first
 
 
 def _table(head: tuple[str, ...], rows: Any) -> str:
@@ -173,4 +191,9 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "rates": rates,
     "python": python,
 }
-"""What a mark ``<!-- generated: NAME -->`` stands for."""
+"""What stands between marks, by the name in the first of them."""
+
+
+if __name__ == "__main__":
+    for path in DOCS.rglob("*.md"):
+        path.write_text(written(path.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What the site takes from the code: nothing is missing, and every mark has its text."""
+"""What pages take from the code: nothing is missing, and every page says what the code says."""
 
 import re
 import runpy
@@ -15,11 +15,25 @@ from roadeval.results.schema import TABLES
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GENERATED = runpy.run_path(str(DOCS / "generated.py"))
 PAGES = {path: path.read_text() for path in DOCS.rglob("*.md")}
+MADE = {str(path.relative_to(DOCS)): text for path, text in PAGES.items() if "<!-- gen" in text}
 
 
-def test_every_mark_has_its_text_and_every_text_its_page():
-    marks = [name for text in PAGES.values() for name in GENERATED["MARK"].findall(text)]
-    assert sorted(marks) == sorted(GENERATED["GENERATED"])
+def test_every_text_from_the_code_has_its_page():
+    names = [name for text in MADE.values() for name in GENERATED["BLOCK"].findall(text)]
+    assert sorted(names) == sorted(GENERATED["GENERATED"])
+
+
+@pytest.mark.parametrize("page", MADE)
+def test_a_page_says_what_the_code_says(page):
+    text = MADE[page]
+    assert text == GENERATED["written"](text), "out of date: run python docs/generated.py"
+    old = text.replace("<!-- end -->", "left over\n<!-- end -->")
+    assert GENERATED["written"](old) == text
+
+
+def test_the_site_links_every_public_name_to_its_api_page():
+    text = GENERATED["page"]("reference/python", MADE["reference/python.md"])
+    assert re.findall(r'"../api/roadeval.html#(\w+)"', text) == [*roadeval.__all__]
 
 
 def test_every_option_and_every_setting_is_there():
@@ -45,7 +59,7 @@ def test_every_table_exit_code_and_public_name_is_there():
     assert {*re.findall(r"### (\w+)\.", tables)} == {*TABLES}
     codes = re.findall(r"^\| (\d+) \|", GENERATED["exit_codes"](), re.MULTILINE)
     assert [*map(int, codes)] == [*ExitCode]
-    names = re.findall(r"#(\w+)\"", GENERATED["python"]())
+    names = re.findall(r"^\| `(\w+)` \|", GENERATED["python"](), re.MULTILINE)
     assert names == [*roadeval.__all__]
 
 
