@@ -58,6 +58,22 @@ def test_every_frame_has_its_pictures_when_it_is_asked_for(address, demo, watche
     assert violations(seen.tab) == []
 
 
+def test_the_frames_behind_a_number_are_fetched_with_their_thumbnails(address, watched):
+    seen = watched(f"{address}0/")
+    mark = seen.tab.locator("#where-the-errors-are circle[data-frames]").last
+    mark.scroll_into_view_if_needed()
+    box = mark.bounding_box()
+    seen.tab.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    links = seen.tab.locator("dialog .behind a")
+    wait_until(seen.tab, "document.querySelectorAll('dialog .behind img').length === 12")
+    numbers = [int(text.split()[-1]) for text in links.all_inner_texts()]
+    assert numbers == [*map(int, mark.get_attribute("data-frames").split())]
+    links.last.click()
+    seen.tab.locator("dialog").wait_for(state="hidden")
+    assert frame(seen.tab) == numbers[-1]
+    assert seen.complaints == []
+
+
 def test_without_a_script_a_frame_is_a_page_of_its_own(address, watched):
     tab = watched(f"{address}0/", java_script_enabled=False).tab
     tab.locator(".frames tr.pictured a").first.click()

@@ -111,7 +111,8 @@ class MapView {
     const [outcome, variant] = [this.title.slice(0, 2).toLowerCase(), this.title.slice(6)];
     const [x, y] = this.pointed;
     const cell = Math.floor(((y + 0.5) / this.rows) * 30) * 40 + Math.floor(((x + 0.5) / this.columns) * 40);
-    showFrames(`${this.title} here, of the frames with pictures`, variant, browser?.wrongAt(`${variant}: errors`, outcome, cell) ?? []);
+    const known = browser?.live ? "opened so far" : "with pictures";
+    showFrames(`${this.title} here, of the frames ${known}`, variant, browser?.wrongAt(`${variant}: errors`, outcome, cell) ?? []);
   }
 
   key(event) {
