@@ -145,7 +145,7 @@ def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, t
     for said in (
         "Nothing to compare: ERR is undefined on every frame.",
         "filtered: undefined on every frame: ACC, ERR, TPR, FNR, TNR and FPR.",
-        "ERR is undefined on every frame, so the effect of the filter on it is unknown.",
+        "ERR is undefined on every frame, so what the filter does to it is unknown.",
         "ERR of filtered is undefined on every frame, so no frame is the worst.",
     ):
         assert said in words

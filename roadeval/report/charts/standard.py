@@ -233,10 +233,7 @@ def regions(
             names=[*titles.values()],
             share=column("pixels", variants[0]) if name == "errors" else (),
         )
-        for name, title in (
-            ("ERR", "ERR within the region"),
-            ("errors", "Share of the wrong pixels"),
-        )
+        for name, title in _OF_REGIONS.items()
     ]
 
 

@@ -13,8 +13,6 @@ from roadeval.report.chart import looks
 from roadeval.report.findings import Findings
 from roadeval.report.images import ExampleFrame, LayerImage, faded, jpeg, variants_of
 
-SIDE_BY_SIDE: Final = 3
-"""More variants than this do not fit beside each other under several rates."""
 ROAD: Final = mask_spec("road", "road")
 
 

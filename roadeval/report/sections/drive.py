@@ -90,23 +90,17 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         yield _differences(findings)
         yield Text(_method(findings.paired), "note")
     for pair in findings.paired:
-        if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
-            yield from _frame_by_frame(findings, pair)
+        if (pair.treated, pair.control) != (FILTERED, UNFILTERED):
+            continue
+        if not defined((change := pair.differences["ERR"]).mean):
+            yield Text("ERR is undefined on every frame, so what the filter does to it is unknown.")
+            continue
+        if pair.pixels is not None:
+            yield Text(pixels_changed(findings, pair))
+        columns = pair.frames["frame"], pair.frames["ERR"]
+        drawn = difference(*columns, pair.treated, pair.control, change)
+        yield Figure([drawn], f"ERR of {pair.treated} minus {pair.control}, frame by frame.")
     yield from _flicker(findings)
-
-
-def _frame_by_frame(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
-    change = pair.differences["ERR"]
-    if not defined(change.mean):
-        yield Text("ERR is undefined on every frame, so the effect of the filter on it is unknown.")
-        return
-    if pair.pixels is not None:
-        yield Text(pixels_changed(findings, pair))
-    columns = pair.frames["frame"], pair.frames["ERR"]
-    yield Figure(
-        [difference(*columns, pair.treated, pair.control, change)],
-        f"ERR of {pair.treated} minus {pair.control}, frame by frame.",
-    )
 
 
 def _differences(findings: Findings) -> Table:

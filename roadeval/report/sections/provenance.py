@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from roadeval.data.words import number
-from roadeval.report.blocks import Block, Command, Details, Heading, Table, Text, TwoColumns
+from roadeval.report.blocks import Block, Command, Details, Heading, Table, Text
 from roadeval.report.findings import Findings, FleetFindings
 from roadeval.results.facts import Facts
 
@@ -37,7 +37,12 @@ def section(findings: Findings) -> Iterator[Block]:
     known = {n: value for n, value in findings.properties.items() if n != "input" and value != ""}
     if known:
         about.append(Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note"))
-    about += _versions_and_seconds(facts)
+    if facts.versions:
+        about.append(_words(["package", "version"], [*facts.versions.items()]))
+    if facts.seconds:
+        masks = ((v, stage, s) for v, own in facts.seconds.items() for stage, s in own.items())
+        seconds = [[variant, stage, f"{1e3 * value:.2f}"] for variant, stage, value in masks]
+        about.append(_words(["variant", "stage", "ms a frame"], seconds))
     if facts.settings:
         first = {"preset": facts.run["preset"]} if "preset" in facts.run else {}
         shared = {name: facts.run[name] for name in TABLES if name in facts.run}
@@ -93,28 +98,9 @@ def _methods(facts: Facts) -> Iterator[Block]:
             yield Details(f"{variant}: {stage}", [_words(["what", "value"], rows)])
 
 
-def _settings(rows: list[list[str]]) -> Block:
-    """Return settings in two columns; without those that are unset."""
-    rows = [row for row in rows if row[1] != "none"]
-    half = -(-len(rows) // 2)
-    left, *right = [
-        _words(["setting", "value"], part) for part in (rows[:half], rows[half:]) if part
-    ]
-    return TwoColumns([left], right)
-
-
-def _versions_and_seconds(facts: Facts) -> Iterator[Block]:
-    versions = [[name, value] for name, value in facts.versions.items()]
-    seconds = [
-        [variant, stage, f"{1e3 * value:.2f}"]
-        for variant, stages in facts.seconds.items()
-        for stage, value in stages.items()
-    ]
-    if versions or seconds:
-        yield TwoColumns(
-            [_words(["package", "version"], versions)] if versions else [],
-            [_words(["variant", "stage", "ms a frame"], seconds)] if seconds else [],
-        )
+def _settings(rows: Sequence[Sequence[str]]) -> Table:
+    """Tabulate settings, without those that are unset."""
+    return _words(["setting", "value"], [row for row in rows if row[1] != "none"])
 
 
 def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
