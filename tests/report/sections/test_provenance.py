@@ -34,7 +34,7 @@ def test_a_list_of_tables_is_told_setting_by_setting():
 def test_the_log_and_the_command_that_makes_the_results_again_are_given():
     blocks = list(section(some_findings(log=LogFacts("street.mcap", "abc"))))
     texts = [block.text for block in blocks if isinstance(block, Text)]
-    assert texts[:2] == ["Log: street.mcap", "SHA-256: abc"]
+    assert texts[:2] == ["Log: street.mcap", "Digest of its index and checksums: abc"]
     assert the(Command, blocks).text == "repeat street.mcap"
 
 
