@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import inspect
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -38,6 +39,8 @@ STAGES: Final[Mapping[str, Stage]] = by_name(
 """The stages of this package, found by their folder."""
 
 
+PACKAGE: Final = Path(__file__).parents[1]
+"""The folder of roadeval itself."""
 TAKEN: Final = ("image", "moment", "settings")
 """The names of the arguments that a function may have."""
 FULL: Final = 65535
@@ -230,7 +233,15 @@ def _named(stage: Stage, what: str) -> Iterator[None]:
         raise
     except Exception as error:  # whatever somebody's code raises
         said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
-        raise StageError(f"stage {stage.name} {what}: {said}") from error
+        raise StageError(f"stage {stage.name} {what}: {said}{_place(error)}") from error
+
+
+def _place(error: Exception) -> str:
+    """Return where in somebody's file an error arose, as `` (mine.py:12)``; else nothing."""
+    frames = traceback.extract_tb(error.__traceback__)
+    others = [each for each in frames if PACKAGE not in Path(each.filename).parents]
+    own = [each for each in others if each.filename == others[0].filename]
+    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
 
 
 def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:

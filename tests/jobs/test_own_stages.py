@@ -22,6 +22,13 @@ def somebodys(name):
     return {"chain": [f"tests.pipeline.somebody:{name}", "post"]}
 
 
+def line_of(text):
+    """The line of the one place in the methods' file that has a text."""
+    lines = Path(somebody.__file__).read_text().splitlines()
+    (found,) = (number for number, line in enumerate(lines, 1) if text in line)
+    return found
+
+
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
     return write_log(tmp_path_factory.mktemp("log") / "drive.mcap")
@@ -41,7 +48,10 @@ def test_it_stands_in_tables_and_recording(drive, tmp_path):
 
 def test_a_frame_on_which_it_fails_is_lost_and_the_rest_is_scored(drive, tmp_path):
     outcome = run(drive, tmp_path, variants={"mine": somebodys("fails_on_13")})
-    assert outcome.losses == ("frame 13: stage fails_on_13 failed: ZeroDivisionError: no road",)
+    assert outcome.losses == (
+        "frame 13: variant mine: stage fails_on_13 failed: ZeroDivisionError: no road "
+        f"(somebody.py:{line_of('ZeroDivisionError')})",
+    )
     frames = outcome.summary["frames"]
     assert frames["evaluated"] == 14
     assert frames["skipped"]["failed in a stage"] == 1
@@ -50,11 +60,36 @@ def test_a_frame_on_which_it_fails_is_lost_and_the_rest_is_scored(drive, tmp_pat
     assert "somebody.py" in outcome.tracebacks[0]
 
 
-def test_where_it_fails_on_every_frame_nothing_is_scored(drive, tmp_path):
-    outcome = run(drive, tmp_path, variants={"mine": somebodys("always_fails")})
-    assert outcome.summary["frames"]["evaluated"] == 0
-    assert len(outcome.losses) == 26
+def test_frames_that_fail_in_the_same_way_are_one_sentence(drive, tmp_path):
+    outcome = run(drive, tmp_path, variants={"mine": somebodys("fails_early")})
+    assert outcome.losses == (
+        "12 frames (0, 1, 2, 3, 4 and 7 more): variant mine: stage fails_early failed: IndexError: "
+        f"list index out of range (somebody.py:{line_of('[moment.number]')})",
+    )
+    assert outcome.summary["frames"]["skipped"]["failed in a stage"] == 12
     assert len(outcome.tracebacks) == 1
+
+
+def test_frames_that_fail_alike_but_for_a_number_are_one_sentence_too(drive, tmp_path):
+    outcome = run(drive, tmp_path, variants={"mine": somebodys("fails_by_number")})
+    assert [loss.partition(":")[0] for loss in outcome.losses] == ["5 frames (0, 1, 2, 3, 4)"]
+
+
+def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
+    variants = {"mine": somebodys("always_fails"), "fine": somebodys("lower_half")}
+    with pytest.raises(roadeval.RoadevalError) as caught:
+        run(drive, tmp_path, variants=variants)
+    assert str(caught.value) == (
+        "variant mine: stage always_fails failed: KeyError: 'weights' "
+        f"(somebody.py:{line_of('KeyError')}), on each of the first 10 frames (10 to 19): mend it, "
+        "or leave the variant out with `only` filtered `only` unfiltered `only` fine"
+    )
+    assert "in always_fails" in str(caught.value.__cause__)
+
+
+def test_so_it_does_where_a_short_run_has_no_other_frame(drive, tmp_path):
+    with pytest.raises(roadeval.RoadevalError, match="on each of the first 4 frames"):
+        run(drive, tmp_path, variants={"mine": somebodys("always_fails")}, max_frames=14)
 
 
 def test_one_that_cannot_learn_is_named(drive, tmp_path):
@@ -108,7 +143,7 @@ def test_its_traceback_is_shown_where_it_is_asked_for(debug, drive, tmp_path, mo
     words = ("--variant", f"mine={tmp_path / 'mine.toml'}", "--reports", tmp_path / "reports")
     assert main(["replay", str(drive), "-q", "--record", "none", *map(str, words)]) == 3
     said = capsys.readouterr().err
-    assert "roadeval: lost: frame 13: stage fails_on_13 failed" in said
+    assert "roadeval: lost: frame 13: variant mine: stage fails_on_13 failed" in said
     assert ("Traceback" in said) == (debug == "1")
 
 

@@ -6,8 +6,9 @@ import hashlib
 import json
 import os
 import platform
+import re
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
@@ -17,6 +18,7 @@ from typing import Any, Final, Protocol
 from roadeval import logs
 from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig, Variant
 from roadeval.data import FrameResult, Role, VariantLayout
+from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import BlindPrior, Scoreboard
@@ -37,27 +39,62 @@ from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
 
 KEPT: Final = 5
-"""Tracebacks that are kept: those of the first errors that say different things."""
+"""Tracebacks that are kept, those of the first errors that say different things; and the frames
+that are named of those with one error."""
+HOPELESS: Final = 10
+"""A run ends where so many frames beside the training are the first ones, and each fails."""
+TRIED: Final = (Role.EVALUATED, Role.UNLABELLED)
+"""What such frames are."""
+_NUMBER: Final = re.compile(r"(?<![:\d])\d+")
+"""A number that is not the line of a file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A frame on which a stage failed. The error itself would hold the frame's images."""
+
+    frame: int
+    role: Role
+    variant: str
+    reason: str
+    """The stage, and why it failed."""
+    traceback: str
+
+    @property
+    def error(self) -> str:
+        """The same for all frames on which the variant fails in the same way."""
+        return _NUMBER.sub("", f"{self.variant}: {self.reason}")
 
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """The frames on which a stage has failed so far; any thread may add to them."""
+    """The frames on which a stage has failed so far, in their order."""
 
-    reasons: dict[int, str] = field(default_factory=dict)
-    """By the frame's number: which stage failed, and why."""
-    tracebacks: dict[str, str] = field(default_factory=dict)
-    """By such a reason."""
+    by_error: dict[str, list[Failure]] = field(default_factory=dict)
 
-    def add(self, number: int, error: StageError) -> None:
-        """Note that a stage failed on a frame. The error itself would hold the frame's images."""
-        self.reasons[number] = str(error)
-        if len(self.tracebacks) < KEPT and str(error) not in self.tracebacks:
-            self.tracebacks[str(error)] = "".join(traceback.format_exception(error))
+    def __len__(self) -> int:
+        return sum(map(len, self.by_error.values()))
+
+    def add(self, failure: Failure) -> None:
+        """Note a frame; its traceback is kept where it is among the first that differ."""
+        own = self.by_error.setdefault(failure.error, [])
+        kept = not own and len(self.by_error) <= KEPT
+        own.append(failure if kept else replace(failure, traceback=""))
+
+    def tracebacks(self) -> tuple[str, ...]:
+        """Return where in their code stages failed, for the first few errors."""
+        return tuple(own[0].traceback for own in self.by_error.values() if own[0].traceback)
 
     def sentences(self) -> tuple[str, ...]:
-        """Return a sentence for each frame, in the frames' order."""
-        return tuple(f"frame {number}: {self.reasons[number]}" for number in sorted(self.reasons))
+        """Return a sentence for each error: the frames, the variant, the stage and why."""
+        return tuple(map(_sentence, self.by_error.values()))
+
+
+def _sentence(failures: Sequence[Failure]) -> str:
+    first, count = failures[0], len(failures)
+    frames = first_of([str(each.frame) for each in failures], KEPT)
+    where = f"{count} frames ({frames})" if count > 1 else f"frame {frames}"
+    return f"{where}: variant {first.variant}: {first.reason}"
 
 
 SPARSE: Final = 5
@@ -325,21 +362,42 @@ def process(run: Run, encoder: Encoder, on_progress: OnProgress) -> Iterator[Pro
     """
     total, workers = len(run.frames), run.config.run.jobs or os.cpu_count() or 1
     work = partial(_process, run, encoder)
+    failed: list[Failure] | None = []  # None once a frame beside the training did not fail
     for position, done in enumerate(ordered(work, enumerate(run.frames, 1), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
             trim()
-        if done is None:
-            run.board.lose()
-        else:
+        if isinstance(done, ProcessedFrame):
             run.board.add(done.result)
             run.beside.update(done.beside)
+            failed = None if done.result.role in TRIED else failed
             yield done
+            continue
+        run.board.lose()
+        if done is not None:
+            run.failures.add(done)
+            if failed is not None and done.role in TRIED:
+                failed.append(done)
+                if len(failed) == HOPELESS:
+                    break
+    if failed:
+        raise _hopeless(run, failed) from StageError(failed[0].traceback)
+
+
+def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:
+    """Return the error that ends a run in which the first frames failed, or all."""
+    first, last = failures[0], failures[-1]
+    others = [f"`only` {each.name}" for each in run.layouts if each.name != first.variant]
+    left_out = f", or leave the variant out with {' '.join(others)}" if others else ""
+    return StageError(
+        f"variant {first.variant}: {first.reason}, on each of the first {len(failures)} frames "
+        f"({first.frame} to {last.frame}): mend it{left_out}"
+    )
 
 
 def _process(
     run: Run, encoder: Encoder, item: tuple[int, logs.LoggedFrame]
-) -> ProcessedFrame | None:
+) -> ProcessedFrame | Failure | None:
     position, logged = item
     try:
         frame = replace(logged.decode(), camera=run.key.camera)
@@ -349,22 +407,16 @@ def _process(
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of(frame.image, frame.moment)
-    try:
-        variants = [
-            run_variant(
-                name,
-                chain,
-                view,
-                truth=known[0],
-                shadow_truth=known[1],
-                known=shared,
-                repeats={seed: chains[name] for seed, chains in run.repeats.items()},
-            )
-            for name, chain in run.chains.items()
-        ]
-    except StageError as error:
-        run.failures.add(frame.number, error)
-        return None
+    variants = []
+    for name, chain in run.chains.items():
+        repeats = {seed: chains[name] for seed, chains in run.repeats.items()}
+        truths = {"truth": known[0], "shadow_truth": known[1]}
+        try:
+            found = run_variant(name, chain, view, **truths, known=shared, repeats=repeats)
+        except StageError as error:
+            where = "".join(traceback.format_exception(error))
+            return Failure(frame.number, use.role, name, str(error), where)
+        variants.append(found)
     variants += [
         external_variant(name, mask, frame.probabilities.get(name))
         for name, mask in frame.external.items()

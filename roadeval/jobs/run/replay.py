@@ -148,7 +148,7 @@ def _written(
             "scores": list(score_rows(facts, run.board.regions())),
             "effects": list(effect_rows(facts)),
         }
-        tracebacks = tuple(run.failures.tracebacks.values())
+        tracebacks = run.failures.tracebacks()
         recorder.finish(_texts(run, facts, sums))
         sidecar.finish()
         del run  # figures take the room of its frames and models

@@ -214,7 +214,7 @@ def _accounting(run: Run) -> FrameAccount:
         "outside the range": seen.in_log - seen.in_range,
         f"not read ({'no truth, ' * labelled}stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
-        "failed in a stage": len(run.failures.reasons),
+        "failed in a stage": len(run.failures),
         "trained on": roles[Role.TRAINING],
         "copies of training frames": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],
