@@ -408,9 +408,7 @@ def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
     )
     assert (effect["units"], effect["groups"]) == (7, 1)
     assert "in 1 group " in outcome.summary["verdict"]
-    assert re.search(
-        "copy0-.* is a copy of a-.*, and 5 more are", outcome.summary["warnings"][0]
-    )
+    assert re.search("copy0-.* is a copy of a-.*, and 5 more are", outcome.summary["warnings"][0])
 
 
 def test_settings_that_hold_for_no_drive_are_told(tmp_path):

@@ -343,6 +343,8 @@ def test_behind_a_point_of_the_paper_s_figure_are_the_frames_of_its_window(drive
     box = area.bounding_box()
     tab.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.2 * box["height"])
     numbers, _ = offered(tab)
+    title = tab.locator("dialog h3").inner_text()
+    assert f"frames {numbers[0]} to {numbers[-1]}: " in title
     windows = pd.read_csv(demo.reports / "windows.csv")
     spans = set(zip(windows["first_frame"], windows["last_frame"], strict=True))
     assert (numbers[0], numbers[-1]) in spans

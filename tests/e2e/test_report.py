@@ -1,5 +1,6 @@
 """``roadeval report``: one PDF that says what the tables say, from the recording alone."""
 
+import io
 import json
 import re
 import shutil
@@ -33,6 +34,15 @@ def made(demo, tmp_path_factory):
 @pytest.fixture(scope="module")
 def words(made):
     return text(made)
+
+
+def test_a_drive_has_eight_pages_at_most_and_no_frame_twice(made):
+    pages = [page.extract_text() for page in PdfReader(io.BytesIO(made)).pages]
+    assert len(pages) <= 8
+    frames = re.findall(r"^Frame (\d+)$", "\n".join(pages), re.MULTILINE)
+    assert len(set(frames)) == len(frames) > 2
+    (figure,) = (page for page in pages if "The paper's figure 2: input" in page)
+    assert figure.count("truth") >= 4
 
 
 def test_the_log_is_named_by_its_hash_with_the_command_that_makes_the_results_again(words, demo):

@@ -187,7 +187,9 @@ class ChartView {
     known.sort((a, b) => Math.abs(a.each.y[a.place] - height) - Math.abs(b.each.y[b.place] - height));
     if (!known.length) return false;
     const { each, place } = known[0];
-    return showFrames(`${each.name}, ${this.where()}: ${withEnds(each.y[place], null, null, this.values.unit)}`, each.name, each.frames[place]);
+    const [first, last] = [each.frames[place][0], each.frames[place].at(-1)];
+    const where = this.values.frames ? `frames ${first} to ${last}` : this.where();
+    return showFrames(`${each.name}, ${where}: ${withEnds(each.y[place], null, null, this.values.unit)}`, each.name, each.frames[place]);
   }
 
   series() {
