@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import roadeval
+from roadeval import RunConfig
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(roadeval.__file__).parent
@@ -19,6 +20,8 @@ QUOTED = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")
 """A path in backticks: it has a slash."""
 NAMED = re.compile(r"`([\w/]+\.py)`, `(\w+)`")
 """A file, and a name that it defines."""
+COMPUTED = re.compile(r"\]\(([\w./]+\.py)\)((?:,? `\w+`)+)")
+"""A link to a file, and names that it defines."""
 MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 """The head of a file that CONTRIBUTING.md adds."""
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
@@ -58,6 +61,22 @@ def test_every_name_is_defined_in_the_file_it_follows():
     for path, name in named:
         defined = rf"^(def|class) {name}\b|^{name}\b.*="
         assert re.search(defined, (PACKAGE / path).read_text(), re.MULTILINE), f"{path}: {name}"
+
+
+def test_every_function_of_the_method_is_defined_in_the_file_it_follows():
+    page = ROOT / "docs" / "explanation" / "paper.md"
+    named = COMPUTED.findall(page.read_text())
+    assert len(named) > 10
+    for path, names in named:
+        text = (PACKAGE / re.sub(r"^(\.\./)*roadeval/", "", path)).read_text()
+        for name in re.findall(r"\w+", names):
+            assert re.search(rf"^(def {name}\(|{name}\b.*=)", text, re.MULTILINE), f"{path}: {name}"
+
+
+def test_the_steps_of_the_method_name_every_layer_of_the_recording():
+    text = (ROOT / "docs" / "explanation" / "paper.md").read_text()
+    layers = {spec.name for spec in RunConfig().pipelines()["filtered"].layers()}
+    assert {*re.findall(r"`/filtered/(\w+)`", text)} == layers
 
 
 def test_every_room_is_in_the_architecture():
