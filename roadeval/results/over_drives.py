@@ -143,6 +143,9 @@ def _within(row: Mapping[str, Any], settings: EvaluationSettings) -> Difference:
         confidence=settings.confidence,
         unit="frames",
         units=row["frames"],
+        worse=row["worse"],
+        better=row["better"],
+        equal=None if row["worse"] is None else row["frames"] - row["worse"] - row["better"],
         effective=row["effective_frames"],
         needed=settings.least_frames if row["low"] is None else None,
     )

@@ -248,6 +248,8 @@ def effect_rows(facts: Facts) -> Iterator[dict[str, Any]]:
                 "p": found.p,
                 "frames": found.units,
                 "effective_frames": found.effective,
+                "worse": found.worse,
+                "better": found.better,
                 "base_wrong": theirs["FP"] + theirs["FN"],
                 "base_N": theirs["N"],
                 "wrong": mine["FP"] + mine["FN"],

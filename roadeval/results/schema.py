@@ -298,6 +298,8 @@ _OF_DRIVES: Final = (
             Column("p", Kind.RATE, "p-value of no difference"),
             Column("frames", Kind.COUNT, "frames that have a difference"),
             Column("effective_frames", Kind.NUMBER, "independent frames that tell as much"),
+            Column("worse", Kind.COUNT, "frames on which it is worse than the base"),
+            Column("better", Kind.COUNT, "frames on which it is better"),
             Column("base_wrong", Kind.COUNT, "wrong pixels of the base on all its frames"),
             Column("base_N", Kind.COUNT, "labelled pixels of the base's frames"),
             Column("wrong", Kind.COUNT, "wrong pixels of the variant on all its frames"),

@@ -62,10 +62,10 @@ def degree(found: Difference, settings: EvaluationSettings) -> Degree:
     p = found.p if found.p_holm is None else found.p_holm
     if not found.units:
         return Degree.UNDEFINED
-    if found.low is None or found.high is None or p is None:
-        return Degree.FEW
     if found.is_zero:
         return Degree.SAME
+    if found.low is None or found.high is None or p is None:
+        return Degree.FEW
     if p < 1 - found.confidence:
         return Degree.SURE
     if max(-found.low, found.high) <= settings.negligible:
@@ -123,7 +123,7 @@ def sentence(
         again = {Degree.UNKNOWN: "; on others that is unclear, too", Degree.FEW: ""}
         doubt = again.get(degree(found, settings), doubt)
     verb = "raises" if found.mean > 0 else "lowers"
-    return f"{here} {what} {verb} {rate} {by}{windows}{_counted(found)}{doubt}."
+    return f"{here} {what} {verb} {rate} {by}{windows or _counted(found)}{doubt}."
 
 
 def levels(
@@ -142,7 +142,7 @@ def _doubt(found: Difference, settings: EvaluationSettings) -> str:
     """Return what a difference says of other frames or drives, as a clause."""
     like, digits = f"on {found.unit} like these", _digits(found)
     low, high = found.low or 0.0, found.high or 0.0
-    ends = f"between {plain_points(low, digits)} and {plain_points(high, digits)} pp"
+    ends = _ends(low, high, digits)
     why = ends
     if high - low > WIDE and found.effective is not None:
         alike = max(round(found.effective), 1)
@@ -154,6 +154,19 @@ def _doubt(found: Difference, settings: EvaluationSettings) -> str:
         Degree.PROBABLE: f"probably also {like}: {ends}",
         Degree.UNKNOWN: f"{like} the effect is unclear: {why}",
     }.get(degree(found, settings), found.none_because) + _family(found, settings)
+
+
+def _ends(low: float, high: float, digits: int) -> str:
+    """Return an interval in words.
+
+    >>> _ends(-0.03, 0.01, 1), _ends(-0.03, -0.01, 1)
+    ('from 3.0 pp lower to 1.0 pp higher', 'from 1.0 to 3.0 pp lower')
+    """
+    if low < 0 < high:
+        return f"from {_size(low, digits)} pp lower to {_size(high, digits)} pp higher"
+    least, most = sorted((low, high), key=abs)
+    word = "lower" if high <= 0 else "higher"
+    return f"from {_size(least, digits)} to {_size(most, digits)} pp {word}"
 
 
 def _digits(found: Difference) -> int:
@@ -176,6 +189,8 @@ def _here(found: Difference) -> str:
 def _counted(found: Difference) -> str:
     if found.worse is None:
         return ""
+    if found.unit == "frames":
+        return f" (better on {found.better} of {found.units})"
     return f" (worse on {found.worse}, better on {found.better})"
 
 
@@ -283,14 +298,22 @@ def _best(
     settings: EvaluationSettings,
 ) -> str:
     """Return how wrong the best variant is, and whether it is better than the baseline."""
-    lead = f"Best here is {best}: " if len({*rates} - {BASELINE}) > 1 else f"{best}: "
-    lead += f"{in_percent(rates[best][TESTED]):.1f} % of the pixels are wrong"
+    several, wrong = len({*rates} - {BASELINE}) > 1, f"{in_percent(rates[best][TESTED]):.1f} %"
+    if blind is not None and blind.mean > 0:
+        name = (
+            f"Nothing here beats {BLIND}: the nearest, {best},"
+            if several
+            else (f"{best} does not beat {BLIND}: it")
+        )
+        more = f"{_size(blind.mean, _digits(blind))} pp more{_counted(blind)}"
+        return f"{name} gets {wrong} of the pixels wrong, {more}; {_doubt(blind, settings)}."
+    lead = f"Best here is {best}: " if several else f"{best}: "
+    lead += f"{wrong} of the pixels are wrong"
     if blind is None:
         return f"{lead}. No frame with truth was trained on, so {BASELINE} is unknown."
     if not blind.units or blind.is_zero:
         return f"{lead}, as many as with {BLIND}."
-    word = "worse" if blind.mean > 0 else "better"
-    by = f"That is {_size(blind.mean, _digits(blind))} pp {word} than {BLIND}{_counted(blind)}"
+    by = f"That is {_size(blind.mean, _digits(blind))} pp better than {BLIND}{_counted(blind)}"
     return f"{lead}. {by}; {_doubt(blind, settings)}."
 
 
@@ -313,12 +336,16 @@ def _costs_most(totals: Mapping[str, Mapping[str, Any]]) -> str:
     )
     if math.isnan(final) or not final:
         return ""
-    costs = {before: plain, "filter": filtered - plain, last: final - filtered}
-    most = max(costs, key=lambda name: costs[name]).replace("filter", "the filter")
-    parts = (
-        f"{before} {plain:.1f}, filter {filtered - plain:+.1f}, {last} {final - filtered:+.1f} pp"
+    costs = {before: plain, "the filter": filtered - plain, last: final - filtered}
+    _, of_filter, of_last = (
+        f"{name} {'adds' if cost >= 0 else 'removes'} {abs(cost):.1f} pp"
+        for name, cost in costs.items()
     )
-    return f"Of {FILTERED}'s {final:.1f} % {most} costs most: {parts}."
+    most = max(costs, key=costs.__getitem__)
+    return (
+        f"Step by step: {before} without the filter gets {plain:.1f} % wrong, {of_filter}, "
+        f"{of_last}; {most} costs most."
+    )
 
 
 # --- Other seeds of the training -----------------------------------------------------------------

@@ -47,8 +47,8 @@ OVER = Difference(
         (
             a_difference(-3.3, -8, 1.4, p=0.15, units=91),
             Degree.PROBABLE,
-            f"{HERE} lowers ERR by 3.3 pp; probably also on frames like these: between "
-            "-8.0 and +1.4 pp.",
+            f"{HERE} lowers ERR by 3.3 pp; probably also on frames like these: from 8.0 "
+            "pp lower to 1.4 pp higher.",
         ),
         (
             a_difference(0.2, -0.4, 0.95, p=0.5, units=91),
@@ -60,7 +60,7 @@ OVER = Difference(
             UNSURE,
             Degree.UNKNOWN,
             f"{HERE} lowers ERR by 3.3 pp; on frames like these the effect is unclear: "
-            "between -20.0 and +3.4 pp.",
+            "from 20.0 pp lower to 3.4 pp higher.",
         ),
         (
             a_difference(9.2, units=1, needed=10),
@@ -101,7 +101,7 @@ def test_what_does_not_stand_after_correction_is_only_probable_and_the_family_is
     corrected = replace(HARM, p_holm=0.06, comparisons=5)
     assert degree(corrected, SETTINGS) is Degree.PROBABLE
     told = sentence(corrected, "the filter", "ERR", SETTINGS)
-    assert told.endswith("between +7.1 and +11.0 pp (corrected for 5 comparisons).")
+    assert told.endswith("from 7.1 to 11.0 pp higher (corrected for 5 comparisons).")
     alone = replace(HARM, p_holm=0.001, comparisons=1)
     assert "corrected" not in sentence(alone, "the filter", "ERR", SETTINGS)
 
@@ -177,17 +177,37 @@ CASES = {
             *against("blind", filtered=HARM, unfiltered=HARM, gated=HARM, robust=UNSURE),
         ],
         "Best here is robust: 2.0 % of the pixels are wrong. That is 3.3 pp better than blind, "
-        "which never looks at the image; on frames like these the effect is unclear: between "
-        "-20.0 and +3.4 pp. On these 91 frames the filter raises ERR of post from 6.2 to 15.4 %; "
-        "on frames like these by 7.1 to 11.0 pp.",
+        "which never looks at the image; on frames like these the effect is unclear: from "
+        "20.0 pp lower to 3.4 pp higher. On these 91 frames the filter raises ERR of post from "
+        "6.2 to 15.4 %; on frames like these by 7.1 to 11.0 pp.",
     ),
     "the filter costs most": (
         FILTER_CHAIN,
         against("unfiltered", filtered=HARM),
         "Best here is unfiltered: 6.2 % of the pixels are wrong. No frame with truth was trained "
         "on, so blind is unknown. On these 91 frames the filter raises ERR of post from 6.2 to "
-        "15.4 % (lower in 2 of 9 windows); on frames like these by 7.1 to 11.0 pp. Of filtered's "
-        "15.4 % the filter costs most: svm 8.0, filter +10.0, post -2.6 pp.",
+        "15.4 % (lower in 2 of 9 windows); on frames like these by 7.1 to 11.0 pp. Step by step: "
+        "svm without the filter gets 8.0 % wrong, the filter adds 10.0 pp, post removes 2.6 pp; "
+        "the filter costs most.",
+    ),
+    "one that does not beat blind": (
+        drive(net=0.162, blind=0.07),
+        against("blind", net=replace(HARM, worse=90, better=1, equal=0)),
+        "net does not beat blind, which never looks at the image: it gets 16.2 % of the pixels "
+        "wrong, 9.2 pp more (better on 1 of 91); on frames like these by 7.1 to 11.0 pp.",
+    ),
+    "none beats blind": (
+        drive(net=0.162, wide=0.2, blind=0.07),
+        against("blind", net=HARM, wide=HARM),
+        "Nothing here beats blind, which never looks at the image: the nearest, net, gets 16.2 % "
+        "of the pixels wrong, 9.2 pp more; on frames like these by 7.1 to 11.0 pp.",
+    ),
+    "better on every frame and unclear": (
+        drive(net=0.02, blind=0.053),
+        against("blind", net=replace(UNSURE, worse=0, better=91, equal=0)),
+        "net: 2.0 % of the pixels are wrong. That is 3.3 pp better than blind, which never looks "
+        "at the image (better on 91 of 91); on frames like these the effect is unclear: from 20.0 "
+        "pp lower to 3.4 pp higher.",
     ),
     "a reason said once": (
         drive(filtered=0.02, unfiltered=0.1, blind=0.1),
@@ -202,7 +222,7 @@ CASES = {
         against("unfiltered", filtered=replace(LOST, mean=0.08, low=-0.02, high=0.4, p=0.1)),
         "Best here is unfiltered: 2.0 % of the pixels are wrong. No frame with truth was trained "
         "on, so blind is unknown. On these 91 frames the filter raises ERR of post from 2.0 to "
-        "10.0 %; probably also on frames like these: between -2.0 and +40.0 pp.",
+        "10.0 %; probably also on frames like these: from 2.0 pp lower to 40.0 pp higher.",
     ),
     "doubts that are equal and known": (
         drive(filtered=0.02, unfiltered=0.112, blind=0.112),

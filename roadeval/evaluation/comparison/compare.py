@@ -501,8 +501,11 @@ class _Against:
     ) -> _OnDrive:
         before, after = (metrics.table(each) for each in counts)
         within = {
-            name: within_drive(after[:, place], before[:, place], self._settings)
-            for place, name in enumerate(METRICS)
+            name: within_drive(
+                *(after[:, place], before[:, place], self._settings),
+                higher_is_better=metric.higher_is_better,
+            )
+            for place, (name, metric) in enumerate(METRICS.items())
             if name in tested
         }
         base, new = map(_Sum.of, counts)

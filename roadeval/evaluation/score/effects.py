@@ -55,8 +55,11 @@ def drive_effects(masks: Sequence[FrameCounts], settings: EvaluationSettings) ->
                 if final or (of_filter and (base, stage) in by_name):
                     new, old = by_name[variant, stage].paired(by_name[base, base_stage])
                     rates = {
-                        rate: within_drive(new[:, column], old[:, column], settings)
-                        for column, rate in enumerate(METRICS)
+                        rate: within_drive(
+                            *(new[:, column], old[:, column], settings),
+                            higher_is_better=metric.higher_is_better,
+                        )
+                        for column, (rate, metric) in enumerate(METRICS.items())
                         if rate in COMPARED
                     }
                     family.append(Effect(base, base_stage, variant, stage, final, rates))

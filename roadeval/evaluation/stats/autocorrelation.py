@@ -233,7 +233,7 @@ class Difference:
     worse: int | None = None
     better: int | None = None
     equal: int | None = None
-    """Over drives: how many are worse, better and exactly the same."""
+    """How many units are worse than the base, better, and exactly the same."""
     needed: int | None = None
     """Units, or groups, that an interval needs; None where there is one."""
     p_holm: float | None = None
@@ -244,7 +244,7 @@ class Difference:
     @property
     def is_zero(self) -> bool:
         """Whether it is 0 on every unit."""
-        return self.low == self.high == 0
+        return self.low == self.high == 0 or 0 < self.units == self.equal
 
     @property
     def none_because(self) -> str:
@@ -265,7 +265,9 @@ class Difference:
         return f"{count} {noun} {verb} too few for an interval ({self.needed} are needed)"
 
 
-def within_drive(rates: Series, base: Series, settings: EvaluationSettings) -> Difference:
+def within_drive(
+    rates: Series, base: Series, settings: EvaluationSettings, *, higher_is_better: bool = False
+) -> Difference:
     """Average paired differences of a drive's frames, ``rates - base``, with an interval.
 
     Both are ``(n,)`` float64, one a frame in the drive's order; NaN where a rate is undefined,
@@ -275,18 +277,30 @@ def within_drive(rates: Series, base: Series, settings: EvaluationSettings) -> D
     known = ~np.isnan(differences)
     series, n = differences[known], int(known.sum())
     mean, confidence = float(series.mean()) if n else math.nan, settings.confidence
+    worse, better = int((series > 0).sum()), int((series < 0).sum())
+    if higher_is_better:
+        worse, better = better, worse
+    found = Difference(
+        *(mean, None, None, None, confidence, "frames", n),
+        worse=worse,
+        better=better,
+        equal=n - worse - better,
+    )
     if n < settings.least_frames:
-        needed = settings.least_frames
-        return Difference(mean, None, None, None, confidence, "frames", n, needed=needed)
+        return replace(found, needed=settings.least_frames)
     if np.ptp(series) == 0:
-        same = float(mean == 0)
-        return Difference(mean, mean, mean, same, confidence, "frames", n, float(n), 0.0)
-    found = mean_distribution(series)
-    low, high = found.interval(confidence)
+        same, sure = float(mean == 0), float(n)
+        return replace(found, low=mean, high=mean, p=same, effective=sure, standard_error=0.0)
+    means = mean_distribution(series)
+    low, high = means.interval(confidence)
     level = float(base[known].mean())
-    low, high = max(low, -level), min(high, 1 - level)
-    return Difference(
-        *(mean, low, high, found.p_value(), confidence, "frames", n, found.frames, found.scale)
+    return replace(
+        found,
+        low=max(low, -level),
+        high=min(high, 1 - level),
+        p=means.p_value(),
+        effective=means.frames,
+        standard_error=means.scale,
     )
 
 
