@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sys
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final, TextIO, cast
 
 from roadeval.errors import RoadevalError
@@ -36,6 +38,16 @@ def diagnostics() -> Console:
 def results() -> Console:
     """Return a console on stdout, for what the user asked for."""
     return _terminal(cast("IO[str]", _Trimmed(sys.stdout)))
+
+
+def show_next(out: Console, *commands: str) -> None:
+    """Print commands to type next; each names a program as it can be typed here."""
+    for command in commands:
+        name, _, rest = command.partition(" ")
+        beside = Path(sys.executable).with_name(name)
+        if shutil.which(name) is None and beside.exists():
+            name = os.path.relpath(beside) if beside.is_relative_to(Path.cwd()) else str(beside)
+        out.print(f"next       {name} {rest}", soft_wrap=True)
 
 
 def _terminal(file: IO[str] | None = None) -> Console:

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -87,6 +88,9 @@ def terminal(folder: Path) -> Iterator[None]:
     """Stand in the folder, so that every path printed is a short one, at a plain terminal."""
     plain = {"COLUMNS": "80", "LINES": "25", "TERM": "dumb"}
     gone = ("FORCE_COLOR", "NO_COLOR", "TTY_COMPATIBLE", "ROADEVAL_DEBUG")
+    # What to type next depends on whether there is a screen, and where programs lie.
+    plain |= {"DISPLAY": ":0"}
+    plain |= {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
     kept = {name: value for name, value in os.environ.items() if name not in gone}
     with chdir(folder), mock.patch.dict(os.environ, {**kept, **plain}, clear=True):
         yield

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.cli import console
 from roadeval.cli.screens import tables
 from roadeval.data.words import counted, first_of, interval, percent, points
 from roadeval.evaluation.metrics import FULL
@@ -59,6 +60,8 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         show_drives(FleetFolder(outcome.folder), list(facts.rates), out)
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
+    listed = [f"roadeval inspect {outcome.folder} --list"] if facts.rates else []
+    console.show_next(out, *listed, f"roadeval report {outcome.folder}")
 
 
 def show_rates(rates: Sequence[Mapping[str, Any]], out: Console) -> None:

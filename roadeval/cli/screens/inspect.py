@@ -58,5 +58,7 @@ def _why(frame: WorstFrame) -> str:
     (first, value), *rest = frame.parts.items()
     terms = [f"{first} {percent(value, 1)}", *(f"{name} {points(part, 1)}" for name, part in rest)]
     # The title names the variant.
-    notes = (note.removeprefix(f"{frame.variant} ") for note in frame.notes)
+    notes = [note.removeprefix(f"{frame.variant} ") for note in frame.notes]
+    if len(frame.parts) > 1:  # they say what the filter did
+        notes = [note for note in notes if not note.startswith("The filter ")]
     return " ".join([f"{ascii_of(', '.join(terms))} pp.", *(n[:1].upper() + n[1:] for n in notes)])

@@ -7,11 +7,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from roadeval.cli import console
 from roadeval.cli.screens import seeds, tables, thresholds
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import percent, points
+from roadeval.data.words import counted, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.stats import Difference
+from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Cell, Table
 from roadeval.results.facts import Facts, FrameAccount, Totals
 from roadeval.results.sentences import correction, lowest, marked_interval
@@ -45,12 +47,12 @@ def show(outcome: Outcome, out: Console) -> None:
 def accounting(facts: Facts) -> str:
     """Return the account of the frames in a line."""
     frames = facts.frames
-    counted = f"{frames.evaluated or 'none'} evaluated"
+    done = f"{frames.evaluated or 'none'} evaluated"
     if facts.windows:
-        counted += f" in {facts.windows} windows"
+        done += f" in {counted(facts.windows, 'window')}"
     skipped = (f"{number} {why}" for why, number in frames.skipped.items())
     of = "" if frames.read == frames.in_log else f" of {frames.in_log}"
-    return ", ".join([f"{frames.read}{of} frames read", *skipped, counted])
+    return ", ".join([f"{frames.read}{of} frames read", *skipped, done])
 
 
 def _show_scores(facts: Facts, out: Console) -> None:
@@ -125,10 +127,21 @@ def _show_files(outcome: Outcome, out: Console) -> None:
         count = len(outcome.files)
         out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
     if place := outcome.recording or outcome.reports:
-        first = [f"rerun {place}"] if outcome.recording else []
-        worst = [f"roadeval inspect {place} --list"] if outcome.facts.totals else []
-        for command in (*first, *worst, f"roadeval report {place}"):
-            out.print(f"next       {command}", soft_wrap=True)
+        console.show_next(out, *_next(outcome, place))
+
+
+def _next(outcome: Outcome, place: Path) -> Iterator[str]:
+    """Yield what to type next."""
+    scored, log = bool(outcome.facts.totals), outcome.facts.log
+    if outcome.recording and has_screen():
+        yield f"rerun {place}"
+    elif outcome.recording and scored:
+        yield f"roadeval inspect {place} --worst 1 --screenshot worst.png"
+    if scored:
+        yield f"roadeval inspect {place} --list"
+    elif not outcome.facts.frames.labelled and log is not None:
+        yield f"roadeval replay {log.path} --truth LABELS"
+    yield f"roadeval report {place}"
 
 
 def size(file: Path) -> str:

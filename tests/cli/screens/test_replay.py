@@ -2,6 +2,7 @@
 
 import io
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from rich.console import Console
 from roadeval.cli.screens import replay as outcome
 from roadeval.evaluation.stats import Difference
 from roadeval.jobs.run.replay import Outcome
-from roadeval.results.facts import DriveFacts, Facts, FrameAccount
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount, LogFacts
 
 RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
 
@@ -50,9 +51,9 @@ def summary(**changed):
     return Facts(**parts | changed)
 
 
-def screen(results, folder=Path("reports/drive")):
+def screen(results, folder=Path("reports/drive"), recording=None):
     out = Console(file=io.StringIO(), width=80)
-    outcome.show(Outcome(None, folder, results, (), (), (folder / "frames.csv",)), out)
+    outcome.show(Outcome(recording, folder, results, (), (), (folder / "frames.csv",)), out)
     return out.file.getvalue()
 
 
@@ -138,7 +139,27 @@ def test_a_long_path_is_never_broken():
     folder = Path("/results", "a-long-name" * 10)
     shown = screen(summary(), folder)
     assert f"results    {folder}/ (" in shown
-    assert f"next       roadeval report {folder}\n" in shown
+    assert re.search(rf"\nnext       \S*roadeval report {folder}\n", shown)
+
+
+@pytest.mark.parametrize(("display", "first"), [(":0", "rerun"), ("", "inspect")])
+def test_what_to_type_next_can_be_typed_here(display, first, monkeypatch, tmp_path):
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    recording = tmp_path / "out.rrd"
+    recording.write_bytes(b"")
+    shown = screen(summary(), recording=recording)
+    programs = [line.split()[1:] for line in shown.splitlines() if line.startswith("next ")]
+    assert all(Path(program).exists() for program, *_ in programs)
+    assert [first in " ".join(words[:2]) for words in programs] == [True, first == "inspect", False]
+
+
+def test_a_log_without_labels_is_told_how_to_get_them(tmp_path):
+    frames = FrameAccount(39, 39, labelled=0, skipped={"unlabelled": 39})
+    log = LogFacts("street.mcap", "0")
+    shown = screen(summary(frames=frames, totals={}, difference={}, windows=0, log=log), tmp_path)
+    assert re.search(r"\nnext       \S*roadeval replay street.mcap --truth LABELS\n", shown)
 
 
 @pytest.mark.parametrize(
