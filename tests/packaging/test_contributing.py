@@ -221,7 +221,9 @@ def test_the_metric_is_on_the_screen_of_replay(workshop):
     first, second = workshop.done("replay").split("\n\nvariant ")[1:]
     assert first.startswith("    stage       frames  ERR %  pooled ERR %  FPR %  FNR %   ACC %\n")
     assert second.startswith("    stage       BACC %\n")
-    assert max(map(len, workshop.done("replay").splitlines())) <= 80
+    # Commands to copy are never broken.
+    tables = workshop.done("replay").partition("\nnext ")[0]
+    assert max(map(len, tables.splitlines())) <= 80
     assert re.search(r"\nfinal masks .* BACC, pp\n", workshop.done("replay"))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Truth
+from roadeval.data.words import counted
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pictures import Picture, RawPicture
@@ -241,12 +242,19 @@ def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: boo
     return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, v) for v in wanted.values())))
 
 
+ALONE: Final = "road"
+"""The class that means road where labels have no other."""
+
+
 def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     """Return the meaning of drawn labels, whose classes have names.
 
-    A `LogError` if no class is named that means road, or one that does not occur.
+    A lone class called road needs no naming. A `LogError` if no class is named that means road, or
+    one that does not occur.
     """
     classes = origin.classes
+    if not labels.road and {*classes} - {UNLABELLED} == {ALONE}:
+        labels = LabelSettings((ALONE,), labels.ignore)
     # A class may be called 7.
     labels = LabelSettings(tuple(map(str, labels.road)), tuple(map(str, labels.ignore)))
     known = _counted(origin, [each for each in classes if each != UNLABELLED])
@@ -271,7 +279,8 @@ def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
     """Name the most usual of some classes, each with the number of labels in which it occurs."""
     every = sorted(classes, key=lambda name: -origin.occurring[name])
     more = f", and {len(every) - limit} more" if len(every) > limit else ""
-    return ", ".join(f"{name} ({origin.occurring[name]})" for name in every[:limit]) + more
+    shown = (f"{name} ({counted(origin.occurring[name], 'label')})" for name in every[:limit])
+    return ", ".join(shown) + more
 
 
 def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSettings:

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,6 +15,7 @@ from PIL import Image
 from pycocotools import mask as coco
 from skimage.draw import polygon2mask
 
+from roadeval.data import ROAD
 from roadeval.images import Limits
 from roadeval.logs import LabelPlace, LabelSettings, LogError, label_files
 from roadeval.logs.truth.beside import labels_in
@@ -146,7 +148,7 @@ def test_pixels_that_nobody_labelled_are_ignored():
 
 def test_a_class_that_does_not_occur_is_refused_with_the_list():
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
-    known = r"which has the classes car \(3\), road \(3\), ego \(1\)"
+    known = r"which has the classes car \(3 labels\), road \(3 labels\), ego \(1 label\)"
     with pytest.raises(LogError, match=rf"`labels.road` Road does not occur in labels, {known}"):
         of_classes(LabelSettings(road=("Road",)), origin, "labels")
     with pytest.raises(LogError, match=rf"`labels.ignore` sky does not occur in labels, {known}"):
@@ -158,7 +160,15 @@ def test_a_class_that_does_not_occur_is_refused_with_the_list():
 def test_the_other_classes_are_said_to_be_non_road():
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
     meaning = of_classes(LabelSettings(road=("road",)), origin, "labels")
-    assert meaning.words == "road is road; non-road is all else, car (3), ego (1)"
+    assert meaning.words == "road is road; non-road is all else, car (3 labels), ego (1 label)"
+
+
+def test_a_lone_class_called_road_needs_no_naming():
+    origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
+    lone = replace(origin, classes={"road": origin.classes["road"]})
+    meaning = of_classes(LabelSettings(), lone, "labels")
+    assert meaning.words == "road is road"
+    assert meaning.meaning[lone.classes["road"]] == ROAD
 
 
 def test_the_pictures_of_panoptic_labels_count_as_their_files(tmp_path):
