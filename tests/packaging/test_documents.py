@@ -7,6 +7,7 @@ import pytest
 
 import roadeval
 from roadeval import RunConfig
+from roadeval.evaluation.settings import DEGRADED_ERR, DEGRADED_MARGIN, FAILED_ERR, FAILED_FNR
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(roadeval.__file__).parent
@@ -22,6 +23,7 @@ NAMED = re.compile(r"`([\w/]+\.py)`, `(\w+)`")
 """A file, and a name that it defines."""
 COMPUTED = re.compile(r"\]\(([\w./]+\.py)\)((?:,? `\w+`)+)")
 """A link to a file, and names that it defines."""
+HEALTH = ("failed", "degraded")
 MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 """The head of a file that CONTRIBUTING.md adds."""
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
@@ -77,6 +79,15 @@ def test_the_steps_of_the_method_name_every_layer_of_the_recording():
     text = (ROOT / "docs" / "explanation" / "paper.md").read_text()
     layers = {spec.name for spec in RunConfig().pipelines()["filtered"].layers()}
     assert {*re.findall(r"`/filtered/(\w+)`", text)} == layers
+
+
+def test_failed_and_degraded_are_explained_by_their_thresholds():
+    text = (ROOT / "docs" / "reference" / "results.md").read_text()
+    failed, degraded = (re.search(rf"^\| {word} \|.*", text, re.MULTILINE)[0] for word in HEALTH)
+    assert re.findall(r"(\d+) ", failed) == [f"{100 * x:.0f}" for x in (FAILED_ERR, FAILED_FNR)]
+    assert re.findall(r"(\d+) ", degraded) == [
+        f"{100 * x:.0f}" for x in (DEGRADED_ERR, DEGRADED_MARGIN)
+    ]
 
 
 def test_every_room_is_in_the_architecture():
