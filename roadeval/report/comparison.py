@@ -37,6 +37,7 @@ from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import MEAN, ForestRow
 from roadeval.report.sections.drives import Part, strata_table
 from roadeval.results import comparison as told
+from roadeval.results.over_drives import DriveJudgement
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
@@ -111,18 +112,40 @@ def document(
 def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
     blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
-    return f"# roadeval comparison\n\n{written(blocks)}"
+    return f"# {_title(judgements)}\n\n{written(blocks)}"
 
 
 def comment(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return the verdict, the table and the changed drives as Markdown of one comment at most."""
     blocks = [*overview(comparison, judgements), *changed_drives(comparison)]
-    text = f"## roadeval comparison\n\n{written([*blocks, *_warnings(comparison)])}"
+    text = f"## {_title(judgements)}\n\n{written([*blocks, *_warnings(comparison)])}"
     if len(text) <= LONGEST:
         return text
     begin = text[: LONGEST - len(_CUT)]
     whole = begin.rfind("\n") + 1  # lines; a single long one is cut within
     return (begin[:whole] if 2 * whole > LONGEST else begin) + _CUT
+
+
+def _title(judgements: Sequence[Judgement | DriveJudgement]) -> str:
+    if not judgements:
+        return "roadeval comparison"
+    return f"roadeval: {told.headline([each.holds for each in judgements])}"
+
+
+def replayed(judgements: Sequence[DriveJudgement], verdict: str) -> str:
+    """Return limits that were judged on a drive, and its verdict, as Markdown of a comment."""
+    limits = _limits([(each.holds, each.told) for each in judgements])
+    return f"## {_title(judgements)}\n\n{written([*limits, Text(verdict, 'verdict')])}"
+
+
+def _limits(judged: Sequence[tuple[bool | None, str]]) -> Iterator[Block]:
+    for title, kind, tone in (
+        ("Limits exceeded", True, "warning"),
+        ("Not judged", None, "warning"),
+        ("Limits kept", False, "plain"),
+    ):
+        if own := [sentence for holds, sentence in judged if holds is kind]:
+            yield BulletList(title, own, tone)
 
 
 def _about(result: ComparedResult) -> str:
@@ -142,7 +165,7 @@ def _warnings(comparison: Comparison) -> Iterator[Block]:
 def overview(
     comparison: Comparison, judgements: Sequence[Judgement], most: int | None = None
 ) -> Iterator[Block]:
-    """Yield what changed: settings, the verdict, limits, all rates, and where masks differ.
+    """Yield what changed: limits, the verdict, settings, all rates, and where masks differ.
 
     Parameters
     ----------
@@ -153,14 +176,9 @@ def overview(
     most
         Changed settings that are named, at most.
     """
-    yield from (Text(line) for line in told.changed_settings(comparison, most))
+    yield from _limits([(each.holds, told.judged(each)) for each in judgements])
     yield Text(told.verdict(comparison), "verdict")
-    for title, holds, tone in (
-        ("Limits exceeded", True, "warning"),
-        ("Limits kept", False, "plain"),
-    ):
-        if judged := [told.judged(each) for each in judgements if each.holds == holds]:
-            yield BulletList(title, judged, tone)
+    yield from (Text(line) for line in told.changed_settings(comparison, most))
     if comparison.paired:
         yield from _changes(comparison)
     else:

@@ -35,11 +35,13 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         "drives": drives,
         "false_discovery_rate": FALSE,
         "warnings": warnings(comparison),
-        "conditions": [
-            {**(fact := asdict(each)).pop("condition"), **fact, "sentence": judged(each)}
-            for each in judgements
-        ],
+        "conditions": [_condition(each) for each in judgements],
     }
+
+
+def _condition(judgement: Judgement) -> dict[str, Any]:
+    fact = {k: value for k, value in asdict(judgement).items() if k != "why"}
+    return {**fact.pop("condition"), **fact, "sentence": judged(judgement)}
 
 
 def changed_settings(comparison: Comparison, most: int | None = None) -> list[str]:
@@ -194,6 +196,8 @@ def _told(note: Note) -> str:
 def judged(judgement: Judgement) -> str:
     """Return what was found of a condition, and whether it holds."""
     condition, drives = judgement.condition, judgement.drives
+    if judgement.holds is None:
+        return judgement.why
     rate = f"{condition.stage}.{condition.variant}.{condition.rate} of {judgement.result}"
     holds = "holds" if judgement.holds else "does not hold"
     after, over = f"{percent(judgement.after)} %", f" over {drives} drives" if drives > 1 else ""
@@ -204,6 +208,15 @@ def judged(judgement: Judgement) -> str:
         change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
     before = f"{percent(judgement.before)} %"
     return f"{rate} changed by {change}{over} ({before} to {after}): {condition.text} {holds}"
+
+
+def headline(holds: Sequence[bool | None]) -> str:
+    """Return whether limits were kept: of each whether it was exceeded, None if not judged."""
+    if not any(each is not False for each in holds):
+        return f"passed, {len(holds)} limit{'s' * (len(holds) > 1)} kept"
+    counts = {"exceeded": holds.count(True), "not judged": holds.count(None)}
+    found = [f"{count} of {len(holds)} limits {word}" for word, count in counts.items() if count]
+    return f"failed, {listing(found)}"
 
 
 def discovery_note() -> str:
@@ -242,12 +255,15 @@ class Case:
 
 
 def comparison_cases(comparison: Comparison, judgements: Iterable[Judgement]) -> Iterator[Case]:
-    """Yield a case with what changed, and one a condition and result, which fails if it holds."""
+    """Yield a case with what changed, and one a condition and result, which fails if it holds.
+
+    One that could not be judged is an error.
+    """
     labels = ", ".join(each.label for each in comparison.results)
     lines = [*changed_settings(comparison), verdict(comparison), *where(comparison)]
     yield Case("compare", labels, {"system-out": "\n".join(lines)})
     for each in judgements:
-        kind = "failure" if each.holds else "system-out"
+        kind = {True: "failure", False: "system-out", None: "error"}[each.holds]
         yield Case(each.condition.text, each.result, {kind: judged(each)})
 
 

@@ -245,6 +245,11 @@ class DriveJudgement:
     sentence: str
     """What was found, or why it was not judged."""
 
+    @property
+    def told(self) -> str:
+        """The sentence, which names the condition."""
+        return f"{self.condition}: {self.sentence}" if self.holds is None else self.sentence
+
 
 def check_conditions(conditions: Sequence[Condition]) -> None:
     """Raise a `ConditionError` for a condition on a change: one result alone has no base."""

@@ -38,6 +38,20 @@ def test_a_replay_fails_where_a_condition_on_its_rates_holds(condition, code, sa
     assert (tmp_path / "out.rrd").exists() == ("pp" not in condition)
 
 
+def test_a_replay_with_limits_appends_them_to_the_summary_of_a_job(tmp_path, monkeypatch):
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
+    drive = make("drives/car_park.mcap", tmp_path)
+    limits = ("post.filtered.ERR > 0%", "svm.unfiltered.ERR > 99%")
+    done = replay(tmp_path, drive, *(word for each in limits for word in ("--fail-if", each)))
+    title, _, *rest = (tmp_path / "summary.md").read_text().splitlines()
+    assert title == "## roadeval: failed, 1 of 2 limits exceeded"
+    assert [line for line in rest if line.startswith("**")] == [
+        "**Limits exceeded**",
+        "**Limits kept**",
+    ]
+    assert done.summary["verdict"].split(";")[0] in rest[-1]
+
+
 def test_a_condition_with_too_few_frames_behind_it_is_not_judged(tmp_path):
     drive = make("drives/car_park.mcap", tmp_path)
     words = ("--max-frames", 15, "--fail-if", "post.filtered.ERR > 99%")

@@ -105,6 +105,31 @@ def test_ci_gets_a_case_a_condition_as_junit(demo, worse, tmp_path):
     assert limited.find("system-out").text.endswith("> 99% does not hold")
 
 
+def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(
+    demo, worse, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
+    files = ("-o", tmp_path / "c.md", "--junit", tmp_path / "c.xml", "-q")
+    words = ("--fail-if", "post.filterd.ERR > +0.5pp", "--fail-if", "post.filtered.ERR > 99%")
+    run = here("compare", demo.recording, worse.reports, *words, *files)
+    (line,) = (each for each in run.stderr.splitlines() if "warning" not in each)
+    why = line.removeprefix("roadeval: error: ")
+    assert (run.returncode, why.partition(";")[0]) == (
+        1,
+        "post.filterd.ERR > +0.5pp: nothing compared is called post.filterd",
+    )
+    suite = ElementTree.parse(tmp_path / "c.xml").getroot()
+    assert (suite.get("errors"), suite.get("failures")) == ("1", "0")
+    assert suite.find("testcase/error").get("message") == why
+    for name in ("c.md", "summary.md"):
+        title, _, heading, _, reason, *_ = (tmp_path / name).read_text().splitlines()
+        assert title.lstrip("# ") == "roadeval: failed, 1 of 2 limits not judged"
+        assert (heading, why.partition(":")[0].replace(">", "\\>") in reason) == (
+            "**Not judged**",
+            True,
+        )
+
+
 def test_the_summary_of_a_job_on_github_is_appended(fleets, tmp_path, monkeypatch):
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
     (tmp_path / "summary.md").write_text("before\n")

@@ -55,7 +55,7 @@ def over_drive():
 
 def test_a_comment_of_ten_thousand_masks_still_fits_and_says_that_it_was_cut():
     whole = comment(a_comparison(), LIMITS)
-    assert whole.startswith("## roadeval comparison\n")
+    assert whole.startswith("## roadeval: failed, 1 of 2 limits exceeded\n")
     assert "left out here" not in whole
     masks = tuple(replace(CHANGE, variant=f"variant_{number}") for number in range(10_000))
     cut = comment(making.a_comparison(*masks), LIMITS)
@@ -126,13 +126,13 @@ def test_the_variants_of_a_single_result_are_in_one_table():
     assert {row[0] for row in table.rows} == {"filtered", "wide", ""}
 
 
-def test_it_opens_with_the_changed_settings():
+def test_the_changed_settings_follow_the_verdict():
     changed = (Note(Kind.SETTINGS, "base", "new|er", settings=PRESETS),)
     comparison = a_comparison(changed_settings=changed)
-    first, second = (note.text for note in blocks(Text, comparison)[:2])
+    second, first = (note.text for note in blocks(Text, comparison)[:2])
     assert first == "Changed settings: preset paper to gated."
     assert second.startswith("On these 12 frames new|er instead of base raises ERR of post")
-    assert markdown(comparison, ()).splitlines()[2].startswith("Changed settings:")
+    assert markdown(comparison, ()).splitlines()[4].startswith("Changed settings:")
 
 
 def test_different_drives_are_laid_side_by_side():

@@ -5,7 +5,15 @@ from dataclasses import replace
 import pytest
 
 from roadeval.evaluation.comparison import Condition, DriveChange, Kind, Note
-from roadeval.results.comparison import as_dict, changed_settings, judged, verdict, warnings, where
+from roadeval.results.comparison import (
+    as_dict,
+    changed_settings,
+    headline,
+    judged,
+    verdict,
+    warnings,
+    where,
+)
 from roadeval.results.sentences import sentence
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
@@ -62,6 +70,19 @@ def test_changed_settings_are_told_of_each_result_and_some_of_many():
     assert changed_settings(several, 1) == [
         "Changed settings in new: preset paper to gated; and 2 more."
     ]
+
+
+@pytest.mark.parametrize(
+    ("holds", "said"),
+    [
+        ([False], "passed, 1 limit kept"),
+        ([False, False], "passed, 2 limits kept"),
+        ([True], "failed, 1 of 1 limits exceeded"),
+        ([True, None, False], "failed, 1 of 3 limits exceeded and 1 of 3 limits not judged"),
+    ],
+)
+def test_the_headline_says_whether_limits_were_kept(holds, said):
+    assert headline(holds) == said
 
 
 def test_drives_that_changed_are_counted_by_direction():

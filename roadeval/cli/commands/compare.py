@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -59,8 +58,6 @@ Junit = Annotated[
         readable=False,
     ),
 ]
-SUMMARY: Final = "GITHUB_STEP_SUMMARY"
-"""Names the file that GitHub shows on the page of a job."""
 
 
 def compare(
@@ -89,21 +86,20 @@ def compare(
 
     size = arguments.paper_of(paper)
     with holding(*(output or ()), *filter(None, [junit]), inputs=results):
-        compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
+        compared = comparing.attempt(results, variants=variant, fail_if=fail_if or [])
         for path in output or []:
             comparing.write(compared, path, paper=size, inspect=inspect_command)
         if junit:
             comparing.write_junit(compared, junit)
-    if place := os.environ.get(SUMMARY):
-        with Path(place).open("a", encoding="utf-8") as file:
-            file.write(comparing.comment(compared))
+    console.to_step_summary(lambda: comparing.comment(compared))
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:
-        screen.show(compared.comparison, compared.judgements, console.results())
+        judged = [each for each in compared.judgements if each.holds is not None]
+        screen.show(compared.comparison, judged, console.results())
     for warning in compared.warnings:
         messages.warning(warning)
-    return messages.conditions(compared.held, (), ExitCode.DONE)
+    return messages.conditions(compared.held, compared.unjudged, ExitCode.DONE)
 
 
 COMMAND: Final = compare

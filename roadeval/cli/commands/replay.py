@@ -27,7 +27,8 @@ def replay(
 
     Every intermediate goes into a recording for the Rerun viewer. Where the log has truth, each
     stage is scored against it, with the shadow filter and without. Exit code 4 if a --fail-if
-    condition holds on the drive; 1 if one cannot be judged.
+    condition holds on the drive; 1 if one cannot be judged. With --fail-if, limits and verdict are
+    appended as Markdown to the file that $GITHUB_STEP_SUMMARY names.
     """
     config = arguments.configuration(given)
     from roadeval.cli.screens import replay as screen
@@ -40,6 +41,10 @@ def replay(
         console.emit(found.facts.text().rstrip())
     elif not quiet:
         screen.show(found, console.results())
+    if found.judgements:
+        from roadeval.report.comparison import replayed
+
+        console.to_step_summary(lambda: replayed(found.judgements, found.facts.verdict))
     for text in found.tracebacks:
         messages.traceback(text)
     messages.loops_missing()

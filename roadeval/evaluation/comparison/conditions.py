@@ -154,7 +154,16 @@ class Judgement:
     low: float | None
     high: float | None
     """The interval of the change, None without one."""
-    holds: bool
+    holds: bool | None
+    """None where it could not be judged."""
+    why: str = ""
+    """The reason then."""
+
+    @classmethod
+    def without(cls, condition: Condition, result: str, error: ConditionError) -> Judgement:
+        """Return what is known of a condition that cannot be judged."""
+        none = math.nan
+        return cls(condition, result, 0, none, none, none, None, None, None, str(error))
 
 
 def judge(

@@ -16,6 +16,7 @@ from roadeval.evaluation import comparison, score
 from roadeval.evaluation.comparison import (
     Comparison,
     Condition,
+    ConditionError,
     Judgement,
     Kind,
     Note,
@@ -25,7 +26,7 @@ from roadeval.evaluation.comparison import (
 )
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import TESTED
-from roadeval.evaluation.settings import NOTEWORTHY
+from roadeval.evaluation.settings import NOTEWORTHY, EvaluationSettings
 from roadeval.jobs.results.frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Strip
@@ -80,6 +81,11 @@ class Compared:
         """The sentences of the conditions that hold."""
         return [judged(judgement) for judgement in self.judgements if judgement.holds]
 
+    @property
+    def unjudged(self) -> list[str]:
+        """Why conditions could not be judged."""
+        return [judged(judgement) for judgement in self.judgements if judgement.holds is None]
+
 
 def compare(
     results: Paths,
@@ -106,6 +112,16 @@ def compare(
         If a result cannot be read, or there is nothing to compare, or a condition not to be
         judged.
     """
+    found = attempt(results, variants=variants, fail_if=fail_if)
+    if found.unjudged:
+        raise ConditionError("; ".join(found.unjudged))
+    return found
+
+
+def attempt(
+    results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
+) -> Compared:
+    """Compare results as `compare`; a condition that cannot be judged is among the judgements."""
     conditions = [Condition.parse(text) for text in fail_if]
     paths = [Path(path) for path in listed(results)]
     across = len(paths) == 1
@@ -127,7 +143,19 @@ def compare(
     recordings = {
         side.label: each.drive for side, each in labelled if each.drive and each.drive.recording
     }
-    return Compared(found, judge(found, conditions, settings), tuple(alone or ()), recordings)
+    judgements = tuple(_judged(found, conditions, settings))
+    return Compared(found, judgements, tuple(alone or ()), recordings)
+
+
+def _judged(
+    found: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
+) -> Iterator[Judgement]:
+    for condition in conditions:
+        try:
+            yield from judge(found, [condition], settings)
+        except ConditionError as error:
+            new = ", ".join(each.label for each in found.results[1:])
+            yield Judgement.without(condition, new, error)
 
 
 # --- Sides ----------------------------------------------------------------------------------------

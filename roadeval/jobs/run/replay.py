@@ -64,7 +64,7 @@ class Outcome:
     @property
     def unjudged(self) -> list[str]:
         """The conditions that could not be judged, with the reason."""
-        return [f"{j.condition}: {j.sentence}" for j in self.judgements if j.holds is None]
+        return [each.told for each in self.judgements if each.holds is None]
 
 
 def replay(
