@@ -344,7 +344,8 @@ def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
 
 def bytes_of(made: Strip) -> int:
     """Return how many bytes of a page a strip takes: pictures as text, with words around each."""
-    return sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+    cells = (bits for row in made.rows for each in row.pictures for bits in each.wrong.values())
+    return sum(len(image.content) * 4 // 3 + 400 for image in made.images()) + sum(map(len, cells))
 
 
 def _chosen(result: DriveResult, count: int) -> list[int]:
