@@ -518,12 +518,19 @@ def evenly(numbers: Sequence[int], count: int) -> list[int]:
     return [numbers[i * len(numbers) // taken] for i in range(taken)]
 
 
-def decoded(frames: Iterable[LoggedFrame]) -> Iterator[tuple[LoggedFrame, Frame]]:
-    """Decode what can be decoded; a frame that cannot is reported when it is replayed."""
+def decoded(
+    frames: Iterable[LoggedFrame], lost: list[str] | None = None
+) -> Iterator[tuple[LoggedFrame, Frame]]:
+    """Decode what can be decoded; ``lost`` receives why others cannot.
+
+    They are reported when they are replayed.
+    """
     for readable in frames:
         try:
             frame = readable.decode()
-        except RoadevalError:
+        except RoadevalError as error:
+            if lost is not None:
+                lost.append(str(error))
             continue
         yield readable, frame
 
@@ -532,8 +539,8 @@ def _hold(
     candidates: Iterator[LoggedFrame], count: int, on_frame: Callable[[int], None]
 ) -> tuple[HeldFrames, Iterator[LoggedFrame]]:
     """Decode the first ``count`` frames, or as many as can be held; return the others too."""
-    held = HeldFrames()
-    for readable, frame in decoded(candidates):
+    held, lost = HeldFrames(), list[str]()
+    for readable, frame in decoded(candidates, lost):
         if not held.add(frame):
             if not held.frames:
                 raise TrainingError(f"{held.full()}; reduce the frames with `frames.scale`")
@@ -541,6 +548,9 @@ def _hold(
         on_frame(len(held.frames))
         if len(held.frames) == count:
             break
+    if lost and not held.frames:
+        none = f"none of the {len(lost)} frames to train on can be decoded"
+        raise TrainingError(f"{none}; the first: {lost[0]}")
     return held, candidates
 
 

@@ -359,3 +359,10 @@ def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
 def test_adapting_needs_a_model():
     with pytest.raises(ValueError, match=r"training.adapt. needs .training.model."):
         TrainingSettings(adapt=True)
+
+
+def test_where_no_image_can_be_decoded_the_first_reason_is_named():
+    frames = log(3, broken=(0, 1, 2))
+    said = "none of the 3 frames to train on can be decoded; the first: cannot be decoded"
+    with pytest.raises(TrainingError, match=said):
+        learn(frames)

@@ -79,11 +79,20 @@ def report(
 def commands_of(result: Result) -> Commands:
     """Return what to type for more about a result: of a fleet, by the rank of a worst frame."""
     from roadeval.report.findings import Commands
+    from roadeval.results.fleet import recording_path
 
     (path,) = result.paths
-    if result.drive is None:
+    if fleet := result.fleet:
+        rows = fleet.table("worst", ["rank", "drive"]).to_pylist()
+        kept = {row["rank"] for row in rows if recording_path(path, row["drive"]).exists()}
         worst = ["roadeval", "inspect", str(path), "--worst"]
-        return Commands(again=None, inspect=lambda rank: shlex.join([*worst, str(rank)]))
+
+        def inspect(rank: int) -> str:
+            replayed = [] if rank in kept else ["--trust-sources"]
+            return shlex.join([*worst, str(rank), *replayed])
+
+        return Commands(again=None, inspect=inspect)
+    assert result.drive is not None
     config, shown = result.drive.configuration, result.drive.viewable or path
     return Commands(
         again=None
