@@ -101,7 +101,21 @@ class DriveResult:
     def facts(self) -> Facts:
         """The facts; of an incomplete run, what its tables give."""
         if not self.complete:
-            return self._facts_of_part()
+            assert self.recording is not None
+            layout, settings = self.recording.layout, EvaluationSettings()
+            effects = drive_effects(list(score.mask_counts(self.rows)), settings)
+            totals = score.totals(self.rows)
+            return Facts(
+                verdict(totals, effects, settings),
+                DriveFacts(layout.drive, width=layout.width, height=layout.height),
+                FrameAccount(
+                    trained_on=int(layout.properties.get("training_frames", 0)),
+                    evaluated=len(self.rows.distinct("frame")),
+                ),
+                totals,
+                training=TrainingFacts(str(layout.properties.get("trained_on"))),
+                **as_parts(effects),
+            )
         assert self._tables.facts is not None
         return self._tables.facts
 
@@ -174,24 +188,6 @@ class DriveResult:
         frames, regions = (self._tables.rows(name)["frame"] for name in ("frames", "regions"))
         both: list[int] = np.intersect1d(frames, regions).tolist()
         return both
-
-    def _facts_of_part(self) -> Facts:
-        """Make the facts that a killed run did not get to write, of what it had scored."""
-        assert self.recording is not None
-        layout, settings = self.recording.layout, EvaluationSettings()
-        effects = drive_effects(list(score.mask_counts(self.rows)), settings)
-        totals = score.totals(self.rows)
-        return Facts(
-            verdict(totals, effects, settings),
-            DriveFacts(layout.drive, width=layout.width, height=layout.height),
-            FrameAccount(
-                trained_on=int(layout.properties.get("training_frames", 0)),
-                evaluated=len(self.rows.distinct("frame")),
-            ),
-            totals,
-            training=TrainingFacts(str(layout.properties.get("trained_on"))),
-            **as_parts(effects),
-        )
 
 
 # --- Any number of drives -------------------------------------------------------------------------

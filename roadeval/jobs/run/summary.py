@@ -77,11 +77,27 @@ def warnings(run: Run) -> tuple[str, ...]:
     """List what a user should know before believing the results."""
     missing = run.selection.no_truth
     unlabelled = f"there is no road truth to score against, only masks to look at: {missing}"
+    warned = []
+    selection, prior = run.selection, run.model.prior
+    scale = run.config.frames.scale
+    if scale != 1 and selection.image.size:
+        width, height = selection.image.size
+        warned.append(
+            f"the frames, {width}x{height} in the log, are reduced to "
+            f"{scale:g} of it: the numbers are not those of full frames"
+        )
+    if run.config.training.model is not None and prior is not None and selection.size:
+        width, height = selection.size
+        if prior.shape != (height, width):
+            warned.append(
+                f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
+                f"are {width}x{height}: texture and sizes in pixels mean something else there"
+            )
     return (
         *((unlabelled,) if missing else ()),
         *_sparse(run),
         *run.frames.oddities,
-        *_sizes(run),
+        *tuple(warned),
         *_missing(run),
         *_near_training(run),
         *_constant(run),
@@ -108,27 +124,6 @@ def _sparse(run: Run) -> Iterator[str]:
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost, and the frames on which a stage failed."""
     return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
-
-
-def _sizes(run: Run) -> tuple[str, ...]:
-    """Warn where the frames are not the camera's own, or not of the model's size."""
-    warned = []
-    selection, prior = run.selection, run.model.prior
-    scale = run.config.frames.scale
-    if scale != 1 and selection.image.size:
-        width, height = selection.image.size
-        warned.append(
-            f"the frames, {width}x{height} in the log, are reduced to "
-            f"{scale:g} of it: the numbers are not those of full frames"
-        )
-    if run.config.training.model is not None and prior is not None and selection.size:
-        width, height = selection.size
-        if prior.shape != (height, width):
-            warned.append(
-                f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
-                f"are {width}x{height}: texture and sizes in pixels mean something else there"
-            )
-    return tuple(warned)
 
 
 def _missing(run: Run) -> Iterator[str]:

@@ -118,7 +118,17 @@ class Container:
         self.redefined: dict[int, str] = {}
         """Which of two descriptions of topics is believed, by the offset of the second."""
         self._checked: set[int] = set()
-        self.logs = self._collect()
+        logs = self._file()
+        if self.summary.statistics is not None and not self._is_as_counted(logs):
+            logs = self._file(look=True)
+        if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
+            late = (each for each in self.scan.late if isinstance(each, Schema) or each.id in logs)
+            self.scan.define(*late)
+            for chunk in self.chunks:
+                if chunk.offset in self.reader.bad:
+                    self.scan.define(*definitions(self.reader.remains(chunk)))
+            logs = self._file()
+        self.logs = self._file() if self._redefine(logs) else logs
         """Where messages lie, by the number of their channel."""
         self.looked_into = frozenset(self.scan.seen)
         """Chunks whose messages were not filed by their message indexes."""
@@ -227,20 +237,6 @@ class Container:
             if missing := _unlisted(records, index):
                 self.unlisted[number] = missing
         return records
-
-    def _collect(self) -> dict[int, ChannelLog]:
-        """File all messages by channel; look into every chunk if the statistics differ."""
-        logs = self._file()
-        if self.summary.statistics is not None and not self._is_as_counted(logs):
-            logs = self._file(look=True)
-        if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
-            late = (each for each in self.scan.late if isinstance(each, Schema) or each.id in logs)
-            self.scan.define(*late)
-            for chunk in self.chunks:
-                if chunk.offset in self.reader.bad:
-                    self.scan.define(*definitions(self.reader.remains(chunk)))
-            logs = self._file()
-        return self._file() if self._redefine(logs) else logs
 
     def _is_as_counted(self, logs: Mapping[int, ChannelLog]) -> bool:
         expected = {channel_id: count for channel_id, count in self.expected.items() if count}

@@ -330,23 +330,20 @@ class Video:
             self._ready[position] = FrameError(self._broken)
             return
         try:
-            self._decode(position, packet)
+            codec = codec_of(packet)
+            if self._decoder is None:
+                if codec is None:
+                    raise BadMessage("its video codec is unknown")
+                self._decoder = self._av.CodecContext.create(_DECODERS.get(codec, codec), "r")
+                self._decoder.thread_count = 1
+                self._decoder.options = {"max_pixels": str(self._limits.max_pixels)}
+            self._waiting[position] = packet
+            unit = self._av.Packet(bytes(packet.data))
+            unit.pts = unit.dts = position
+            self._drain(unit)
         except BadMessage as error:
             self._ready[position] = FrameError(str(error))
             self._broken = "a frame that it builds upon is lost"
-
-    def _decode(self, position: int, packet: Picture) -> None:
-        codec = codec_of(packet)
-        if self._decoder is None:
-            if codec is None:
-                raise BadMessage("its video codec is unknown")
-            self._decoder = self._av.CodecContext.create(_DECODERS.get(codec, codec), "r")
-            self._decoder.thread_count = 1
-            self._decoder.options = {"max_pixels": str(self._limits.max_pixels)}
-        self._waiting[position] = packet
-        unit = self._av.Packet(bytes(packet.data))
-        unit.pts = unit.dts = position
-        self._drain(unit)
 
     def _drain(self, unit: Any) -> None:
         if self._decoder is None:
