@@ -102,13 +102,7 @@ class DriveSettings:
 
 @dataclass(frozen=True, slots=True)
 class RunConfig(LogConfig):
-    """Every option of a run.
-
-    Raises
-    ------
-    ConfigError
-        If the parts do not go together.
-    """
+    """Every option of a run; a `ConfigError` if the parts do not go together."""
 
     preset: str = "paper"
     """The preset that it started from."""
@@ -342,6 +336,8 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
 def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = True) -> RunConfig:
     """Read the configuration of a run from a TOML file.
 
+    A `ConfigError` if the file is missing, no TOML, or holds a key or a value that cannot be used.
+
     Parameters
     ----------
     path
@@ -351,11 +347,6 @@ def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = 
     trusted
         Whether the user has named the file. One that came with results, or in a recording, loads
         no code.
-
-    Raises
-    ------
-    ConfigError
-        If the file is missing, no TOML, or holds a key or a value that cannot be used.
     """
     base = {} if preset is None else {"preset": preset}
     return configure({**base, **read_tables(path, trusted=trusted)}, where=str(path))

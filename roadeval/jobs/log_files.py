@@ -57,6 +57,9 @@ def pack(
 ) -> logs.PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
+    A `RoadevalError` if there is nothing to pack, a file is unreadable, or no mask belongs to an
+    image.
+
     Parameters
     ----------
     images
@@ -67,11 +70,6 @@ def pack(
         A folder of label images, for a folder of images; paired by name.
     rate_hz
         Images a second; by default the times in the names, a video's own, or 10.
-
-    Raises
-    ------
-    RoadevalError
-        If there is nothing to pack, a file is unreadable, or no mask belongs to an image.
 
     Examples
     --------
@@ -100,12 +98,8 @@ _PLACES: Final = (_PACKAGE / "demo.mcap", _PACKAGE.parent / "recordings" / "demo
 def demo(output: AnyPath) -> Path:
     """Write the demo drive, which ships with roadeval, to a file.
 
-    100 frames of 640x480 pixels at 10 Hz of a synthetic road, with the truth of road and shadow.
-
-    Raises
-    ------
-    RoadevalError
-        If it cannot be written.
+    100 frames of 640x480 pixels at 10 Hz of a synthetic road, with the truth of road and shadow. A
+    `RoadevalError` if it cannot be written.
 
     Examples
     --------

@@ -35,12 +35,8 @@ class Recording:
     """A recording on disk, the ``.rrd`` file that a replay wrote.
 
     A partial one, of a run that was interrupted or killed, is read as far as it goes: then
-    ``complete`` is False, and ``summary`` and ``windows`` may be empty.
-
-    Raises
-    ------
-    RecordingError
-        If it is no recording by this program, or of another format.
+    ``complete`` is False, and ``summary`` and ``windows`` may be empty. A `RecordingError` if it is
+    no recording by this program, or of another format.
 
     Examples
     --------
@@ -187,18 +183,14 @@ class Recording:
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any]:
         """Return a layer of a variant on a frame.
 
+        A `RecordingError` if there is no such layer, or not on this frame. A `DamagedError` if it
+        is not what was written.
+
         Returns
         -------
         array
             Masks and labels: ``(H, W)`` uint8, as the stage made them. Maps of numbers:
             ``(H, W)`` float32 in their own unit. Images: ``(H, W, 3)`` uint8 RGB.
-
-        Raises
-        ------
-        RecordingError
-            If there is no such layer, or not on this frame.
-        DamagedError
-            If it is not what was written.
         """
         return self._array(at.layer_path(variant, name), frame)
 

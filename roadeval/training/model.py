@@ -148,6 +148,9 @@ def save_model(model: Model, path: Path) -> None:
 def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     """Read a model file; it holds data alone, so a file from elsewhere runs no code.
 
+    A `ModelError` if the file is missing, no model, damaged, or of another version, or if it holds
+    what no training gives: arrays of a wrong shape, numbers that are not finite.
+
     Parameters
     ----------
     path
@@ -155,12 +158,6 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     stages
         Further stages whose parameters it may hold, as ``config.pipelines()["mine"].stages()``.
         A file loads no stage by itself.
-
-    Raises
-    ------
-    ModelError
-        If the file is missing, no model, damaged, or of another version, or if it holds what
-        no training gives: arrays of a wrong shape, numbers that are not finite.
     """
     header, arrays = _content(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:

@@ -95,6 +95,9 @@ def compare(
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 
+    A `RoadevalError` if a result cannot be read, or there is nothing to compare, or a condition not
+    to be judged.
+
     Parameters
     ----------
     results
@@ -105,12 +108,6 @@ def compare(
         first.
     fail_if
         Conditions, see `roadeval.evaluation.comparison.conditions`.
-
-    Raises
-    ------
-    RoadevalError
-        If a result cannot be read, or there is nothing to compare, or a condition not to be
-        judged.
     """
     found = attempt(results, variants=variants, fail_if=fail_if)
     if found.unjudged:

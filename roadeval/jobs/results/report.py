@@ -67,6 +67,8 @@ def write_report(
 ) -> Path:
     """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
 
+    A `RoadevalError` if there is nothing to read there, or the file cannot be written.
+
     Parameters
     ----------
     result
@@ -77,11 +79,6 @@ def write_report(
         in ``.html`` gives a page.
     commands
         What the reader may type for more; none by default.
-
-    Raises
-    ------
-    RoadevalError
-        If there is nothing to read there, or the file cannot be written.
     """
     opened = result if isinstance(result, Result) else Result(result)
     (source,) = opened.paths

@@ -196,6 +196,8 @@ class DriveResult:
 class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 
+    A `RoadevalError` if one is none of these, or was made by another program or format.
+
     Parameters
     ----------
     paths
@@ -203,11 +205,6 @@ class Result:
     trust_sources
         Whether logs, masks, models and recordings may be read that a fleet's folder names and that
         lie outside it.
-
-    Raises
-    ------
-    RoadevalError
-        If one is none of these, or was made by another program or format.
 
     Examples
     --------

@@ -116,8 +116,10 @@ def replay_fleet(
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
-    The folder is the state: a drive whose record is there, made of the same log, settings,
-    model and version, is not replayed again.
+    The folder is the state: a drive whose record is there, made of the same log, settings, model
+    and version, is not replayed again. A `RoadevalError` if there is no drive, or the folder or the
+    engine cannot be used, or more drives fail than ``fleet.max_failures`` allows: then all that was
+    done is kept.
 
     Parameters
     ----------
@@ -137,12 +139,6 @@ def replay_fleet(
         Whether drives that failed before are tried again.
     on_progress
         Called in the caller's thread as drives are done.
-
-    Raises
-    ------
-    RoadevalError
-        If there is no drive, or the folder or the engine cannot be used, or more drives fail than
-        ``fleet.max_failures`` allows: then all that was done is kept.
     """
     config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in listed(drives)])

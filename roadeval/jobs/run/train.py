@@ -25,16 +25,12 @@ def train(
 ) -> Model:
     """Train every variant on one drive or some, and write the model file.
 
-    From each drive ``training.frames`` labelled frames are taken, spread evenly over the
-    selected range. Frames without truth are taken where ``training.source`` is ``patch``, or
-    ``auto`` and no drive has truth. The labels hold for every drive without its own
-    (`RunConfig.drives`); where they do not occur, a 0/255 mask is recognised. Frames that cannot be
-    decoded are left out, and listed in `Model.losses`.
-
-    Raises
-    ------
-    RoadevalError
-        If some drives have truth and others none, or there is nothing to learn.
+    From each drive ``training.frames`` labelled frames are taken, spread evenly over the selected
+    range. Frames without truth are taken where ``training.source`` is ``patch``, or ``auto`` and no
+    drive has truth. The labels hold for every drive without its own (`RunConfig.drives`); where
+    they do not occur, a 0/255 mask is recognised. Frames that cannot be decoded are left out, and
+    listed in `Model.losses`. A `RoadevalError` if some drives have truth and others none, or there
+    is nothing to learn.
     """
     config, paths = config or RunConfig(), listed(drives)
     settings = config.training

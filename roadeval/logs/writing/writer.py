@@ -309,9 +309,9 @@ def pack(
 ) -> PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
-    JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. Masks belong to
-    the image of the same name, endings such as ``_mask`` aside. The same files give the same
-    bytes.
+    JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. Masks belong to the
+    image of the same name, endings such as ``_mask`` aside. The same files give the same bytes. A
+    `LogError` if there is nothing to pack, a file is unreadable, or no mask belongs to an image.
 
     Parameters
     ----------
@@ -324,11 +324,6 @@ def pack(
     rate_hz
         Images a second. By default a video's own; of images, the times in their names if every
         name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
-
-    Raises
-    ------
-    LogError
-        If there is nothing to pack, a file is unreadable, or no mask belongs to an image.
     """
     images, output = Path(images), Path(output)
     if rate_hz is not None and not 1e-4 <= rate_hz <= 1000:
