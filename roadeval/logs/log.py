@@ -22,8 +22,7 @@ from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import choose_truth, named
 from roadeval.logs.topics.reader import TopicInfo, describe_topic, survey, topic_readers
 from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.named import with_keys
-from roadeval.logs.truth.pairing import frames_of
+from roadeval.logs.truth.pairing import frames_of, with_keys
 from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
 from roadeval.runtime.text import visible
 

@@ -21,7 +21,7 @@ from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPictu
 from roadeval.logs.settings import Color
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, Drawn, LabelFormat, Size
-from roadeval.logs.truth.named import LabelSet, NamedLabel
+from roadeval.logs.truth.pairing import LabelSet, NamedLabel
 from roadeval.runtime.discovery import found_in
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input

@@ -27,7 +27,7 @@ from roadeval.logs.messages.pixels import (
 )
 from roadeval.logs.settings import Color, LabelSettings
 from roadeval.logs.truth.drawn import UNLABELLED
-from roadeval.logs.truth.named import LabelSet
+from roadeval.logs.truth.pairing import LabelSet
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""

@@ -27,11 +27,12 @@ from roadeval.logs.truth.meaning import (
     understand,
     with_colours,
 )
-from roadeval.logs.truth.named import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
     Camera,
     LabelPictures,
+    LabelSet,
+    NamedLabels,
     Pairing,
     Partners,
     by_number,

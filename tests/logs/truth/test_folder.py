@@ -10,7 +10,7 @@ from roadeval.logs import LogError, MaskSettings
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.truth.beside import labels_in, npy_picture
 from roadeval.logs.truth.meaning import Confidence
-from roadeval.logs.truth.named import NamedLabels, with_keys
+from roadeval.logs.truth.pairing import NamedLabels, with_keys
 from roadeval.logs.truth.source import log_and_topic
 from tests.logs.making import png
 from tests.logs.truth.test_npy import file_of
