@@ -1,4 +1,4 @@
-"""Which label belongs to which image: by header stamp, frame number, name, or what takes their place.
+"""Which label belongs to which image: by stamp, frame number, name, or what takes their place.
 
 Labels may be logged long after their images, so log times do not pair them. Stamps are read only
 where they are needed: around the stamp that is looked for.
