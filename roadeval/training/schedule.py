@@ -68,16 +68,6 @@ def fingerprint(image: Rgb) -> Fingerprint:
     return _standardised(grid.reshape(-1)).astype(np.float16)
 
 
-@dataclass(frozen=True, slots=True)
-class Alike:
-    """Which training frames a frame is like."""
-
-    same: bool = False
-    """Whether it shows the same picture as one of them."""
-    beside: frozenset[int] = frozenset()
-    """Indices of those that show the same place."""
-
-
 class Likeness:
     """The pictures of training frames, to compare others with.
 
@@ -88,13 +78,14 @@ class Likeness:
         self._fine = _standardised(fingerprints)
         self._coarse = _coarser(self._fine)
 
-    def of(self, image: Rgb) -> Alike:
-        """Compare an ``(H, W, 3)`` uint8 RGB image with the training frames; from any thread."""
+    def of(self, image: Rgb) -> tuple[bool, frozenset[int]]:
+        """Compare an ``(H, W, 3)`` uint8 RGB image with the training frames; from any thread.
+
+        Returned are whether one of them shows the same, and the indices of those beside it.
+        """
         fine = _standardised(fingerprint(image))
-        beside = _near(self._coarse, _coarser(fine), BESIDE)
-        return Alike(
-            bool(_near(self._fine, fine, SAME).any()), frozenset(np.flatnonzero(beside).tolist())
-        )
+        beside = np.flatnonzero(_near(self._coarse, _coarser(fine), BESIDE))
+        return bool(_near(self._fine, fine, SAME).any()), frozenset(beside.tolist())
 
 
 def _near(known: Grids, seen: Grids, limit: float) -> npt.NDArray[np.bool_]:
@@ -150,15 +141,14 @@ class Schedule:
 
     def use(self, frame: Frame) -> Use:
         """Return what a decoded frame is used for."""
-        alike = Alike() if self.likeness is None else self.likeness.of(frame.image)
-        return Use(self._role(frame, alike), alike.beside)
-
-    def _role(self, frame: Frame, alike: Alike) -> Role:
-        may_be = self.sizes is None or len(frame.payload) in self.sizes
-        if may_be and frame.digest() in self.digests:
-            return Role.TRAINING
-        if alike.same:
-            return Role.COPY
+        same, beside = False, frozenset[int]()
+        if self.likeness is not None:
+            same, beside = self.likeness.of(frame.image)
+        role = Role.UNLABELLED if frame.truth is None else Role.EVALUATED
         if frame.number in self.gap:
-            return Role.GAP
-        return Role.UNLABELLED if frame.truth is None else Role.EVALUATED
+            role = Role.GAP
+        if same:
+            role = Role.COPY
+        if self.sizes is None or len(frame.payload) in self.sizes:
+            role = Role.TRAINING if frame.digest() in self.digests else role
+        return Use(role, beside)

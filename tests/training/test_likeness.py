@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from roadeval import logs
-from roadeval.training.schedule import BESIDE, SAME, SIDE, Alike, Likeness, fingerprint
+from roadeval.training.schedule import BESIDE, SAME, SIDE, Likeness, fingerprint
 from tests.e2e.commands import DEMO
 from tests.fixtures.shared import SHARED
 
@@ -49,9 +49,7 @@ KNOWN = Likeness(np.stack([fingerprint(view(column)) for column in (0, 300, 600)
 
 @pytest.mark.parametrize("how", ENCODINGS)
 def test_a_picture_is_the_same_in_another_encoding(how):
-    alike = KNOWN.of(ENCODINGS[how](view(300)))
-    assert alike.same
-    assert alike.beside == {1}
+    assert KNOWN.of(ENCODINGS[how](view(300))) == (True, {1})
 
 
 @pytest.mark.parametrize(
@@ -65,22 +63,20 @@ def test_a_picture_is_the_same_in_another_encoding(how):
     ids=["half the size", "twice the size", "the range of video", "half as bright"],
 )
 def test_a_picture_is_the_same_in_another_size_and_range(change):
-    assert KNOWN.of(change(view(600))).same
+    assert KNOWN.of(change(view(600)))[0]
 
 
 def test_a_picture_from_a_little_further_on_is_another_one_of_the_same_place():
-    alike = KNOWN.of(view(306))
-    assert not alike.same
-    assert alike.beside == {1}
+    assert KNOWN.of(view(306)) == (False, {1})
 
 
 def test_a_picture_of_another_place_is_like_none():
-    assert KNOWN.of(view(450)) == KNOWN.of(view(300, OTHER)) == Alike()
+    assert KNOWN.of(view(450)) == KNOWN.of(view(300, OTHER)) == (False, frozenset())
 
 
 def test_every_training_frame_of_a_place_is_named():
     near = Likeness(np.stack([fingerprint(view(column)) for column in (300, 900, 303)]))
-    assert near.of(view(300)).beside == {0, 2}
+    assert near.of(view(300))[1] == {0, 2}
 
 
 def test_a_fingerprint_has_the_deviation_1_whatever_is_added_and_multiplied():
@@ -93,7 +89,7 @@ def test_a_fingerprint_has_the_deviation_1_whatever_is_added_and_multiplied():
 def test_a_picture_of_one_brightness_is_like_nothing(level):
     flat = np.full((90, 120, 3), level, np.uint8)
     assert not fingerprint(flat).any()
-    assert not Likeness(fingerprint(flat)[None]).of(flat).same
+    assert not Likeness(fingerprint(flat)[None]).of(flat)[0]
 
 
 def distances(images: list[np.ndarray], others: list[np.ndarray]) -> list[float]:

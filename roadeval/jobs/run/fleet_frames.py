@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields
+from dataclasses import asdict, astuple, fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,19 +26,6 @@ WIDTH: Final = 320
 """Pixels across their pictures."""
 
 
-@dataclass(frozen=True, slots=True)
-class _WorstFrame:
-    number: int
-    stamp_ns: int
-    tally: Tally
-    light: Light
-    picture: bytes
-
-    @property
-    def err(self) -> float:
-        return self.tally.rates["ERR"]
-
-
 class FrameGatherer:
     """Takes a drive's frames in order, and writes their rows; to be used as a context.
 
@@ -51,7 +38,8 @@ class FrameGatherer:
         self._rows: Final = TableFile(frames_path(folder, drive), "frames")
         self._lights: Final[list[tuple[float, ...]]] = []
         self._stamps: list[int] = []
-        self._worst: list[_WorstFrame] = []
+        self._worst: list[tuple[dict[str, Any], bytes]] = []
+        """Rows of the table ``worst`` without their ranks, and the pictures."""
 
     def __enter__(self) -> FrameGatherer:
         self._rows.__enter__()
@@ -81,19 +69,27 @@ class FrameGatherer:
     def _offer(self, result: FrameResult, tally: Tally, light: Light) -> None:
         """Keep a frame as long as it is one of the worst."""
         frame, err = result.frame, tally.rates["ERR"]
-        near = [w for w in self._worst if abs(w.stamp_ns - frame.stamp_ns) < APART_NS]
+        near = [w for w in self._worst if abs(w[0]["stamp_ns"] - frame.stamp_ns) < APART_NS]
         rest = [w for w in self._worst if w not in near]
-        bound = max((w.err for w in near), default=-1.0)
+        bound = max((row["ERR"] for row, _ in near), default=-1.0)
         if len(rest) == WORST:
-            bound = max(bound, min(w.err for w in rest))
+            bound = max(bound, min(row["ERR"] for row, _ in rest))
         if math.isnan(err) or err <= bound:
             return
         # Painted when they are small: most are soon replaced by a worse frame's.
         image, errors = shrink(frame.image, WIDTH), result.errors[tally.variant].array
         small = shrink(errors.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
-        kept = _WorstFrame(frame.number, frame.stamp_ns, tally, light, picture)
-        ranked = sorted([*rest, kept], key=lambda w: (-w.err, w.number))
+        row = {
+            "frame": frame.number,
+            "stamp_ns": frame.stamp_ns,
+            "variant": tally.variant,
+            "stage": tally.stage,
+            **{name: tally.rates[name] for name in ("ERR", "FPR", "FNR")},
+            "picture": Path(PICTURES, self._drive, f"{frame.number}.jpg").as_posix(),
+            **asdict(light),
+        }
+        ranked = sorted([*rest, (row, picture)], key=lambda w: (-w[0]["ERR"], w[0]["frame"]))
         self._worst = ranked[:WORST]
 
     def facts(self) -> dict[str, Any]:
@@ -112,22 +108,10 @@ class FrameGatherer:
         """Write the rows and the worst frames' pictures; an OSError if they cannot be written."""
         if self._lights:
             self._rows.finish()
-        for each in self._worst:
-            put(self._folder / self._picture(each), each.picture)
+        for row, picture in self._worst:
+            put(self._folder / row["picture"], picture)
 
     def worst_rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of ``worst``; ranks are given over all drives."""
-        for rank, each in enumerate(self._worst, 1):
-            yield {
-                "rank": rank,
-                "frame": each.number,
-                "stamp_ns": each.stamp_ns,
-                "variant": each.tally.variant,
-                "stage": each.tally.stage,
-                **{name: each.tally.rates[name] for name in ("ERR", "FPR", "FNR")},
-                "picture": self._picture(each).as_posix(),
-                **{field.name: getattr(each.light, field.name) for field in fields(Light)},
-            }
-
-    def _picture(self, each: _WorstFrame) -> Path:
-        return Path(PICTURES, self._drive, f"{each.number}.jpg")
+        for rank, (row, _) in enumerate(self._worst, 1):
+            yield {"rank": rank, **row}
