@@ -80,12 +80,7 @@ ROAD_CLASSES: Final = (
     LabelClass(ROAD, "road", with_opacity(colours.ROAD, 160)),
 )
 IGNORED_CLASS: Final = LabelClass(IGNORE, "ignored", with_opacity(colours.IGNORE, 160))
-TRUTH: Final = LayerSpec(
-    "truth",
-    LayerKind.MASK,
-    "Ground truth",
-    (*ROAD_CLASSES, IGNORED_CLASS),
-)
+TRUTH: Final = LayerSpec("truth", LayerKind.MASK, "Ground truth", (*ROAD_CLASSES, IGNORED_CLASS))
 ERRORS: Final = LayerSpec(
     "errors",
     LayerKind.MASK,

@@ -22,13 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.images.formats import (
-    DamagedImageError,
-    ImageError,
-    ImageFormat,
-    Limits,
-    format_of,
-)
+from roadeval.images.formats import DamagedImageError, ImageError, ImageFormat, Limits, format_of
 
 Array = npt.NDArray[Any]
 File = bytes | memoryview

@@ -49,11 +49,7 @@ def info(
 
 
 def pack(
-    images: AnyPath,
-    output: AnyPath,
-    *,
-    truth: AnyPath | None = None,
-    rate_hz: float | None = None,
+    images: AnyPath, output: AnyPath, *, truth: AnyPath | None = None, rate_hz: float | None = None
 ) -> logs.PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 

@@ -19,14 +19,7 @@ from typing import Any, Final, Self
 
 import rerun as rr
 
-from roadeval.data import (
-    BASELINE,
-    ERRORS,
-    FINAL_STAGE,
-    FrameResult,
-    Health,
-    LayerKind,
-)
+from roadeval.data import BASELINE, ERRORS, FINAL_STAGE, FrameResult, Health, LayerKind
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
 from roadeval.recording import views

@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import (
-    Change,
-    Counts,
-    FrameResult,
-    Rows,
-    Transition,
-)
+from roadeval.data import Change, Counts, FrameResult, Rows, Transition
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import at_levels
 from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind

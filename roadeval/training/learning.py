@@ -115,9 +115,7 @@ def _sampled(
 
 
 def _fit_variant(
-    sampled: TrainingSet,
-    base: Mapping[str, Mapping[str, Any]],
-    variant: tuple[str, Pipeline],
+    sampled: TrainingSet, base: Mapping[str, Mapping[str, Any]], variant: tuple[str, Pipeline]
 ) -> tuple[str, dict[str, Any], list[str]]:
     """Return the variant's name, what its stages learn, and the warnings."""
     name, pipeline = variant

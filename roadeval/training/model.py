@@ -233,9 +233,7 @@ class _Header:
 
 
 def _model(
-    content: Mapping[str, Any],
-    arrays: Mapping[str, npt.NDArray[Any]],
-    known: Mapping[str, Stage],
+    content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]], known: Mapping[str, Stage]
 ) -> Model:
     """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
     names = [entry.name for entry in dataclasses.fields(_Header)]

@@ -211,11 +211,7 @@ def most_changed(
 
 
 def _apart(
-    stamps: Ints,
-    ranked: Ints,
-    count: int,
-    apart_ns: int | None = None,
-    besides: Sequence[int] = (),
+    stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
 ) -> Ints:
     """Return the first ``count`` places of a ranking that are no neighbours of one before."""
     if apart_ns is None:

@@ -35,13 +35,7 @@ from roadeval.report.charts.standard import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.report.sections.frames import BrowsedFrames, FrameFacts, browser, strip
-from roadeval.results.comparison import (
-    as_dict,
-    comparison_cases,
-    judged,
-    junit_xml,
-    warnings,
-)
+from roadeval.results.comparison import as_dict, comparison_cases, judged, junit_xml, warnings
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.runtime.files import Paths, listed
@@ -88,10 +82,7 @@ class Compared:
 
 
 def compare(
-    results: Paths,
-    *,
-    variants: Sequence[str] | None = None,
-    fail_if: Sequence[str] = (),
+    results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 

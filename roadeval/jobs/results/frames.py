@@ -132,11 +132,7 @@ class FramePicker:
         ]
 
     def moved(
-        self,
-        paired: Sequence[PairedComparison],
-        shown: Sequence[NotableFrame],
-        *,
-        harmed: bool,
+        self, paired: Sequence[PairedComparison], shown: Sequence[NotableFrame], *, harmed: bool
     ) -> list[NotableFrame]:
         """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
         for pair in paired:
@@ -279,8 +275,7 @@ def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
 
 
 def _conditions(
-    rates: Mapping[str, Mapping[str, float]],
-    blind: Mapping[str, float] | None,
+    rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
 ) -> Iterator[str]:
     """Yield what is true of a frame, in words: the first variant's health, and the filter."""
     first = next(iter(rates), None)

@@ -341,11 +341,7 @@ class RecordFinder:
     """
 
     def __init__(
-        self,
-        source: FileBytes,
-        reader: ChunkReader,
-        summary: Summary,
-        channels: Collection[int],
+        self, source: FileBytes, reader: ChunkReader, summary: Summary, channels: Collection[int]
     ) -> None:
         self._source, self._reader, self._summary = source, reader, summary
         self._size = len(source)

@@ -12,13 +12,7 @@ import numpy.typing as npt
 
 from roadeval import images
 from roadeval.data import Rgb
-from roadeval.images import (
-    DamagedImageError,
-    ImageError,
-    Limits,
-    eight_bits,
-    without_colours,
-)
+from roadeval.images import DamagedImageError, ImageError, Limits, eight_bits, without_colours
 from roadeval.logs.container.records import Buffer
 from roadeval.logs.errors import BadMessage, DamagedMessage
 from roadeval.logs.messages.pictures import (

@@ -35,10 +35,7 @@ FRINGE: Final = 253
 """Marks a value that lies too far from every known one, as compression makes them at edges."""
 TOP: Final = np.iinfo(np.uint16).max
 """The code of a confidence of 1."""
-_MASKS: Final = (
-    {0: NON_ROAD, 255: ROAD, 128: IGNORE},
-    {0: NON_ROAD, 1: ROAD, 255: IGNORE},
-)
+_MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
 """Masks that need no settings: what their values mean."""
 
 

@@ -262,11 +262,7 @@ def _coloured(layer: Layer) -> npt.NDArray[np.uint8]:
 
 def _schema(rates: tuple[str, ...]) -> str:
     """Return the JSON Schema of the metrics, with Foxglove's own form of a time."""
-    time = {
-        "type": "object",
-        "title": "time",
-        "properties": {"sec": _INTEGER, "nsec": _INTEGER},
-    }
+    time = {"type": "object", "title": "time", "properties": {"sec": _INTEGER, "nsec": _INTEGER}}
     counts = dict.fromkeys(("frame", "TP", "TN", "FP", "FN", "N"), _INTEGER)
     properties = {"timestamp": time, "variant": {"type": "string"}, "stage": {"type": "string"}}
     properties |= counts | dict.fromkeys(rates, _RATE)

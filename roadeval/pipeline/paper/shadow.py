@@ -346,10 +346,7 @@ def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Co
     applied[0] = False
     here = applied[:, None]
     return Compensation(
-        inside.mean,
-        np.where(here, ring.mean, inside.mean),
-        np.where(here, gain, 1.0),
-        applied,
+        inside.mean, np.where(here, ring.mean, inside.mean), np.where(here, gain, 1.0), applied
     )
 
 
