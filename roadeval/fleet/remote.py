@@ -137,9 +137,6 @@ def drives_below(url: str) -> list[str]:
     return [f"{place.root}{'/'.join(key.parts)}{ends.get(key, '')}" for key in found]
 
 
-# --- Files of a drive -----------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class _Place:
     """Where an object is: its store, its key there, and the URL of the store's root."""
@@ -239,9 +236,6 @@ def _file_name(url: str) -> str:
 def _no_copy(url: str, error: OSError) -> str:
     at = f" {error.filename}" if error.filename else ""
     return f"{shown(url)}: cannot be copied to this machine:{at}: {error.strerror or error}"
-
-
-# --- Stores ---------------------------------------------------------------------------------------
 
 
 def _place(url: str) -> _Place:

@@ -60,9 +60,6 @@ def _require(array: npt.NDArray[Any], *shape: int) -> None:
         raise ValueError(f"an array of shape {array.shape}, not {shape}")
 
 
-# --- Colours --------------------------------------------------------------------------------------
-
-
 def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
     _require(table, 766, 256)
     height, width = _shape(*planes)
@@ -92,9 +89,6 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
         _require(table, COLOUR_WORDS)
     _loops.look_up_colours(*planes, height, width, *tables, result, *room)
     return result
-
-
-# --- Components -----------------------------------------------------------------------------------
 
 
 def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
@@ -144,9 +138,6 @@ def label_runs(labels: Labels) -> Runs:
     height, width = labels.shape
     runs = np.empty((height * width, 4), np.int32)
     return runs[: _loops.label_runs(labels, height, width, runs)].copy()
-
-
-# --- Masks ----------------------------------------------------------------------------------------
 
 
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
@@ -212,9 +203,6 @@ def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) 
     return result
 
 
-# --- Outcomes -------------------------------------------------------------------------------------
-
-
 def outcomes(mask: Plane, truth: Plane) -> Plane:
     shape = _shape(mask, truth)
     errors = np.empty(shape, np.uint8)
@@ -227,17 +215,11 @@ def add_outcomes(errors: Plane, totals: Image) -> None:
     _loops.add_outcomes(errors, errors.size, totals)
 
 
-# --- Paths ----------------------------------------------------------------------------------------
-
-
 def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
     shape = _shape(cost, seeds)
     distance = np.empty(shape, np.int32)
     _loops.geodesics(cost, seeds, *shape, rounds, distance)
     return distance
-
-
-# --- Decision -------------------------------------------------------------------------------------
 
 
 def tree_sum(
@@ -250,9 +232,6 @@ def tree_sum(
     sized = features, count, pixels
     _loops.tree_sum(*sized, feature, threshold, kept, values, trees, nodes, block, result)
     return result
-
-
-# --- Image files ----------------------------------------------------------------------------------
 
 
 def filter_rows(rows: Plane, step: int) -> Plane:

@@ -298,9 +298,6 @@ def as_scores(output: npt.NDArray[Any], layout: str | None) -> npt.NDArray[Any] 
     return array if array.ndim == 3 and min(array.shape[1:]) > 1 else None
 
 
-# --- The input ------------------------------------------------------------------------------------
-
-
 def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """Complete layout, channels and size."""
     shape = file.inputs[0].shape if len(file.inputs) == 1 else ()
@@ -345,9 +342,6 @@ def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
                 f"{settings.channel_count} channels"
             )
     return settings
-
-
-# --- The outputs ----------------------------------------------------------------------------------
 
 
 def _meaning(

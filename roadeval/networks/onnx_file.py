@@ -204,8 +204,6 @@ def _explained(path: Path) -> Iterator[None]:
         raise NetworkError(f"{path}: {library} cannot run the network: {quoted}") from error
 
 
-# --- What onnxruntime does not tell: weight files, and what makes the outputs ---------------------
-
 # An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. What is no such
 # message is a ValueError.
 

@@ -135,9 +135,6 @@ def _check(stage: Stage) -> None:
             raise ValueError(f"the name of its layer {spec.name!r} must be of letters and digits")
 
 
-# --- A plain function as a stage ------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class NoSettings:
     """Settings of a function that has none."""
@@ -196,9 +193,6 @@ def _output(found: Any, spec: LayerSpec) -> Output:
     codes = np.rint(array * FULL).astype(np.uint16)
     mask = Packed.of(codes > round(FULL / 2))
     return Output((Layer(spec, mask),), mask=mask, probability=codes)
-
-
-# --- Somebody else's stage: its errors are named, and what it hands out is checked ----------------
 
 
 def guarded(stage: Stage) -> Stage:

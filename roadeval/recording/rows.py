@@ -136,9 +136,6 @@ def _size(value: Any) -> int:
     return len(value) if isinstance(value, bytes | str) else 0
 
 
-# --- Columns: one row a value ---------------------------------------------------------------------
-
-
 def scalars(values: list[float]) -> Any:
     """Return columns of one number a row."""
     return rr.Scalars.columns(scalars=values)

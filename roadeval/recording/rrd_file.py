@@ -258,9 +258,6 @@ def _reason(path: Path) -> str:
     )
 
 
-# --- Checksums ------------------------------------------------------------------------------------
-
-
 class MessageSums:
     """The checksums of the messages of a file that is being written."""
 

@@ -182,9 +182,6 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
     ]
 
 
-# --- Single views ---------------------------------------------------------------------------------
-
-
 def picture(title: str, *paths: str) -> BlueprintPart:
     """Return a view of images drawn over each other."""
     return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
@@ -368,9 +365,6 @@ def _markdown(text: str) -> rr.TextDocument:
 
 def _line(name: str, colour: Colour) -> rr.SeriesLines:
     return rr.SeriesLines(names=name, colors=colour, widths=2.0)
-
-
-# --- Texts ----------------------------------------------------------------------------------------
 
 
 def guide(layout: Layout, verdict: str = "") -> str:

@@ -269,9 +269,6 @@ def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
     return parts
 
 
-# --- Many drives ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Member:
     """A drive of a fleet, as its command names it."""
@@ -357,9 +354,6 @@ class FleetFacts(_Document):
 def is_fleet(path: str | Path) -> bool:
     """Return whether a path leads to a fleet's folder."""
     return (Path(path) / FLEET).is_file()
-
-
-# --- JSON -----------------------------------------------------------------------------------------
 
 
 @cache

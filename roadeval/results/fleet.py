@@ -99,9 +99,6 @@ def recording_path(folder: Path, drive: str) -> Path:
     return folder / RECORDINGS / f"{drive}.rrd"
 
 
-# --- Reading --------------------------------------------------------------------------------------
-
-
 class FleetFolder:
     """Reads a fleet's folder, perhaps made on another machine, by anybody.
 
@@ -182,9 +179,6 @@ class FleetFolder:
         for drive, row in self.drives.items():
             if row["evaluated"]:
                 yield self.frames(drive).to_pandas()
-
-
-# --- Records --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,9 +292,6 @@ class _Records:
                 "meanwhile; run the same command again, or give each a folder of its own"
             )
         return record
-
-
-# --- Writing --------------------------------------------------------------------------------------
 
 
 class FleetWriter:

@@ -231,9 +231,6 @@ def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
     return rows
 
 
-# --- Conditions on each drive ---------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class DriveJudgement:
     """A condition judged on a drive."""

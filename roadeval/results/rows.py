@@ -179,9 +179,6 @@ def as_arrays(name: str, rows: Iterable[Row]) -> Rows:
     )
 
 
-# --- Rows of the tables of drives -----------------------------------------------------------------
-
-
 def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
     """Return the row of ``drives`` of a drive that was replayed, under a name, from a source."""
     status = (DAMAGED if facts.losses else SCORED) if facts.totals else UNSCORED

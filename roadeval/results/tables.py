@@ -53,9 +53,6 @@ class TableFacts:
     sha256: str
 
 
-# --- CSV ------------------------------------------------------------------------------------------
-
-
 def read_table(
     name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None
 ) -> pd.DataFrame:
@@ -174,9 +171,6 @@ def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
             raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
 
 
-# --- Arrays ---------------------------------------------------------------------------------------
-
-
 def _arrays(table: pa.Table, columns: Iterable[Column]) -> Rows:
     return Rows(
         {
@@ -216,9 +210,6 @@ def _numbers(column: pa.ChunkedArray) -> Cells:
 def _filled(cells: pa.Array, blank: float) -> Cells:
     # Filling imports pandas.
     return np.from_dlpack(cells.fill_null(blank) if cells.null_count else cells)
-
-
-# --- Parquet --------------------------------------------------------------------------------------
 
 
 class TableFile:

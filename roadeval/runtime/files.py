@@ -43,8 +43,6 @@ _KINDS: Final = {
     stat.S_IFSOCK: "a socket",
 }
 
-# --- Names and kinds ------------------------------------------------------------------------------
-
 
 def listed(paths: Paths) -> list[AnyPath]:
     """Return one path or some as a list; a text is a path, not a sequence of letters."""
@@ -133,9 +131,6 @@ def remove(path: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-# --- Files ----------------------------------------------------------------------------------------
-
-
 class NewFile:
     """A file that is written as ``partial`` and takes its place when it is complete.
 
@@ -200,9 +195,6 @@ def put_with(path: Path, content: bytes, files: Mapping[str, bytes]) -> None:
     for other in target.parent.iterdir():
         if pattern.fullmatch(other.name) and other != folder:
             remove(other)
-
-
-# --- Folders --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,9 +315,6 @@ def _home_of(target: Path) -> Path:
         return target.parent
     apart = os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)
     return target if apart else target.parent
-
-
-# --- Claims ---------------------------------------------------------------------------------------
 
 
 @contextmanager

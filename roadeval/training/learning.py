@@ -159,9 +159,6 @@ def _collapsed(
     ]
 
 
-# --- Which pixels train ---------------------------------------------------------------------------
-
-
 def sample(truths: Sequence[Truth], settings: TrainingSettings) -> TrainingSet:
     """Draw pixels of both classes from the truths of the training frames, without the images.
 
@@ -192,9 +189,6 @@ def _draw(
         rows, columns = np.unravel_index(np.sort(chosen), truth.shape)
         drawn.append(np.stack([np.full(len(chosen), index), rows, columns], axis=1))
     return np.concatenate(drawn).astype(np.intp)
-
-
-# --- A truth for logs that have none --------------------------------------------------------------
 
 
 def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
@@ -399,9 +393,6 @@ def spread(
     chosen = frozenset(evenly(numbers, count))
     for _, frame in decoded(each for each in frames() if each.number in chosen):
         yield frame
-
-
-# --- Which frames of a log train its model --------------------------------------------------------
 
 
 class HeldFrames:

@@ -277,9 +277,6 @@ def _line(error: ValueError) -> str:
     return f"{'.'.join(map(str, problem['loc']))}: {problem['msg'].lower()}"
 
 
-# --- What a stage has learnt as named arrays, and back --------------------------------------------
-
-
 def arrays_of(learnt: Any) -> dict[str, npt.NDArray[Any]]:
     """Return the fields of a dataclass as arrays by name.
 

@@ -61,9 +61,6 @@ class ComparisonError(RoadevalError):
     """Results that cannot be compared."""
 
 
-# --- What comes out -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class ComparedResult:
     """One of the results."""
@@ -197,9 +194,6 @@ class Comparison:
         return [change for change in finals if change.variant != BASELINE] or finals
 
 
-# --- How it is made -------------------------------------------------------------------------------
-
-
 def variants_as_sides(
     whole: Side, there: Sequence[str], chosen: Sequence[str] | None = None
 ) -> list[Side]:
@@ -315,9 +309,6 @@ def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
         yield replace(each, difference={**each.difference, **difference})
 
 
-# --- Masks, drive by drive ------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sum:
     """A mask's frames on one drive, summed up."""
@@ -401,9 +392,6 @@ def _changes(
             new=_rates(own, [each.new for each in own]),
             difference=differences(own),
         )
-
-
-# --- One new result against the base --------------------------------------------------------------
 
 
 class _Against:

@@ -77,9 +77,6 @@ class Side:
         return [part for part in self.parts if part.scored]
 
 
-# --- Drives ---------------------------------------------------------------------------------------
-
-
 class Kind(StrEnum):
     """The subject of a note on a comparison."""
 
@@ -175,9 +172,6 @@ def _why_not(base: Part, new: Part | None) -> Kind | None:
     if base.digest is None or new.digest is None:
         return Kind.LOG_UNKNOWN
     return Kind.OTHER_LOG if base.digest != new.digest else None
-
-
-# --- Frames ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -40,9 +40,6 @@ Total = dict[str, Any]
 """See `sum_up`."""
 
 
-# --- One frame ------------------------------------------------------------------------------------
-
-
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
     """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
 
@@ -69,9 +66,6 @@ def flat(masks: Bits | Sequence[Bits]) -> Bits:
     """Lay each mask's rows one after the other: ``(K, H * words)``."""
     stacked = np.asarray(masks, np.uint64)
     return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
-
-
-# --- Many frames ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,9 +172,6 @@ def _total(frames: int, counts: FourCounts, sums: Floats, defined: npt.NDArray[A
         **{f"pooled_{name}": value for name, value in metrics.of(pooled).items()},
         "undefined": dict(zip(metrics.METRICS, undefined, strict=True)),
     }
-
-
-# --- Windows: the paper's rows of ten frames ------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

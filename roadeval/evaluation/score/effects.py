@@ -88,8 +88,6 @@ def final_stages(masks: Iterable[Name]) -> dict[str, str]:
     return finals
 
 
-# --- The paper's claims ---------------------------------------------------------------------------
-
 _WITH: Final = (FILTERED, FINAL_STAGE)
 _WITHOUT: Final = (UNFILTERED, FINAL_STAGE)
 CLAIMS: Final[Mapping[str, tuple[str, Name, Name]]] = {

@@ -164,8 +164,6 @@ def judge(rates: Rates, blind: Rates | None) -> Health:
     return Health.DEGRADED if worse or rates["ERR"] >= DEGRADED_ERR else Health.OK
 
 
-# --- The baseline that does not look at the image -------------------------------------------------
-
 _NEAREST: Final = 0
 _LINEAR: Final = 1
 """OpenCV's numbers for the two, so that importing this module does not import OpenCV."""

@@ -116,9 +116,6 @@ def merged(chains: Iterable[Iterable[str]]) -> list[str]:
     return names
 
 
-# --- Which stage broke it -------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Causes:
     """Each frame's error rate, taken apart."""
@@ -171,9 +168,6 @@ def _errors(own: Rows, frames: Ints) -> dict[str, Floats]:
     return found
 
 
-# --- Frames worth opening -------------------------------------------------------------------------
-
-
 def scene_ns(stamps: Ints) -> int:
     """Return how far apart frames of two scenes are: a quarter of the drive, at most 3 seconds."""
     return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
@@ -224,9 +218,6 @@ def _apart(
         if (np.abs(taken - stamps[place]) >= apart_ns).all():
             places.append(place)
     return np.array(places, np.int64)
-
-
-# --- Tables of a report ---------------------------------------------------------------------------
 
 
 def pairs(rows: Rows, treated: str, control: str) -> Rows:

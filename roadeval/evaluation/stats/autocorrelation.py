@@ -304,9 +304,6 @@ def within_drive(
     )
 
 
-# --- Multiple-comparison corrections of p-values --------------------------------------------------
-
-
 def holm(family: Sequence[Difference]) -> list[Difference]:
     """Return differences with p-values corrected so that a false finding among them is rare.
 

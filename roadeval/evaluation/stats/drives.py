@@ -129,9 +129,6 @@ def _student(means: Values, confidence: float) -> tuple[float, float, float]:
     return mean - half, mean + half, float(2 * special("stdtr")(degrees, -abs(mean) / error))
 
 
-# --- The exact sign-flip test ---------------------------------------------------------------------
-
-
 def sign_flip_p(values: Values, mean: float = 0.0) -> float:
     """Compute the two-sided p-value of the hypothesis that the mean is ``mean``.
 
@@ -192,8 +189,6 @@ def _sums(values: Values) -> Values:
         sums = np.concatenate([sums, sums + value])
     return sums
 
-
-# --- Parts of a fleet -----------------------------------------------------------------------------
 
 THIRDS: Final = ("low", "middle", "high")
 """Of the fleet's drives, by a measured condition."""

@@ -146,9 +146,6 @@ def _judged(
             yield Judgement.without(condition, new, error)
 
 
-# --- Sides ----------------------------------------------------------------------------------------
-
-
 def _sides(
     opened: Sequence[Result], labels: Sequence[str], variants: Sequence[str] | None
 ) -> list[Side]:
@@ -176,9 +173,6 @@ def _labels(paths: Sequence[Path]) -> list[str]:
         label = stem if stems.count(stem) == 1 else visible(str(path))
         labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
     return labels
-
-
-# --- Writing files --------------------------------------------------------------------------------
 
 
 def write(
@@ -259,8 +253,6 @@ def as_json(compared: Compared) -> str:
     """Write a comparison as JSON; undefined numbers become null."""
     return json_text(plain(compared.content))
 
-
-# --- One drive ------------------------------------------------------------------------------------
 
 ROWS: Final = 60
 """Points of the figure over the drive, at most."""

@@ -232,9 +232,6 @@ class FramePicker:
         return ExampleFrame(frame, recording.image(frame), truth, there)
 
 
-# --- Frames of a page -----------------------------------------------------------------------------
-
-
 def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> BrowsedFrames:
     """Collect the frames of a result for a page, without their pictures."""
     frames = result.rows

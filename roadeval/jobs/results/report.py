@@ -203,9 +203,6 @@ def _behind(rows: Rows, regions: Rows) -> Iterator[tuple[tuple[str, str, str], l
             yield (variant, region, WRONG), most(there["frame"], there["FP"] + there["FN"])
 
 
-# --- Tables ---------------------------------------------------------------------------------------
-
-
 def _windows(result: DriveResult) -> Rows:
     """Return the drive's windows; longer ones where the drive is long."""
     size, windows = result.facts.evaluation.window, result.table("windows")
@@ -235,9 +232,6 @@ def _stage_changes(changes: Rows) -> dict[tuple[str, str], tuple[float, float]]:
     masks = zip(own["to_variant"].tolist(), own["to_stage"].tolist(), strict=True)
     shares = ((own[name] / own["N"]).tolist() for name in ("repaired", "spoiled"))
     return dict(zip(masks, zip(*shares, strict=True), strict=True))
-
-
-# --- Masks ----------------------------------------------------------------------------------------
 
 
 def _mask_sums(result: DriveResult, numbers: Sequence[int]) -> tuple[Rows, Rows, int]:
@@ -297,8 +291,6 @@ def _coverage(result: DriveResult, numbers: Sequence[int]) -> dict[str, dict[int
         for variant in result.recording.variants
     }
 
-
-# --- Many drives ----------------------------------------------------------------------------------
 
 _EFFECTS: Final = [
     *("drive", "base", "variant", "stage", "final", "metric"),

@@ -190,9 +190,6 @@ class DriveResult:
         return both
 
 
-# --- Any number of drives -------------------------------------------------------------------------
-
-
 class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 

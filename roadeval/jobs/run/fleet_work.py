@@ -179,9 +179,6 @@ def _begun(task: DriveTask) -> int:
         return 0
 
 
-# --- How changes are noticed ----------------------------------------------------------------------
-
-
 def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
     """Return what shows at little cost that a drive's log, or masks beside it, did not change.
 
@@ -220,9 +217,6 @@ def _check(asking: Mapping[str, str], config: RunConfig) -> None:
                 f"a worker has {name} {mine[:12]}, and the command {theirs[:12]}: install the same "
                 "everywhere, and start the workers again"
             )
-
-
-# --- A drive --------------------------------------------------------------------------------------
 
 
 def _made(task: DriveTask) -> tuple[Record, bool]:
@@ -311,9 +305,6 @@ def _remove(task: DriveTask, *folders: str) -> None:
             path.unlink(missing_ok=True)
 
 
-# --- The fleet's disk -----------------------------------------------------------------------------
-
-
 @contextmanager
 def ending_the_run(folder: Path) -> Iterator[None]:
     """Turn what fails because of the fleet's disk, as every drive would, into a FleetError."""
@@ -343,9 +334,6 @@ def _disk_failure(error: BaseException | None) -> BaseException | None:
             return error
         error = error.__cause__
     return None
-
-
-# --- The models of folds --------------------------------------------------------------------------
 
 
 def model_path(folder: Path, fold: int) -> Path:

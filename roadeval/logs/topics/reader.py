@@ -154,9 +154,6 @@ def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
     }
 
 
-# --- Oddities of a topic's images -----------------------------------------------------------------
-
-
 def survey(reader: TopicReader, size: Size | None) -> tuple[str, ...]:
     """Go through all messages of a topic whose images have this size; return what is odd."""
     positions = range(len(reader))

@@ -372,9 +372,6 @@ def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
     return min(low, len(stamps) - 1)
 
 
-# --- How one source is paired ---------------------------------------------------------------------
-
-
 def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
     """Pair by stamps, by log times, or by order where the log has no times at all.
 

@@ -21,8 +21,6 @@ from roadeval.pipeline.stage import TrainingSet
 
 Places = npt.NDArray[np.intp]
 
-# --- Colour, light, place, texture and surroundings -----------------------------------------------
-
 ANGLES: Final = (30, 45, 60)
 """Of the projections, in degrees from ``ln R - ln G`` towards ``ln B - ln G``."""
 SMOOTH: Final = 7
@@ -116,9 +114,6 @@ def _changes(plane: Values) -> list[Values]:
     ]
 
 
-# --- Scans: what lies between a pixel and the image's edges and middle ----------------------------
-
-
 def scans(scene: Scene) -> Sequence[Values]:
     """Return what `_column` finds below and above, and what is met from the middle outwards.
 
@@ -166,8 +161,6 @@ def _strips(plane: Values, size: tuple[int, int]) -> Values:
     return averaged
 
 
-# --- Paths: what must be crossed on the way from the reference patch ------------------------------
-
 ROUNDS: Final = 3
 """Sweeps up and down. More would shorten the path to about one pixel in a hundred by 1 %."""
 SCALE: Final = 10_000
@@ -208,8 +201,6 @@ def distance(cost: Values, patch: Mask) -> Values:
     lengths: Values = found / np.float32(LENGTH)
     return lengths
 
-
-# --- Barriers: thin things that bound a road, found at twice the size -----------------------------
 
 THIN, WIDE = 3, 15
 """Sides of the squares whose means differ where there is a thin line."""
@@ -266,9 +257,6 @@ def greatest_of_four(plane: Values) -> Values:
     """Return the greatest of each four pixels of a ``(2 h, 2 w)`` image, ``(h, w)``."""
     rows = np.maximum(plane[::2], plane[1::2])
     return np.maximum(rows[:, ::2], rows[:, 1::2])
-
-
-# --- All groups -----------------------------------------------------------------------------------
 
 
 class Group(NamedTuple):
@@ -373,8 +361,6 @@ def _at(planes: Values, image: Rgb, row: Places, column: Places) -> Values:
     found: Values = planes[:, rows, columns].T
     return found
 
-
-# --- How far roads reach --------------------------------------------------------------------------
 
 OVER_EDGES: Final = 1.0
 """Where roads end by the distance over the edges of the working image, which grows with all that is

@@ -119,9 +119,6 @@ class GatedSettings:
     stays."""
 
 
-# --- Dark pixels where road may be ----------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """A working image as the filter sees it."""
@@ -194,9 +191,6 @@ def features_of(seen: Look) -> Values:
         ]
     )
     return found
-
-
-# --- What is learnt -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -327,9 +321,6 @@ def _sigmoid(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
     return share
 
 
-# --- How far pixels are brightened ----------------------------------------------------------------
-
-
 def gains(seen: Look, shaded: Values, settings: GatedSettings) -> Values:
     """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
 
@@ -374,9 +365,6 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
         cv2.scaleAdd(here, float(OFFSET), result, dst=result)
         cv2.convertScaleAbs(result, dst=bright[rows], beta=-float(OFFSET))
     return bright
-
-
-# --- The stage ------------------------------------------------------------------------------------
 
 
 def bind(settings: GatedSettings, model: ShadedRoad) -> Callable[[View], Output]:

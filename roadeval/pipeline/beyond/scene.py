@@ -139,9 +139,6 @@ def mean(plane: Values, side: int) -> Values:
     return blurred
 
 
-# --- Sizes ----------------------------------------------------------------------------------------
-
-
 def reduced(image: Rgb, width: int) -> Rgb:
     """Reduce an ``(H, W, 3)`` uint8 image to ``width`` columns by area means; never enlarge it."""
     if image.shape[1] <= width:

@@ -279,9 +279,6 @@ class TreesSettings:
         return names
 
 
-# --- What is learnt -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Blend:
     """A forest and a network that learnt from the same pixels."""
@@ -393,9 +390,6 @@ def check_fit(learnt: Stack, settings: TreesSettings) -> None:
             f"the model's trees were grown on {learnt.inputs} features of a pixel, and this "
             f"version computes {known}; train it again"
         )
-
-
-# --- What is decided ------------------------------------------------------------------------------
 
 
 def network_weight(values: Values, settings: TreesSettings) -> Values | float:

@@ -85,9 +85,6 @@ class ShadowSettings:
     back as step 5 of section 4.2 says)."""
 
 
-# --- Hue, saturation and value: Eq. 3-5 -----------------------------------------------------------
-
-
 def value(rgb: npt.NDArray[np.uint8]) -> Floats:
     """Return V of ``(..., 3)`` uint8 RGB: ``(R + G + B) / 3`` over 255, in 0..1 (Eq. 3)."""
     result: Floats = rgb.sum(axis=-1, dtype=np.int64) / (3 * 255)
@@ -131,9 +128,6 @@ def hsv_to_rgb(h: Floats, s: Floats, v: Floats) -> npt.NDArray[np.uint8]:
         place = (channel - third) % 3
         rgb[..., channel] = np.select([place == 0, place == 1], [leading, between], least)
     return np.clip(np.rint(rgb * 255.0), 0, 255).astype(np.uint8)
-
-
-# --- The mask: Eq. 6-8 ----------------------------------------------------------------------------
 
 
 def ndi(saturation: Floats, value: Floats) -> Floats:
@@ -211,9 +205,6 @@ def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask
     return (codes >= threshold if inclusive else codes > threshold).view(np.uint8)
 
 
-# --- Components and buffer rings: Eq. 9-10 --------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Components:
     """Connected components of an image of ``shape`` (H, W), numbered from 1.
@@ -264,9 +255,6 @@ def ring_pairs(
         # Row by row: the repetitions of a wide ring would take much memory together.
         pairs = np.unique(np.concatenate([pairs, *keys]))
     return pairs // size, pairs % size
-
-
-# --- Compensation: Eq. 11 -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -407,9 +395,6 @@ def _compensate_hsi(
 
 def _saturation_value(rgb: npt.NDArray[np.uint8]) -> Floats:
     return np.stack([saturation(rgb), value(rgb)], axis=-1)
-
-
-# --- The stage ------------------------------------------------------------------------------------
 
 
 def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output]:
