@@ -394,6 +394,7 @@ def write_tables(
             for name in OF_DRIVES
         }
         worst: list[list[Any]] = []
+        err, drive, frame = map(TABLES["worst"].names.index, ("ERR", "drive", "frame"))
         for member in members:
             record = records[member.drive]
             own = dict(zip(TABLES["drives"].names, record.rows["drives"][0], strict=True))
@@ -401,15 +402,8 @@ def write_tables(
             files["drives"].add([[*own.values(), *(member.tags.get(tag) for tag in tags)]])
             for name in ("scores", "effects"):
                 files[name].add(record.rows[name])
-            worst = _worst([*worst, *map(list, record.rows["worst"])])
-        files["worst"].add(worst)
+            worst = [*worst, *map(list, record.rows["worst"])]
+            worst = sorted(worst, key=lambda row: (-row[err], row[drive], row[frame]))[:WORST]
+        files["worst"].add([rank, *row[1:]] for rank, row in enumerate(worst, 1))
         for file in files.values():
             file.finish()
-
-
-def _worst(rows: list[list[Any]]) -> list[list[Any]]:
-    """Keep the worst of some rows, and rank them."""
-    names = TABLES["worst"].names
-    err, drive, frame = (names.index(name) for name in ("ERR", "drive", "frame"))
-    ranked = sorted(rows, key=lambda row: (-row[err], row[drive], row[frame]))[:WORST]
-    return [[rank, *row[1:]] for rank, row in enumerate(ranked, 1)]

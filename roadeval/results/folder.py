@@ -36,14 +36,10 @@ def belonging(summary: Path) -> frozenset[str]:
     with suppress(OSError, ValueError, AttributeError):
         listed = read_json(read_bounded(summary)).get("files")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
-    plain = {name for name in names if _is_name(name)}
-    return frozenset(plain) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
-
-
-def _is_name(text: str) -> bool:
-    """Return whether a text can name a file of a folder: a summary may list anything."""
-    plain = Path(text).name == text != ".."
-    return plain and text.isprintable() and len(text.encode()) <= NAME_BYTES
+    # A summary may list anything: what cannot name a file of the folder is left out.
+    plain = [name for name in names if Path(name).name == name != ".." and name.isprintable()]
+    own = {name for name in plain if len(name.encode()) <= NAME_BYTES}
+    return frozenset(own) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
 
 
 CONTENT: Final = Content(SUMMARY, belonging)

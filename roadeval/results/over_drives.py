@@ -46,7 +46,10 @@ def summarise(
     for row in final_rows(folder / "effects.parquet"):
         found[row["base"], row["variant"], row["metric"]].append(row)
     rows = dict(found)
-    copies = _copies(drives)
+    # Drives whose log has the digest of another one's, and the first of these.
+    firsts = {row["log_digest"]: row["drive"] for row in reversed(drives) if row["log_digest"]}
+    known = {row["drive"]: firsts[row["log_digest"]] for row in drives if row["log_digest"]}
+    copies = {drive: first for drive, first in known.items() if drive != first}
     groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
     effects = _effects(rows, groups, settings)
     rates = _rates(folder)
@@ -75,13 +78,6 @@ def summarise(
         conditions=conditions,
         run=run,
     )
-
-
-def _copies(drives: Rows) -> dict[str, str]:
-    """Return drives whose log has the digest of another one's, and the first of these."""
-    firsts = {row["log_digest"]: row["drive"] for row in reversed(drives) if row["log_digest"]}
-    known = {row["drive"]: firsts[row["log_digest"]] for row in drives if row["log_digest"]}
-    return {drive: first for drive, first in known.items() if drive != first}
 
 
 def _of_copies(copies: Mapping[str, str]) -> Iterator[str]:
@@ -124,15 +120,12 @@ def _effects(
         first = rows[0]
         made = Effect(base, first["stage"], variant, first["stage"], True, {})
         each = found[base].setdefault(variant, made)
-        difference = _over(rows, groups, settings) if several else _within(rows[0], settings)
+        difference = _within(first, settings)
+        if several:
+            means, better = [_mean(row, groups) for row in rows], METRICS[metric].higher_is_better
+            difference = over_drives(means, settings.confidence, higher_is_better=better)
         found[base][variant] = replace(each, rates={**each.rates, metric: difference})
     return [each for own in found.values() for each in corrected([*own.values()])]
-
-
-def _over(rows: Rows, groups: Mapping[str, str], settings: EvaluationSettings) -> Difference:
-    means = [_mean(row, groups) for row in rows]
-    better = METRICS[rows[0]["metric"]].higher_is_better
-    return over_drives(means, settings.confidence, higher_is_better=better)
 
 
 def _within(row: Mapping[str, Any], settings: EvaluationSettings) -> Difference:

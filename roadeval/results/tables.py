@@ -309,8 +309,11 @@ def read_parquet(
             raise ResultsError(
                 f"{path}: damaged (column {column.name} is not of type {column.type}); {remedy}"
             )
-        elif column.name == "drive":
-            _check_drives(path, table["drive"])
+        elif column.name == "drive":  # files are called after drives
+            for drive in table["drive"].unique().to_pylist():
+                if drive is None or not is_plain(drive):
+                    what = f"a drive is called {str(drive)[:NAMED]!r}, which is no name"
+                    raise ResultsError(f"{path}: damaged ({what})")
     return table
 
 
@@ -347,15 +350,6 @@ def _checked_words(table: pa.Table) -> pa.Table:
             raise ValueError(f"column {field.name} has {letters:,} letters")
         table = table.set_column(place, field.name, table.column(place).cast(pa.string()))
     return table
-
-
-def _check_drives(path: Path, drives: pa.ChunkedArray) -> None:
-    """Refuse drives of a fleet whose names are more than names: files are called after them."""
-    for name in drives.unique().to_pylist():
-        if name is None or not is_plain(name):
-            raise ResultsError(
-                f"{path}: damaged (a drive is called {str(name)[:NAMED]!r}, which is no name)"
-            )
 
 
 def parquet_rows(table: pa.Table, name: str) -> Rows:

@@ -17,7 +17,6 @@ from roadeval.data import (
     Health,
     LayerKind,
     Rows,
-    VariantLayout,
 )
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
@@ -236,6 +235,7 @@ def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> Browse
     """Collect the frames of a result for a page, without their pictures."""
     frames = result.rows
     variants = frames.distinct("variant")
+    there = result.recording.variants if result.recording else ()
     return BrowsedFrames(
         frames=list(facts_of(result)),
         variants=variants,
@@ -243,12 +243,8 @@ def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> Browse
         strips=[],
         charts=over_frames(frames, [*SHORT]) if len(frames) else [],
         inspect=inspect if result.recording is not None else None,
-        masks=[f"{each.name}: {each.stages[-1]}" for each in _variants(result)],
+        masks=[f"{each.name}: {each.stages[-1]}" for each in there],
     )
-
-
-def _variants(result: DriveResult) -> Sequence[VariantLayout]:
-    return result.recording.variants if result.recording else ()
 
 
 def facts_of(result: DriveResult) -> Iterator[FrameFacts]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -51,7 +51,13 @@ def train(
         frames = {each.path: each.frames for each in drawn}
         warnings = [sentence for each in drawn for sentence in each.warnings]
         model = learning.from_drives(frames, config.pipelines(), settings, warnings)
-        model = replace(model, losses=tuple(_losses(drawn)))
+        losses = [
+            sentence if len(drawn) == 1 or sentence.startswith(start) else f"{start}{sentence}"
+            for each in drawn
+            for start in [f"{each.path.name}: "]
+            for sentence in each.losses
+        ]
+        model = replace(model, losses=tuple(losses))
         save_model(model, Path(output))
         return model
 
@@ -94,22 +100,8 @@ def _draw(
             losses.append(f"{missing} of {total} training frames could not be decoded")
         if losses and not frames:
             raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
-        warnings = [*_understood(selection, own), *streams[-1].oddities]
+        warnings, truth = [*streams[-1].oddities], selection.truth
+        if truth and own.labels.road and truth.meaning.by_itself:
+            read = f"which was read as {truth.meaning.words}"
+            warnings.insert(0, f"none of the given labels occurs in {truth.where}, {read}")
         return _Drawn(log.path, frames, [f"{log.name}: {each}" for each in warnings], losses)
-
-
-def _losses(drawn: Sequence[_Drawn]) -> Iterator[str]:
-    """Yield what was lost; of several drives, with the drive's name before it."""
-    for each in drawn:
-        for sentence in each.losses:
-            names_it = len(drawn) == 1 or sentence.startswith(f"{each.path.name}: ")
-            yield sentence if names_it else f"{each.path.name}: {sentence}"
-
-
-def _understood(selection: logs.Selection, own: RunConfig) -> Iterator[str]:
-    """Yield a warning for a mask that was recognised, although labels were given."""
-    if selection.truth and own.labels.road and selection.truth.meaning.by_itself:
-        yield (
-            f"none of the given labels occurs in {selection.truth.where}, which "
-            f"was read as {selection.truth.meaning.words}"
-        )
