@@ -12,18 +12,9 @@ from roadeval.evaluation.score.counts import (
     cut,
     edge_of,
     error_map,
+    final_stages,
     means,
     sum_up,
-)
-from roadeval.evaluation.score.effects import (
-    BASES,
-    CLAIMS,
-    TESTED,
-    Effect,
-    corrected,
-    drive_effects,
-    evidence,
-    final_stages,
 )
 from roadeval.evaluation.score.frame import (
     BlindPrior,
@@ -53,7 +44,17 @@ from roadeval.evaluation.score.rows import (
     windows,
     worst,
 )
-from roadeval.evaluation.score.scoreboard import DriveSums, Scoreboard
+from roadeval.evaluation.score.scoreboard import (
+    BASES,
+    CLAIMS,
+    TESTED,
+    DriveSums,
+    Effect,
+    Scoreboard,
+    corrected,
+    drive_effects,
+    evidence,
+)
 from roadeval.evaluation.score.thresholds import (
     BINS,
     CODES,

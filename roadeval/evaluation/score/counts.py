@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from roadeval.data import (
     ERRORS,
+    FINAL_STAGE,
     OUTCOMES,
     Counts,
     FrameResult,
@@ -330,3 +331,15 @@ def edge_of(labels: TruthBits) -> Bits:
     Neither the image's border nor an ignored pixel makes an edge.
     """
     return labels.road & grow(labels.other, square(1), labels)
+
+
+def final_stages(masks: Iterable[Name]) -> dict[str, str]:
+    """Return each variant's final stage: ``post``, or the last that it has.
+
+    ``masks`` are in the order in which the stages ran.
+    """
+    finals: dict[str, str] = {}
+    for variant, stage in masks:
+        if finals.get(variant) != FINAL_STAGE:
+            finals[variant] = stage
+    return finals

@@ -23,10 +23,10 @@ from roadeval.evaluation.score.counts import (
     Total,
     Window,
     cut,
+    final_stages,
     means,
     sum_up,
 )
-from roadeval.evaluation.score.effects import final_stages
 
 FILTER: Final = "filter"
 """The part of an error rate that the filter caused, beside the stages'."""
