@@ -102,7 +102,10 @@ class DriveSettings:
 
 @dataclass(frozen=True, slots=True)
 class RunConfig(LogConfig):
-    """Every option of a run; a `ConfigError` if the parts do not go together."""
+    """Every option of a run.
+
+    A `ConfigError` if the parts do not go together.
+    """
 
     preset: str = "paper"
     """The preset that it started from."""
