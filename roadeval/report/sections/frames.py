@@ -12,9 +12,8 @@ import numpy.typing as npt
 
 from roadeval.data import BASELINE, ERRORS
 from roadeval.data.arrays import FN, FP
-from roadeval.data.words import defined, listing, number, percent, points, timestamp
+from roadeval.data.words import defined, in_percent, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.score import FILTER
 from roadeval.report.blocks import (
     CELLS,
     Block,
@@ -35,6 +34,7 @@ from roadeval.report.chart import Chart
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.sections.common import rate_cells, variant_cell
+from roadeval.results.sentences import step_by_step
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -82,8 +82,8 @@ def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     stamp, *facts = sentences_about(frame)
     if frame.change is not None:
         facts = [f"The filter changes ERR by {points(frame.change)} pp."]
-    elif frame.notes:
-        facts[-len(frame.notes) :] = [" ".join(frame.notes)]
+    elif notes := _notes(frame):
+        facts[-len(notes) :] = [" ".join(notes)]
     sentences = [Text(sentence, "note") for sentence in (stamp, *facts)]
     rates = rates_of(frame, [*findings.finals])
     yield TwoColumns([Text(f"Frame {frame.frame}", "title"), *sentences], [rates], 0.55)
@@ -112,13 +112,14 @@ def sentences_about(frame: NotableFrame) -> Iterator[str]:
     """Yield when it was, which stage its error comes from, and its notes."""
     yield f"Stamp {timestamp(frame.stamp_ns)}"
     if len(frame.parts) > 1:
-        first, *rest = frame.parts
-        terms = [f"{first} {percent(frame.parts[first])}"]
-        terms += [f"{name} {points(frame.parts[name])}" for name in rest]
-        culprit = max(frame.parts, key=lambda part: frame.parts[part])
-        of = "the shadow filter" if culprit == FILTER else culprit
-        yield f"ERR of {frame.variant}: {', '.join(terms)} pp. Most of it comes from {of}."
-    yield from frame.notes
+        parts = {name: in_percent(part) for name, part in frame.parts.items()}
+        yield f"{frame.variant}: {step_by_step(parts)}."
+    yield from _notes(frame)
+
+
+def _notes(frame: NotableFrame) -> list[str]:
+    """Return a frame's notes, without that on the filter where the parts of its error have it."""
+    return [n for n in frame.notes if len(frame.parts) < 2 or not n.startswith("The filter ")]
 
 
 LARGE_ON_PAGE: Final = 640

@@ -33,8 +33,8 @@ def test_a_bad_frame_is_shown_with_its_rates_the_stage_at_fault_and_its_notes():
     assert said(blocks) == [
         "Frame 7",
         "Stamp 12.345 s",
-        "ERR of filtered: svm 10.00, filter +20.00, post +10.00 pp. "
-        "Most of it comes from the shadow filter.",
+        "filtered: svm without the filter gets 10.0 % wrong, the filter adds 20.0 pp, post adds "
+        "10.0 pp.",
         "A note. Another.",
     ]
     assert plain_rows(the(TwoColumns, blocks).right[0]) == [
@@ -45,10 +45,15 @@ def test_a_bad_frame_is_shown_with_its_rates_the_stage_at_fault_and_its_notes():
     assert the(Command, blocks).text == "open frame 7"
 
 
-def test_the_stage_at_fault_is_the_one_with_the_greatest_part():
-    parts = {"svm": 0.1, "filter": -0.2, "post": 0.11}
-    (blocks,) = shown(some_findings(worst=[a_frame(7, parts=parts)]))
-    assert said(blocks)[2].endswith("Most of it comes from post.")
+def test_what_the_filter_did_is_said_once():
+    parts = {"svm": 0.1, "filter": 0.2, "post": 0.1}
+    notes = ("The filter raised ERR by 21.0 pp on this frame.", "filtered finds nothing.")
+    (blocks,) = shown(some_findings(worst=[a_frame(7, parts=parts, notes=notes)]))
+    _, _, steps, *rest = said(blocks)
+    assert "the filter adds 20.0 pp" in steps
+    assert rest == ["filtered finds nothing."]
+    (blocks,) = shown(some_findings(worst=[a_frame(7, parts={"post": 0.4}, notes=notes)]))
+    assert said(blocks)[2:] == [" ".join(notes)]
 
 
 def test_helped_and_harmed_frames_are_told_apart():
