@@ -1,16 +1,23 @@
 """Results compared: from fleets' folders and from what single drives left."""
 
+import importlib
 import json
+import re
 import shutil
+import sys
 
 import pytest
 
-from roadeval import compare
+from roadeval import compare, replay, replay_fleet
 from roadeval.errors import RoadevalError
 from roadeval.jobs.results.compare import as_json
-from roadeval.jobs.results.result import asked
+from roadeval.jobs.results.result import asked, contents
+from roadeval.pipeline import stages
 from roadeval.results.fleet import FleetFolder, frames_path
+from tests.e2e.test_fleet import Here
+from tests.jobs.making import settings, write_log
 from tests.results.fleet.making import RUN, fleet_of
+from tests.results.making import facts_of
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +102,43 @@ def test_settings_that_differ_are_told(fleets, tmp_path):
     (warning,) = (each for each in found.warnings if "every" in each)
     assert "`frames.every` 1 and 2" in warning
     assert "preset" not in warning
+
+
+def test_code_networks_masks_and_truth_that_are_others_are_named():
+    def facts(digest):
+        return facts_of(
+            methods={
+                "grey": {"road": {"stage": "greyroad:road", "code": {"digest": 2 * digest}}},
+                "odd": {"road": "text"},
+            },
+            settings={"net1": {"chain": ["net", "post"], "net": {"sha256": digest}}},
+            masks={"truth": {"sha256": digest}, "mine": {"sha256": digest}},
+        )
+
+    assert contents(facts("0123456789")) == {
+        "truth": "01234567",
+        "code of grey (greyroad:road)": "01234567",
+        "network net1": "01234567",
+        "masks mine": "01234567",
+    }
+
+
+def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    drive = write_log(tmp_path / "drive.mcap")
+    for name, least in (("base", 100), ("new", 120)):
+        stages._somebodys.cache_clear()
+        sys.modules.pop("greyroad", None)
+        code = f"def road(image):\n    return image.mean(axis=2) > {least}\n"
+        (tmp_path / "greyroad.py").write_text(code)
+        importlib.invalidate_caches()
+        config = settings(variants={"grey": {"chain": ["greyroad:road", "post"]}})
+        replay(drive, config, save=tmp_path / f"{name}.rrd", reports=tmp_path / name)
+        replay_fleet([drive], tmp_path / f"fleet_{name}", config, executor=Here())
+    for base, new in (("base.rrd", "new"), ("fleet_base", "fleet_new")):
+        (changed,) = compare([tmp_path / base, tmp_path / new]).content["changed"]
+        said = r"Changed settings: code of grey \(greyroad:road\) \w{8} to \w{8}\."
+        assert re.fullmatch(said, changed)
 
 
 def test_settings_that_change_no_number_are_left_aside():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 
     from roadeval.recording import Recording
 
+OF_ALL: Final = ("code of ", "network ")
+"""What `contents` calls files that all drives of a fleet share."""
 NO_NUMBER: Final = ("output", "run", "fleet")
 """Tables of a run's settings that change no number."""
 
@@ -344,12 +347,18 @@ def _own(result: DriveResult, name: str) -> pd.DataFrame:
 def _alone(result: DriveResult) -> Part:
     return Part(
         *(result.name, result.name, result.facts.log_digest),
-        *(len(result.rows) > 0, asked(result.facts.run), result.table),
+        *(len(result.rows) > 0, asked(result.facts.run) | contents(result.facts), result.table),
     )
 
 
 def _members(fleet: FleetFolder) -> Iterator[Part]:
     settings = asked(fleet.facts.run)
+    scored = next((drive for drive, row in fleet.drives.items() if row["evaluated"]), None)
+    if scored is not None:
+        with suppress(RoadevalError):  # the folders of its drives may be gone
+            found = contents(ResultsFolder(fleet.results(scored)).facts)
+            # Masks and truth of one drive say nothing of the others'.
+            settings |= {name: each for name, each in found.items() if name.startswith(OF_ALL)}
     for member in fleet.facts.drives:
         row = fleet.drives[member.drive]
         yield Part(
@@ -386,6 +395,28 @@ def asked(run: Mapping[str, Any]) -> dict[str, Any]:
         nested = own.items() if isinstance(own, dict) else [("", own)]
         found |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
     return found
+
+
+def contents(facts: Facts) -> dict[str, str]:
+    """Return the digests of what a run took from files, by names as ``masks mine``."""
+    found = {}
+    for variant, stages in facts.methods.items():
+        for about in filter(lambda each: isinstance(each, Mapping), stages.values()):
+            name = f"code of {variant} ({about.get('stage')})"
+            found[name] = _digest(about, "code", "digest")
+    for variant in facts.settings:
+        found[f"network {variant}"] = _digest(facts.settings, variant, "net", "sha256")
+    for name in facts.masks:
+        shown = name if name == "truth" else f"masks {name}"
+        found[shown] = _digest(facts.masks, name, "sha256")
+    return {name: digest for name, digest in found.items() if digest}
+
+
+def _digest(value: Any, *keys: str) -> str:
+    """Return the first letters of the digest that lies at some keys; empty where none does."""
+    for key in keys:
+        value = value.get(key) if isinstance(value, Mapping) else None
+    return value[:8] if isinstance(value, str) else ""
 
 
 def _recording(path: Path) -> Recording:
