@@ -159,12 +159,6 @@ class Judgement:
     why: str = ""
     """The reason then."""
 
-    @classmethod
-    def without(cls, condition: Condition, result: str, error: ConditionError) -> Judgement:
-        """Return what is known of a condition that cannot be judged."""
-        none = math.nan
-        return cls(condition, result, 0, none, none, none, None, None, None, str(error))
-
 
 def judge(
     comparison: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings

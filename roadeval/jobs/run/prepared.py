@@ -42,9 +42,8 @@ KEPT: Final = 5
 """Tracebacks that are kept, those of the first errors that say different things; and the frames
 that are named of those with one error."""
 HOPELESS: Final = 10
-"""A run ends where so many frames beside the training are the first ones, and each fails."""
 TRIED: Final = (Role.EVALUATED, Role.UNLABELLED)
-"""What such frames are."""
+"""A run ends where the first so many frames of these roles fail."""
 _NUMBER: Final = re.compile(r"(?<![:\d])\d+")
 """A number that is not the line of a file."""
 
@@ -60,24 +59,20 @@ class Failure:
     """The stage, and why it failed."""
     traceback: str
 
-    @property
-    def error(self) -> str:
-        """The same for all frames on which the variant fails in the same way."""
-        return _NUMBER.sub("", f"{self.variant}: {self.reason}")
-
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """The frames on which a stage has failed so far, in their order."""
+    """The frames on which a stage has failed so far, in their order, by variant and error."""
 
-    by_error: dict[str, list[Failure]] = field(default_factory=dict)
+    by_error: dict[tuple[str, str], list[Failure]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return sum(map(len, self.by_error.values()))
 
     def add(self, failure: Failure) -> None:
         """Note a frame; its traceback is kept where it is among the first that differ."""
-        own = self.by_error.setdefault(failure.error, [])
+        error = failure.variant, _NUMBER.sub("", failure.reason)
+        own = self.by_error.setdefault(error, [])
         kept = not own and len(self.by_error) <= KEPT
         own.append(failure if kept else replace(failure, traceback=""))
 
@@ -85,16 +80,12 @@ class Failures:
         """Return where in their code stages failed, for the first few errors."""
         return tuple(own[0].traceback for own in self.by_error.values() if own[0].traceback)
 
-    def sentences(self) -> tuple[str, ...]:
-        """Return a sentence for each error: the frames, the variant, the stage and why."""
-        return tuple(map(_sentence, self.by_error.values()))
-
-
-def _sentence(failures: Sequence[Failure]) -> str:
-    first, count = failures[0], len(failures)
-    frames = first_of([str(each.frame) for each in failures], KEPT)
-    where = f"{count} frames ({frames})" if count > 1 else f"frame {frames}"
-    return f"{where}: variant {first.variant}: {first.reason}"
+    def sentences(self) -> Iterator[str]:
+        """Yield a sentence for each error: the frames, the variant, the stage and why."""
+        for own in self.by_error.values():
+            frames = first_of([str(each.frame) for each in own], KEPT)
+            where = f"{len(own)} frames ({frames})" if len(own) > 1 else f"frame {frames}"
+            yield f"{where}: variant {own[0].variant}: {own[0].reason}"
 
 
 SPARSE: Final = 5
