@@ -98,7 +98,7 @@ def test_regions_have_titles_in_the_reports_order():
         "band_2": "image rows 6\N{EN DASH}7, the bottom",
         "wet_road": "wet road",
     }
-    assert regions.titles(["band_0"])["band_0"].startswith("image rows, band 0")
+    assert regions.titles(["band_0"])["band_0"].startswith("image rows, part 1 of 1")
 
 
 def test_the_regions_that_make_up_a_frame_do_so_family_by_family():

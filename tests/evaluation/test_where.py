@@ -181,7 +181,7 @@ def test_bands_keep_their_place_where_one_is_left_out():
     run = a_run([10] * 20, [20] * 20, regions=regions(rows))
     found = compare([run, run], SETTINGS)
     assert [row.title for row in found.regions] == [
-        *("image rows, band 0, the top", "image rows, band 2, the bottom")
+        *("image rows, part 1 of 3, the top", "image rows, part 3 of 3, the bottom")
     ]
 
 

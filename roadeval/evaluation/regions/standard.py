@@ -76,9 +76,8 @@ def _titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
     titles = {}
     for place, name in enumerate(bands):
         first, after = (-(-height * edge // len(bands)) for edge in (place, place + 1))
-        rows = (
-            f"image rows {first}\N{EN DASH}{after - 1}" if height else f"image rows, band {place}"
-        )
+        part = f"image rows, part {place + 1} of {len(bands)}"
+        rows = f"image rows {first}\N{EN DASH}{after - 1}" if height else part
         titles[name] = rows + {0: ", the top", len(bands) - 1: ", the bottom"}.get(place, "")
     return titles
 
