@@ -18,10 +18,11 @@ def shown(*changes, judgements=(), **more):
     return out.file.getvalue()
 
 
-def test_the_screen_begins_with_the_changed_settings_and_the_verdict():
+def test_the_screen_begins_with_the_verdict_and_the_changed_settings():
     changed = (Note(Kind.SETTINGS, "base", "new", settings={"preset": ("paper", "gated")}),)
     told = shown(a_change(SURE), changed_settings=changed)
-    assert told.startswith("Changed settings: preset paper to gated.\n\nOn these 12 frames new ")
+    assert told.startswith("On these 12 frames new ")
+    assert told.split("\n\n")[1] == "Changed settings: preset paper to gated."
     assert "+1.00 to +2.00 *" in told
 
 
