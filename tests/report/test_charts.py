@@ -137,7 +137,7 @@ def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
     assert [*worse.points()] == [(7, pytest.approx(10))]
     assert [*better.points()] == [(9, pytest.approx(-20))]
     assert (worse.look.colour, better.look.colour) == (UNFILTERED, FILTERED)
-    assert (worse.name, better.name) == ("filtered worse", "filtered better")
+    assert (worse.name, better.name) == ("unfiltered better", "filtered better")
     assert (chart.level.name, chart.level.value) == ("mean", -5)
 
 

@@ -281,11 +281,8 @@ def difference(
         f"ERR of {treated} minus {control}",
         ChartKind.BARS,
         [
-            thinned(series(f"{treated} {word}", drawn[name], frames, np.where(own, change, np.nan)))
-            for word, name, own in (
-                ("worse", control, change > 0),
-                ("better", treated, change <= 0),
-            )
+            thinned(series(f"{name} better", drawn[name], frames, np.where(own, change, np.nan)))
+            for name, own in ((control, change > 0), (treated, change <= 0))
         ],
         unit="pp",
         level=Level(
