@@ -371,7 +371,7 @@ class Damage:
         if self.lost:
             listed = ", ".join(f"{count} of {topic}" for topic, count in self.lost)
             text += f"; lost: {listed}"
-        return text if self.lossy else f"{text}; no message is lost"
+        return text if self.lossy else f"{text}; no message is lost by that"
 
 
 def damage_of(container: Container) -> tuple[Damage, ...]:
