@@ -21,7 +21,7 @@ from roadeval.data import FrameResult, Packed
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import prepare, process
-from roadeval.recording import RecordRule, png, recorder_for
+from roadeval.recording import RecordRule, codecs, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
 from roadeval.runtime.threads import ordered
@@ -107,7 +107,7 @@ def library_codecs() -> Iterator[None]:
     Both with the settings that make their smallest files of masks and noisy maps. A floor of these
     stays what it is when the recording's encoder becomes faster.
     """
-    own = png.crc32, png.compress, png.encode_levels
+    own = codecs.crc32, codecs.compress, codecs.encode_levels
 
     def by_zlib(lines: np.ndarray) -> bytes:
         deflate = zlib.compressobj(1, zlib.DEFLATED, strategy=zlib.Z_RLE)
@@ -117,11 +117,11 @@ def library_codecs() -> Iterator[None]:
         channels = levels if levels.ndim == 2 else cv2.cvtColor(levels, cv2.COLOR_RGB2BGR)
         return cv2.imencode(".png", channels, NOISY)[1].tobytes()
 
-    png.crc32, png.compress, png.encode_levels = zlib.crc32, by_zlib, by_opencv
+    codecs.crc32, codecs.compress, codecs.encode_levels = zlib.crc32, by_zlib, by_opencv
     try:
         yield
     finally:
-        png.crc32, png.compress, png.encode_levels = own
+        codecs.crc32, codecs.compress, codecs.encode_levels = own
 
 
 def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[None]) -> Cost:
@@ -158,7 +158,7 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
             recorder.finish({})
             cost = meter.read()
             results.append(csv_lines(run.key, sum_rows(run.board.sums())))
-            results.finish(summary.of(run), "")
+            results.finish(summary.of(run, [], results.tables), "")
         return cost
 
 
