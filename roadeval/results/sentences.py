@@ -35,6 +35,8 @@ ROUNDING: Final = 5e-4
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are stated together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
+_OF_FILTER: Final = "The filter "
+"""Begins the note on what the filter did to a frame."""
 BLIND: Final = f"{BASELINE}, which never looks at the image"
 
 
@@ -416,6 +418,11 @@ def of_seeds(seeds: Mapping[str, Any]) -> str:
 # --- A frame --------------------------------------------------------------------------------------
 
 
+def without_filter(notes: Iterable[str]) -> list[str]:
+    """Return a frame's notes without that on the filter, where its part of ERR is shown."""
+    return [note for note in notes if not note.startswith(_OF_FILTER)]
+
+
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
     """Return the notes on a frame from its tallies; none on a frame that is not evaluated."""
     finals = {tally.variant: tally.rates for tally in tallies}
@@ -439,7 +446,7 @@ def notes(
         change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
         if abs(change) >= NOTEWORTHY:
             verb = "raised" if change > 0 else "lowered"
-            yield f"The filter {verb} ERR by {percent(abs(change), 1)} pp on this frame."
+            yield f"{_OF_FILTER}{verb} ERR by {percent(abs(change), 1)} pp on this frame."
     for name, rates in finals.items():
         if rates["FNR"] >= FAILED_FNR:
             yield f"{name} finds {percent(1 - rates['FNR'], 1)} % of the road."

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from roadeval.cli.screens.tables import ascii_of, show_table
 from roadeval.data.words import percent, points
 from roadeval.report.blocks import Table
+from roadeval.results.sentences import without_filter
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -57,8 +58,7 @@ def _light(frame: WorstFrame) -> tuple[str, ...]:
 def _why(frame: WorstFrame) -> str:
     (first, value), *rest = frame.parts.items()
     terms = [f"{first} {percent(value, 1)}", *(f"{name} {points(part, 1)}" for name, part in rest)]
+    notes = without_filter(frame.notes) if rest else frame.notes
     # The title names the variant.
-    notes = [note.removeprefix(f"{frame.variant} ") for note in frame.notes]
-    if len(frame.parts) > 1:  # they say what the filter did
-        notes = [note for note in notes if not note.startswith("The filter ")]
+    notes = [note.removeprefix(f"{frame.variant} ") for note in notes]
     return " ".join([f"{ascii_of(', '.join(terms))} pp.", *(n[:1].upper() + n[1:] for n in notes)])

@@ -346,6 +346,7 @@ class Damage:
 
     path: Path
     offset: int
+    """The byte where it begins."""
     reason: str
     lossy: bool = True
     """Whether messages are, or may be, lost or wrong by it."""

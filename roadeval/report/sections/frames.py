@@ -34,7 +34,7 @@ from roadeval.report.chart import Chart
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.sections.common import rate_cells, variant_cell
-from roadeval.results.sentences import step_by_step
+from roadeval.results.sentences import step_by_step, without_filter
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -119,7 +119,7 @@ def sentences_about(frame: NotableFrame) -> Iterator[str]:
 
 def _notes(frame: NotableFrame) -> list[str]:
     """Return a frame's notes, without that on the filter where the parts of its error have it."""
-    return [n for n in frame.notes if len(frame.parts) < 2 or not n.startswith("The filter ")]
+    return without_filter(frame.notes) if len(frame.parts) > 1 else [*frame.notes]
 
 
 LARGE_ON_PAGE: Final = 640
