@@ -1,12 +1,15 @@
 """The command ``info``: what is in a log, and what replay would pick of it and why."""
 
+import io
 import json
 
 import cv2
 import numpy as np
 import pytest
+from rich.console import Console
 
 from roadeval.cli.app import main
+from roadeval.cli.screens import info as screen
 from roadeval.logs import LogWriter
 from tests.fixtures.make import make
 
@@ -66,11 +69,15 @@ def test_json_holds_the_same(write, capsys):
     assert "`topics.image`" in found["problem"]
 
 
-def test_numbers_have_room_beside_long_names_and_types(write, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    main(["info", write({f"/camera/{'front_' * 8}raw/compressed": None})])
-    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("/camera/")]
-    assert row.split()[-4:] == ["8x6", "4", "1", "Hz"]
+def test_numbers_have_room_beside_long_names_and_types():
+    topic = dict.fromkeys(("problem", "gaps", "format"), "") | {"encoding": "cdr", "count": 3000}
+    topic |= {"name": "/camera/front_left/image_raw", "schema": "vendor_msgs/msg/RectifiedImage"}
+    topic |= {"size": (1920, 1200), "rate_hz": 19.98}
+    found = dict.fromkeys(("path", "oddities", "problem", "picks"), "") | {"topics": [topic]}
+    out = Console(file=io.StringIO(), width=80)
+    screen.show(found | {"start_ns": 0, "end_ns": 1, "bytes": 1, "verified": True}, out)
+    (row,) = [line for line in out.file.getvalue().splitlines() if line.startswith("/camera/")]
+    assert row.split()[-4:] == ["1920x1200", "3000", "19.98", "Hz"]
 
 
 def test_damage_is_told_and_has_its_exit_code(tmp_path, capsys):

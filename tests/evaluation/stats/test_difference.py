@@ -27,6 +27,15 @@ def of(differences: np.ndarray, settings: EvaluationSettings = SETTINGS) -> Diff
     return within_drive(base + differences, base, settings)
 
 
+def test_frames_are_counted_as_worse_and_better_by_the_rate_s_direction():
+    base = np.full(12, 0.5)
+    rates = base + np.array([0.1] * 7 + [-0.1] * 3 + [0.0, math.nan])
+    lower = within_drive(rates, base, SETTINGS)
+    assert (lower.worse, lower.better, lower.equal, lower.units) == (7, 3, 1, 11)
+    higher = within_drive(rates, base, SETTINGS, higher_is_better=True)
+    assert (higher.worse, higher.better, higher.equal) == (3, 7, 1)
+
+
 def test_the_mean_is_that_of_the_frames_that_have_a_difference() -> None:
     found = within_drive(np.array([0.25, np.nan, 0.75]), np.array([0.0, 0.5, 0.0]), SETTINGS)
     assert (found.mean, found.units) == (0.5, 2)
