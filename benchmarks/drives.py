@@ -24,15 +24,15 @@ PERIOD_NS: Final = 100_000_000
 JPEG_QUALITY: Final = 90
 FORMS: Final = ("protobuf jpeg", "protobuf png", "ros2 jpeg", "ros2 raw")
 
-_HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
-_NESTED = (
-    f"\n{'=' * 80}\nMSG: std_msgs/Header\n{_HEADER}"
+HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
+NESTED = (
+    f"\n{'=' * 80}\nMSG: std_msgs/Header\n{HEADER}"
     f"\n{'=' * 80}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 )
-_COMPRESSED = f"std_msgs/Header header\nstring format\nuint8[] data\n{_NESTED}"
+COMPRESSED = f"std_msgs/Header header\nstring format\nuint8[] data\n{NESTED}"
 _RAW = (
     "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
-    f"uint8 is_bigendian\nuint32 step\nuint8[] data\n{_NESTED}"
+    f"uint8 is_bigendian\nuint32 step\nuint8[] data\n{NESTED}"
 )
 
 
@@ -61,7 +61,7 @@ def resized(frame: Frame, width: int, height: int) -> tuple[np.ndarray, np.ndarr
 
 def write(path: Path, frames: list[Frame], size: tuple[int, int], count: int | None = None) -> Path:
     """Write a log of these frames at a size, again and again until there are ``count``."""
-    pictures = [(_jpeg(image), truth) for image, truth in (resized(f, *size) for f in frames)]
+    pictures = [(jpeg(image), truth) for image, truth in (resized(f, *size) for f in frames)]
     with LogWriter(path) as log:
         for stamp, (jpeg, truth) in _stamped(pictures, count):
             log.image("/camera", stamp, jpeg, "jpeg")
@@ -77,7 +77,7 @@ def write_form(path: Path, frames: list[Frame], size: tuple[int, int], form: str
         with LogWriter(path) as log:
             for stamp, image in _stamped(images):
                 if encoding == "jpeg":
-                    log.image("/camera", stamp, _jpeg(image), "jpeg")
+                    log.image("/camera", stamp, jpeg(image), "jpeg")
                 else:
                     log.mask("/camera", stamp, image)
     else:
@@ -89,10 +89,10 @@ def _write_ros2(path: Path, images: list[np.ndarray], encoding: str) -> None:
     raw = encoding == "raw"
     with path.open("wb") as file:
         writer = Writer(file)
-        name, text = ("Image", _RAW) if raw else ("CompressedImage", _COMPRESSED)
+        name, text = ("Image", _RAW) if raw else ("CompressedImage", COMPRESSED)
         schema = writer.register_msgdef(f"sensor_msgs/msg/{name}", text)
         for stamp, image in _stamped(images):
-            message = _ros2_raw(image) if raw else {"format": "jpeg", "data": _jpeg(image)}
+            message = _ros2_raw(image) if raw else {"format": "jpeg", "data": jpeg(image)}
             seconds, rest = divmod(stamp, 1_000_000_000)
             header = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": "camera"}
             writer.write_message("/camera", schema, {"header": header, **message}, stamp, stamp)
@@ -116,6 +116,6 @@ def _stamped(pictures: list[Any], count: int | None = None) -> Iterator[tuple[in
     return ((PERIOD_NS * number, picture) for number, picture in enumerate(many, 1))
 
 
-def _jpeg(image: np.ndarray) -> bytes:
+def jpeg(image: np.ndarray) -> bytes:
     bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
