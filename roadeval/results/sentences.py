@@ -19,7 +19,7 @@ from roadeval.data.words import (
     percent,
     plain_points,
 )
-from roadeval.evaluation.score import TESTED, Effect, final_stages
+from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
 from roadeval.evaluation.stats import Difference
 
@@ -243,8 +243,8 @@ def verdict(
 ) -> str:
     """Return the verdict on a drive or a fleet, at most four sentences.
 
-    Which variant is best, and whether it beats the baseline; what the filter changes; and what
-    costs the filtered variant most.
+    Which variant is best, and whether it beats the baseline; what the filter changes; and which
+    step adds most to the filtered variant's errors.
 
     Parameters
     ----------
@@ -328,7 +328,11 @@ def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:
 
 
 def _costs_most(totals: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return which part of the filtered variant's error rate is largest; empty without a pair."""
+    """Return how the filtered variant's error rate comes about, and which step adds most to it.
+
+    The first mask's own error is what the steps after it start from, and no step's addition.
+    Empty without an unfiltered variant of the same stages, or where a rate is undefined.
+    """
     own, without = totals.get(FILTERED, {}), totals.get(UNFILTERED, {})
     *_, before, last = [None, *own] if len(own) > 1 else [None, None]
     if before is None or last is None or before not in without:
@@ -336,11 +340,14 @@ def _costs_most(totals: Mapping[str, Mapping[str, Any]]) -> str:
     plain, filtered, final = (
         in_percent(each[TESTED]) for each in (without[before], own[before], own[last])
     )
-    if math.isnan(final) or not final:
+    if math.isnan(plain + filtered + final) or not final:
         return ""
-    costs = {before: plain, "filter": filtered - plain, last: final - filtered}
-    most = max(costs, key=costs.__getitem__).replace("filter", "the filter")
-    return f"Step by step: {step_by_step(costs)}; {most} costs most."
+    parts = {before: plain, FILTER: filtered - plain, last: final - filtered}
+    most = max((FILTER, last), key=parts.__getitem__)
+    costs = f"{'the ' * (most == FILTER)}{most} costs most"
+    if round(parts[most], 1) <= 0:
+        costs = f"no later step adds errors, so {before} costs most"
+    return f"Step by step: {step_by_step(parts)}; {costs}."
 
 
 def step_by_step(parts: Mapping[str, float]) -> str:
@@ -349,16 +356,15 @@ def step_by_step(parts: Mapping[str, float]) -> str:
     ``parts`` are in percent: the error of a first mask, and what each further step adds.
 
     >>> step_by_step({"svm": 15.0, "filter": -1.2, "post": 0.6})
-    'svm without the filter gets 15.0 % wrong, the filter removes 1.2 pp, post adds 0.6 pp'
+    'svm without the filter leaves 15.0 % wrong, the filter removes 1.2 pp, post adds 0.6 pp'
     """
     (first, error), *rest = parts.items()
-    without = " without the filter" if "filter" in parts else ""
+    without = " without the filter" if FILTER in parts else ""
     steps = (
-        f"{'the ' * (name == 'filter')}{name} {'adds' if cost >= 0 else 'removes'} "
-        f"{abs(cost):.1f} pp"
+        f"{'the ' * (name == FILTER)}{name} {'adds' if cost >= 0 else 'removes'} {abs(cost):.1f} pp"
         for name, cost in rest
     )
-    return ", ".join([f"{first}{without} gets {error:.1f} % wrong", *steps])
+    return ", ".join([f"{first}{without} leaves {error:.1f} % wrong", *steps])
 
 
 # --- Other seeds of the training -----------------------------------------------------------------

@@ -187,7 +187,7 @@ CASES = {
         "Best here is unfiltered: 6.2 % of the pixels are wrong. No frame with truth was trained "
         "on, so blind is unknown. On these 91 frames the filter raises ERR of post from 6.2 to "
         "15.4 % (lower in 2 of 9 windows); on frames like these by 7.1 to 11.0 pp. Step by step: "
-        "svm without the filter gets 8.0 % wrong, the filter adds 10.0 pp, post removes 2.6 pp; "
+        "svm without the filter leaves 8.0 % wrong, the filter adds 10.0 pp, post removes 2.6 pp; "
         "the filter costs most.",
     ),
     "one that does not beat blind": (
@@ -283,6 +283,46 @@ def test_the_verdict_says_the_best_its_doubt_the_filter_and_what_costs_most(case
     totals, effects, told = CASES[case]
     claims = {"filter_ERR": {"held": 2, "windows": 9}} if case == "the filter costs most" else {}
     assert verdict(totals, effects, SETTINGS, claims) == told
+
+
+@pytest.mark.parametrize(
+    ("plain", "filtered", "final", "costs"),
+    [
+        pytest.param(0.132, 0.245, 0.154, "the filter costs most", id="the filter harms most"),
+        pytest.param(0.132, 0.112, 0.145, "post costs most", id="post harms, the filter helps"),
+        pytest.param(0.132, 0.142, 0.162, "post costs most", id="both harm, post more"),
+        pytest.param(0.132, 0.162, 0.172, "the filter costs most", id="both harm, the filter more"),
+        pytest.param(
+            0.15, 0.138, 0.028, "no later step adds errors, so svm costs most", id="both help"
+        ),
+        pytest.param(
+            0.15, 0.1503, 0.028, "no later step adds errors, so svm costs most", id="rounded to 0"
+        ),
+    ],
+)
+def test_what_costs_most_is_the_step_that_adds_most(plain, filtered, final, costs):
+    totals = {
+        "filtered": {"svm": total(filtered), "post": total(final)},
+        "unfiltered": {"svm": total(plain), "post": total(plain)},
+    }
+    assert verdict(totals, [], SETTINGS).endswith(f" pp; {costs}.")
+
+
+@pytest.mark.parametrize(
+    "totals",
+    [
+        pytest.param({"robust": FILTER_CHAIN["unfiltered"]}, id="one variant"),
+        pytest.param({"filtered": FILTER_CHAIN["filtered"]}, id="the filter alone"),
+        pytest.param(drive(net=0.054, filtered=0.1, unfiltered=0.2), id="networks, of one stage"),
+        pytest.param(
+            FILTER_CHAIN | {"unfiltered": {"svm": total(math.nan), "post": total(0.062)}},
+            id="an undefined rate",
+        ),
+        pytest.param({}, id="no truth"),
+    ],
+)
+def test_without_a_pair_of_stages_nothing_is_said_of_steps(totals):
+    assert "Step by step" not in verdict(totals, [], SETTINGS)
 
 
 def test_where_nothing_was_scored_the_verdict_says_so():

@@ -33,7 +33,7 @@ def test_a_bad_frame_is_shown_with_its_rates_the_stage_at_fault_and_its_notes():
     assert said(blocks) == [
         "Frame 7",
         "Stamp 12.345 s",
-        "filtered: svm without the filter gets 10.0 % wrong, the filter adds 20.0 pp, post adds "
+        "filtered: svm without the filter leaves 10.0 % wrong, the filter adds 20.0 pp, post adds "
         "10.0 pp.",
         "A note. Another.",
     ]
