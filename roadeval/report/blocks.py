@@ -370,6 +370,8 @@ class LongTable(Block):
 
 @dataclass(frozen=True, slots=True)
 class LinkList(Block):
-    """Titles with the addresses that they lead to, which a server made."""
+    """Titles with the addresses that they lead to; paper has none."""
 
     links: Sequence[tuple[str, str]]
+    command: str = ""
+    """What to type next, after the links."""

@@ -135,6 +135,21 @@ def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(dri
     assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(first)
 
 
+def test_the_link_below_the_verdict_leads_to_the_worst_frame(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    tab.keyboard.press("ArrowRight")
+    link = tab.locator("#summary .links a")
+    link.click()
+    rows = pd.read_csv(demo.reports / "frames.csv").query(
+        "variant == 'filtered' and stage == 'post'"
+    )
+    worst = int(rows.loc[rows["ERR"].idxmax(), "frame"])
+    assert frame(tab) == worst
+    assert tab.locator(".strip:visible").get_attribute("data-frame") == str(worst)
+    command = tab.locator("#summary .links code").inner_text()
+    assert command == f"roadeval inspect drive.rrd --frame {worst}"
+
+
 def test_a_frame_without_pictures_offers_the_nearest_and_its_note(drive, watched):
     tab = watched(drive.as_uri()).tab
     rows = tab.locator(".frames tbody tr")
@@ -517,6 +532,10 @@ def test_a_fleets_page_has_every_drive_and_finds_one(fleet, watched):
     assert rows.count() == len(told["drives"]) == 24
     seen.tab.fill("#all-drives input", "drive_0003")
     assert len(shown(seen.tab, "#all-drives tbody tr")) == 1
+    link = seen.tab.locator("#summary .links a")
+    assert re.fullmatch(r"Worst frame: \w+, frame \d+ \(ERR \d+\.\d %\)", link.inner_text())
+    place = seen.tab.locator(link.get_attribute("href"))
+    assert place.locator("h2").inner_text() == "The worst frames over all drives"
     pictures = seen.tab.locator(".grid img")
     assert pictures.count() > 5
     pictures.first.scroll_into_view_if_needed()

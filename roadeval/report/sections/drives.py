@@ -325,6 +325,8 @@ def _legend(rows: Sequence[Part], left_out: int) -> str:
     return legend
 
 
+WORST_AT: Final = "#the-worst-frames-over-all-drives"
+"""Address of the worst frames on the page of a fleet: their heading."""
 ACROSS = 4
 LACKING = 12
 """Frames without a picture that are named."""

@@ -16,6 +16,7 @@ from roadeval.report.blocks import (
     Cell,
     Heading,
     ImageGrid,
+    LinkList,
     Table,
     TableOfContents,
     Text,
@@ -24,6 +25,7 @@ from roadeval.report.blocks import (
 from roadeval.report.findings import Findings, FleetFindings, worse_than_baseline
 from roadeval.report.images import jpeg
 from roadeval.report.sections.common import variant_cell
+from roadeval.report.sections.drives import WORST_AT
 from roadeval.results.facts import FleetFacts, FrameAccount, OverDrives
 from roadeval.results.rows import ACCOUNT
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
@@ -61,6 +63,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     yield Text(findings.facts.verdict, "verdict")
     if "probably" in findings.facts.verdict:
         yield Text("Probably: by chance alone, one drive in ten would show as much.", "note")
+    yield from _next(findings)
     if findings.totals:
         yield rates_table(findings)
         if seeds := findings.facts.seeds:
@@ -78,9 +81,26 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     yield _beware(list(warnings(findings)))
 
 
+def _next(findings: Findings) -> Iterator[LinkList]:
+    """Yield what to look at first: the worst frame, and the command that opens it."""
+    if findings.worst:
+        frame = findings.worst[0]
+        wrong = percent(frame.rates[frame.variant]["ERR"], 1)
+        title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
+        command = findings.commands.inspect(frame.frame) if findings.commands else ""
+        links = [(title, f"#frame-{frame.frame}")]
+        yield LinkList(links, command if findings.viewable else "")
+
+
 def _of_drives(findings: FleetFindings) -> Iterator[Block]:
     facts = findings.facts
     yield Text(facts.verdict, "verdict")
+    if findings.worst:
+        frame = findings.worst[0]
+        where = f"{findings.names[frame.drive]}, frame {frame.frame}"
+        title = f"Worst frame: {where} (ERR {percent(frame.rates['ERR'], 1)} %)"
+        command = findings.inspect(frame.rank) if findings.inspect else ""
+        yield LinkList([(title, WORST_AT)], command)
     if note := _how_sure_over_drives(facts):
         yield Text(note, "note")
     if facts.rates:
