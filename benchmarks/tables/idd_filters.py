@@ -25,7 +25,7 @@ FLAT: Final = 0.03
 ODDS: Final = (0.1, 1.0)
 """Factors of the odds, see `roadeval.pipeline.beyond.shade_candidates.GatedSettings`."""
 CHAINS: Final[Mapping[str, Mapping[str, Any]]] = {
-    "colours": {"preset": "gated"},
+    "colours": {"preset": "gated", "chain": idd.FILTER_ALONE},
     "robust": {
         "preset": "robust",
         "chain": ("gated", "exposure", "trees", "post"),

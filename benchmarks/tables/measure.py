@@ -9,7 +9,7 @@ from typing import Any, Final
 import roadeval
 from benchmarks.tables.drives import COMMA10K, DRIVES, Drive, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST
-from roadeval.data import FINAL_STAGE
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 
 SEEDS: Final = 5
 RATES: Final = ("ERR", "FPR", "FNR")
@@ -126,6 +126,15 @@ def kept(summary: Mapping[str, Any]) -> dict[str, Any]:
         "claims": summary["claims"],
         "truth_flicker": rounded(summary["beyond"][next(iter(variants))]["truth_flicker"]),
     }
+    perfect = summary.get("oracles", {}).get(FILTERED, {}).get("shadow", {})
+    if perfect:
+        found["perfect_shadow"] = {
+            "perfect": rounded(perfect[FINAL_STAGE]["ERR"]),
+            **{
+                name: rounded(summary["totals"][name][FINAL_STAGE]["ERR"])
+                for name in (FILTERED, UNFILTERED)
+            },
+        }
     if own := summary["difference"].get(FINAL_STAGE):
         found["filter"] = {
             rate: {**_change(own[rate]), "seeds": rounded(seeds["difference"][FINAL_STAGE][rate])}

@@ -327,7 +327,7 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
     --------
     >>> config = configure({"preset": "gated", "frames": {"every": 2}})
     >>> config.pipeline.chain
-    ('gated', 'similarity', 'svm', 'post')
+    ('exposure', 'gated', 'similarity', 'svm', 'post')
     """
     tables = tables or {}
     with in_file(where):

@@ -8,7 +8,8 @@ nothing is learnt, and every frame passes as it came, bit for bit.
 A shadow, a dark car and a hedge may have one colour. What tells them apart is learnt, as Guo, Dai
 and Hoiem learn their shadow detector [1]_, but by pixel: a logistic regression on what surrounds a
 dark pixel, on its place, and on what lies between it and the vehicle. All brightness is relative to
-the frame's own sunlit road, so that it holds for any exposure.
+the frame's own sunlit road, so that it holds for any exposure. What follows it sees colours alone,
+and wants the same light in each frame: the stage `exposure` comes before it in the preset.
 
 References
 ----------

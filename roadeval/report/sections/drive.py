@@ -344,7 +344,29 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         "pixels count as non-road, or lit: a bound on what mending the stage could bring.",
         "note",
     )
-    yield Details("If a stage were perfect", [table, meaning])
+    yield Details("If a stage were perfect", [table, meaning, *_compensation(findings)])
+
+
+def _compensation(findings: Findings) -> Iterator[Text]:
+    """Say whether a filter that finds all shadow, and nothing else, would help."""
+    if not {FILTERED, UNFILTERED} <= findings.totals.keys():
+        return
+    without = findings.total(UNFILTERED)
+    for row in findings.oracles:
+        is_filter = row["oracle"] not in findings.totals[FILTERED]
+        if row["variant"] == FILTERED and is_filter and row["frames"] == without["frames"]:
+            harms = row["ERR"] > without["ERR"]
+            yield Text(
+                f"With a perfect shadow mask the filter would err {percent(row['ERR'])} %, and "
+                f"{percent(without['ERR'])} % is the error without any filter: "
+                + (
+                    "it is not only what it takes for shadow, but what it makes of shadow that "
+                    "does harm."
+                    if harms
+                    else "what it makes of true shadow helps."
+                ),
+                "note",
+            )
 
 
 def thresholds(findings: Findings) -> Iterator[Block]:
