@@ -12,6 +12,10 @@ from hypothesis import settings
 settings.register_profile("roadeval", deadline=None)
 settings.load_profile("roadeval")
 
+# As in a command: on busy processors the threads of OpenBLAS wait for each other longer than they
+# compute.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Installed without a C compiler: the twins are used as if somebody had asked for them, for who did
 # not is told so by every run, and what the runs tell is compared word for word. The tests of the
 # loops themselves are skipped.

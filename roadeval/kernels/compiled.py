@@ -3,7 +3,7 @@
 The loops are in C, in the folder ``c``, and built when the package is installed. Here what they
 write is allocated, and shapes are checked, a `ValueError` if they do not fit together; an array of
 another type, dimension or order than a loop takes is a `TypeError`. Rows, columns and labels in
-runs are trusted: they are those of `components` or `label_runs`, of an image of that size.
+runs are trusted: they are those of `components`, of an image of that size.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from roadeval.data.arrays import (
     Distances,
     Image,
     Indices,
-    Labels,
     Masks,
     Matrix,
     Plane,
@@ -127,19 +126,6 @@ def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Mat
     return result
 
 
-def paint(runs: Runs, height: int, width: int) -> Labels:
-    _require(runs, len(runs), 4)
-    labels = np.zeros((height, width), np.int32)
-    _loops.paint(runs, len(runs), width, labels)
-    return labels
-
-
-def label_runs(labels: Labels) -> Runs:
-    height, width = labels.shape
-    runs = np.empty((height * width, 4), np.int32)
-    return runs[: _loops.label_runs(labels, height, width, runs)].copy()
-
-
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     room = _room_for_runs(bits, width)
     runs = np.empty((len(room[1]), 4), np.int32)
@@ -203,18 +189,6 @@ def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) 
     return result
 
 
-def outcomes(mask: Plane, truth: Plane) -> Plane:
-    shape = _shape(mask, truth)
-    errors = np.empty(shape, np.uint8)
-    _loops.outcomes(mask, truth, errors.size, errors)
-    return errors
-
-
-def add_outcomes(errors: Plane, totals: Image) -> None:
-    _require(totals, 3, *errors.shape)
-    _loops.add_outcomes(errors, errors.size, totals)
-
-
 def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
     shape = _shape(cost, seeds)
     distance = np.empty(shape, np.int32)
@@ -247,13 +221,6 @@ def label_rows(labels: Plane, bits: int) -> Plane:
     height, width = labels.shape
     lines = np.empty((height, 1 + -(-width * bits // 8)), np.uint8)
     _loops.label_rows(labels, height, width, bits, lines)
-    return lines
-
-
-def mask_rows(mask: Bits, width: int) -> Plane:
-    _require(mask, len(mask), -(-width // 64))
-    lines = np.empty((len(mask), 1 + -(-width // 8)), np.uint8)
-    _loops.mask_rows(mask, len(mask), width, lines)
     return lines
 
 

@@ -13,9 +13,6 @@ import numpy.typing as npt
 
 from roadeval.data import pack, unpack
 from roadeval.data.arrays import (
-    FN,
-    FP,
-    IGNORED,
     Bits,
     CodeTable,
     Costs,
@@ -43,7 +40,7 @@ STRAIGHT: Final = 5
 ASLANT: Final = 7
 """Length of a step to a neighbour by a side and by a corner: 7/5 is the root of 2, less 1 %."""
 LABEL_BITS: Final = (2, 4, 8)
-"""Those that a label of a PNG file may have; with one it is a mask."""
+"""Those that a label of a PNG file may have here; with one it is a mask."""
 LEAVES: Final = 32
 """Of a tree, at most."""
 
@@ -240,25 +237,6 @@ def _step(to: Sums, cost: Sums, start: Sums, other: Sums, length: int) -> None:
     np.minimum(to, start + length * (cost + other), out=to)
 
 
-# --- Outcomes of a mask: pixel by pixel, and in how many frames -----------------------------------
-
-
-def outcomes(mask: Plane, truth: Plane) -> Plane:
-    """Classify each pixel of a mask, ``(H, W)`` of 0 and 1, by a truth of 0, 1 and 255 for ignored.
-
-    Returned are the outcomes, ``(H, W)`` uint8: `TN`, `TP`, `FP`, `FN` or `IGNORED`.
-    """
-    # TN 0 and TP 1 where the two agree, FP 2 and FN 3 where not; beyond 4 what is ignored.
-    return np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED))
-
-
-def add_outcomes(errors: Plane, totals: Image) -> None:
-    """Add to ``(3, H, W)`` uint8 ``totals``, in place, where `outcomes` are labelled, FP and FN."""
-    counted = errors != IGNORED, errors == FP, errors == FN
-    for total, found in zip(totals, counted, strict=True):
-        np.add(total, found, out=total)
-
-
 # --- Rows of a PNG file ---------------------------------------------------------------------------
 
 
@@ -288,16 +266,8 @@ def label_rows(labels: Plane, bits: int) -> Plane:
     number, 0.
     """
     single = np.unpackbits(labels[..., None], axis=2)[..., 8 - bits :]
-    return _unfiltered(single.reshape(len(labels), -1))
-
-
-def mask_rows(mask: Bits, width: int) -> Plane:
-    """Pack a mask of ``width`` pixels a row as `label_rows` packs labels, with a bit a pixel."""
-    return _unfiltered(unpack(mask, width))
-
-
-def _unfiltered(single: Plane) -> Plane:
-    return np.insert(np.packbits(single, axis=1), 0, np.uint8(0), axis=1)
+    packed = np.packbits(single.reshape(len(labels), -1), axis=1)
+    return np.insert(packed, 0, np.uint8(0), axis=1)
 
 
 # --- Connected components of a mask, as stretches of rows (Eq. 9) ---------------------------------

@@ -266,11 +266,10 @@ def encode_labels(labels: Bytes | Packed, palette: Sequence[ColourWithOpacity]) 
     Labels of two classes may be packed, or of another type: what is not 0 is of the second class.
     """
     bits = next(bits for bits in (1, 2, 4, 8) if len(palette) <= 1 << bits)
+    pixels = labels.pixels() if isinstance(labels, Packed) else labels
     if bits == 1:
-        mask = labels if isinstance(labels, Packed) else Packed.of(labels)
-        lines = KERNELS.mask_rows(mask.bits, mask.width)
+        lines = np.insert(np.packbits(pixels, axis=1), 0, np.uint8(0), axis=1)
     else:
-        pixels = labels.pixels() if isinstance(labels, Packed) else labels
         lines = KERNELS.label_rows(np.ascontiguousarray(pixels, np.uint8), bits)
     colours = bytes(value for *rgb, _ in palette for value in rgb)
     opacity = bytes(alpha for *_, alpha in palette)

@@ -482,8 +482,7 @@ def test_a_chart_is_read_by_the_keyboard(drive, watched):
     assert frame(tab) == number
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1440, 390])
+@pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (390, "dark")])
 def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
     drive, fleet, scheme, width, watched
 ):

@@ -40,6 +40,6 @@ def test_the_resumed_result_is_that_of_one_go(tmp_path):
             again = forks.run(partial(run, logs, folder), steps.undisturbed)
             assert again == steps.DONE
             assert (files(folder), tables(folder)) == want, number
-            number += 17
+            number += 41
     assert code == steps.DONE
     assert number > 100

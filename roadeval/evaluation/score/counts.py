@@ -28,7 +28,7 @@ from roadeval.data import (
     everywhere,
     ones,
 )
-from roadeval.data.arrays import Bits, Floats, Sums
+from roadeval.data.arrays import IGNORED, Bits, Floats, Sums
 from roadeval.evaluation import metrics
 from roadeval.evaluation.region import disk, grow, square
 from roadeval.kernels import KERNELS
@@ -60,7 +60,8 @@ def error_map(mask: Mask, truth: Truth) -> Layer:
 
     ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` too, and 255 where it is ignored.
     """
-    return Layer(ERRORS, KERNELS.outcomes(mask, truth))
+    # TN 0 and TP 1 where the two agree, FP 2 and FN 3 where not; beyond 4 what is ignored.
+    return Layer(ERRORS, np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED)))
 
 
 def flat(masks: Bits | Sequence[Bits]) -> Bits:

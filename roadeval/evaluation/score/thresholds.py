@@ -38,7 +38,7 @@ from roadeval.data import (
     everywhere,
     ones,
 )
-from roadeval.data.arrays import Bits, Floats, Sums
+from roadeval.data.arrays import FN, FP, IGNORED, Bits, Floats, Sums
 from roadeval.evaluation.score.counts import Name, flat
 from roadeval.kernels import KERNELS
 
@@ -234,7 +234,8 @@ class HeatMap:
         if self.frames and self.frames % PENDING == 0:
             self._carry()
         self.frames += 1
-        KERNELS.add_outcomes(errors, self._bytes)
+        counted = errors != IGNORED, errors == FP, errors == FN
+        self._bytes += np.array(counted)
 
     def cells(self) -> tuple[int, Sums]:
         """Return the cells' side in pixels, and their sums.

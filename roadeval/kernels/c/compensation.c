@@ -29,15 +29,6 @@ LOOP void run_sums(
     }
 }
 
-/* `labels`: an image of `width` pixels a row, cleared. */
-LOOP void paint(
-    const run_t *restrict runs, int64_t count, int64_t width, int32_t *restrict labels)
-{
-    for (const run_t *run = runs; run < runs + count; run++)
-        for (int64_t x = run->start; x < run->end; x++)
-            labels[run->row * width + x] = run->label;
-}
-
 /* --- Rings ------------------------------------------------------------------------------------ */
 
 /* Add the ring's pixels in a stretch of a row to a component. */

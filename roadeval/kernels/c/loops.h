@@ -56,8 +56,6 @@ void ring_sums(
 void transfer(
     uint8_t *image, int64_t width, const run_t *runs, int64_t run_count, const double *source,
     const double *target, const double *gain, int64_t count, int64_t *pixels, uint8_t *tables);
-void paint(const run_t *runs, int64_t count, int64_t width, int32_t *labels);
-int64_t label_runs(const int32_t *labels, int64_t height, int64_t width, run_t *runs);
 int64_t components(
     const uint64_t *bits, int64_t height, int64_t width, int corner, int64_t *rows,
     int32_t *starts, int32_t *ends, int64_t *parents, run_t *runs);
@@ -77,8 +75,6 @@ void dilate(
 void erode(
     const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
     uint64_t *room, uint64_t *result);
-void outcomes(const uint8_t *mask, const uint8_t *truth, int64_t size, uint8_t *errors);
-void add_outcomes(const uint8_t *errors, int64_t size, uint8_t *totals);
 void geodesics(
     const uint16_t *cost, const uint8_t *seeds, int64_t height, int64_t width, int64_t rounds,
     int32_t *distance);
@@ -90,7 +86,6 @@ void filter_rows(
     const uint8_t *rows, int64_t height, int64_t size, int64_t step, uint8_t *lines);
 void label_rows(
     const uint8_t *labels, int64_t height, int64_t width, int bits, uint8_t *lines);
-void mask_rows(const uint64_t *mask, int64_t height, int64_t width, uint8_t *lines);
 
 PART int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 PART int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }

@@ -142,10 +142,6 @@ FUNCTION(transfer, ">B3 n i2 n d2 d2 d2 n >q1 >B1",
     transfer(ARRAY(0), SIZE(1), ARRAY(2), SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6), SIZE(7),
         ARRAY(8), ARRAY(9)))
 
-FUNCTION(paint, "i2 n n >i2", paint(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
-
-FUNCTION(label_runs, "i2 n n >i2", found = label_runs(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
-
 FUNCTION(components, "Q2 n n n >q1 >i1 >i1 >q1 >i2",
     found = components(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6),
         ARRAY(7), ARRAY(8)))
@@ -168,10 +164,6 @@ FUNCTION(dilate, "Q2 n n q1 n >Q1 >Q2",
 FUNCTION(erode, "Q2 n n q1 n >Q1 >Q2",
     erode(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), SIZE(4), ARRAY(5), ARRAY(6)))
 
-FUNCTION(outcomes, "B2 B2 n >B2", outcomes(ARRAY(0), ARRAY(1), SIZE(2), ARRAY(3)))
-
-FUNCTION(add_outcomes, "B2 n >B3", add_outcomes(ARRAY(0), SIZE(1), ARRAY(2)))
-
 FUNCTION(geodesics, "H2 B2 n n n >i2",
     geodesics(ARRAY(0), ARRAY(1), SIZE(2), SIZE(3), SIZE(4), ARRAY(5)))
 
@@ -184,16 +176,14 @@ FUNCTION(filter_rows, "B2 n n n >B2", filter_rows(ARRAY(0), SIZE(1), SIZE(2), SI
 FUNCTION(label_rows, "B2 n n n >B2",
     label_rows(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4)))
 
-FUNCTION(mask_rows, "Q2 n n >B2", mask_rows(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
-
 #define METHOD(name) {#name, (PyCFunction)(void (*)(void))call_##name, METH_FASTCALL, NULL}
 
 static PyMethodDef methods[] = {
     METHOD(look_up_sum_min), METHOD(mahalanobis), METHOD(look_up_colours), METHOD(run_sums),
-    METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
+    METHOD(ring_sums), METHOD(transfer), METHOD(components),
     METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(dilate), METHOD(erode),
-    METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum),
-    METHOD(filter_rows), METHOD(label_rows), METHOD(mask_rows),
+    METHOD(geodesics), METHOD(tree_sum),
+    METHOD(filter_rows), METHOD(label_rows),
     {NULL, NULL, 0, NULL},
 };
 

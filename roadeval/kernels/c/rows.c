@@ -78,22 +78,3 @@ LOOP void label_rows(
             pack_row(row, width, 8, line);
     }
 }
-
-/* Turn each byte's bits round: a file has the leftmost pixel in the highest bit, a mask in the lowest.
- *
- * `mask`: height rows of whole words, the first pixels in a word's first byte. `lines`: as above. */
-LOOP void mask_rows(
-    const uint64_t *restrict mask, int64_t height, int64_t width, uint8_t *restrict lines)
-{
-    int64_t words = (width + 63) / 64, size = (width + 7) / 8;
-    for (int64_t y = 0; y < height; y++) {
-        const uint8_t *restrict row = (const uint8_t *)(mask + y * words);
-        uint8_t *restrict line = lines + y * (1 + size) + 1;
-        line[-1] = NONE;
-        for (int64_t byte = 0; byte < size; byte++) {
-            uint8_t bits = (uint8_t)(row[byte] >> 4 | row[byte] << 4);
-            bits = (uint8_t)((bits >> 2 & 0x33) | (bits & 0x33) << 2);
-            line[byte] = (uint8_t)((bits >> 1 & 0x55) | (bits & 0x55) << 1);
-        }
-    }
-}

@@ -115,23 +115,6 @@ LOOP int64_t components(
     return count;
 }
 
-/* Write the `runs` of equal labels, at most a pixel each, and return how many they are. */
-LOOP int64_t label_runs(const int32_t *labels, int64_t height, int64_t width, run_t *restrict runs)
-{
-    int64_t count = 0;
-    for (int64_t y = 0; y < height; y++) {
-        const int32_t *row = labels + y * width;
-        for (int64_t x = 0; x < width;) {
-            int64_t start = x;
-            while (x < width && row[x] == row[start])
-                x++;
-            if (row[start] > 0)
-                runs[count++] = (run_t){(int32_t)y, (int32_t)start, (int32_t)x, row[start]};
-        }
-    }
-    return count;
-}
-
 /* `patch` may be NULL; `votes` as many as `parents`; `kept` cleared. */
 LOOP void keep_region(
     const uint64_t *bits, int64_t height, int64_t width, const uint8_t *patch,

@@ -219,7 +219,10 @@ class Components:
 
     def labels(self) -> Labels:
         """Return their label image: ``(H, W)`` int32, 0 outside."""
-        return KERNELS.paint(self.runs, *self.shape)
+        labels = np.zeros(self.shape, np.int32)
+        for row, begin, end, label in self.runs.tolist():
+            labels[row, begin:end] = label
+        return labels
 
 
 def connected_components(shadow: Packed, connectivity: int) -> Components:
