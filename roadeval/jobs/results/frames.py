@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -26,7 +27,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
-from roadeval.report.sections.frames import SMALL, BrowsedFrames, FrameFacts, strip
+from roadeval.report.sections.frames import SMALL, BrowsedFrames, FrameFacts, strip, wrong_cells
 from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
@@ -152,6 +153,27 @@ class FramePicker:
         """Return a frame with its pictures, those of layers of at most so many pixels across."""
         command = inspect(frame) if inspect else ""
         return strip(self._pictured(frame), self._all, command, layers)
+
+    def wrong(self, lock: Lock) -> dict[tuple[str, str], tuple[list[int], npt.NDArray[np.uint8]]]:
+        """Return where all frames with pictures have errors, by variant and outcome.
+
+        Frame numbers, those with the highest ERR of the variant first, and a row of bits for each,
+        see `roadeval.report.sections.frames.wrong_cells`. ``lock`` is held while one is read.
+        """
+        found = {}
+        for variant in self._variants:
+            ranked = score.worst(self._result.rows, variant, len(self._scored), 0)["frame"]
+            frames, cells = [], []
+            for frame in ranked[np.isin(ranked, self._result.pictured)].tolist():
+                with lock:
+                    errors = self._result.layer(variant, ERRORS.name, frame)
+                if errors is not None:
+                    frames.append(frame)
+                    cells.append(wrong_cells(errors))
+            for outcome in cells[0] if cells else ():
+                rows = np.array([each[outcome] for each in cells])
+                found[variant, outcome] = frames, rows
+        return found
 
     def _pictured(self, frame: int) -> NotableFrame:
         """Return a frame whose pictures are there, with all of them; without truth, too."""

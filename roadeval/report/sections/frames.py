@@ -299,16 +299,20 @@ def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
 
 def _picture(image: LayerImage, name: str, width: int) -> Picture:
     title = image.spec.title if image.spec else image.title
-    wrong = {} if image.array is None or image.spec is not ERRORS else _wrong(image.array)
+    cells = wrong_cells(image.array) if image.array is not None and image.spec is ERRORS else {}
+    wrong = {name: base64.b64encode(bits.tobytes()).decode() for name, bits in cells.items()}
     return Picture(name, title, jpeg(image, width), wrong)
 
 
-def _wrong(errors: npt.NDArray[Any]) -> dict[str, str]:
-    """Return in which cells of `CELLS` a mask has errors, see `Picture.wrong`."""
+def wrong_cells(errors: npt.NDArray[Any]) -> dict[str, npt.NDArray[np.uint8]]:
+    """Return the cells of `CELLS` with errors of a mask, by outcome, a bit each.
+
+    ``errors`` is ``(H, W)`` uint8, see `roadeval.data.ERRORS`.
+    """
     import cv2
 
     found = {}
     for name, outcome in (("FP", FP), ("FN", FN)):
         shares = cv2.resize(np.float32(errors == outcome), CELLS, interpolation=cv2.INTER_AREA)
-        found[name] = base64.b64encode(np.packbits(shares > 0).tobytes()).decode()
+        found[name] = np.packbits(shares > 0)
     return found

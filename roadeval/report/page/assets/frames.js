@@ -59,10 +59,10 @@ class Browser {
     });
   }
 
-  /** Frames that can be looked at, in the drive's order; of the filtered ones, if any is. */
-  pictured() {
+  /** Frames that can be looked at, in the drive's order: all, or of the filtered ones, if any is. */
+  pictured(whole = false) {
     const all = this.rows.filter((row) => row.classList.contains("pictured"));
-    const shown = all.filter((row) => !row.hidden);
+    const shown = whole ? all : all.filter((row) => !row.hidden);
     return (shown.length ? shown : all).map((row) => Number(row.dataset.frame)).sort((a, b) => a - b);
   }
 
@@ -120,12 +120,14 @@ class Browser {
   }
 
   /** The frames, of those with pictures here, that are wrong in a cell of an image. */
-  wrongAt(name, outcome, cell) {
+  wrongAt(variant, outcome, cell) {
     const isWrong = (strip) => {
-      const cells = [...strip.querySelectorAll(".tile")].find((each) => each.dataset.name === name)?.dataset[outcome];
+      const tile = [...strip.querySelectorAll(".tile")].find((each) => each.dataset.name === `${variant}: errors`);
+      const cells = tile?.dataset[outcome.toLowerCase()];
       return cells && atob(cells).charCodeAt(cell >> 3) & (128 >> (cell & 7));
     };
-    return [...this.held].filter(([, strip]) => isWrong(strip)).map(([frame]) => frame);
+    const frames = [...this.held].filter(([, strip]) => isWrong(strip)).map(([frame]) => frame);
+    return { frames, count: frames.length };
   }
 
   /** A link to a frame, with a picture as soon as there is one. */

@@ -15,7 +15,7 @@ function enlarge(content, closed = null) {
   inside.append(button, ...content);
   dialog.replaceChildren(inside);
   onClosed = closed;
-  dialog.showModal();
+  if (!dialog.open) dialog.showModal();
 }
 
 dialog.addEventListener("close", () => {

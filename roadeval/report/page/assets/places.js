@@ -105,14 +105,22 @@ class MapView {
     this.area.addEventListener("click", () => this.showBehind());
   }
 
-  /** Show the frames whose pictures are here and that are wrong at the place pointed at. */
-  showBehind() {
-    if (!this.pointed) return;
-    const [outcome, variant] = [this.title.slice(0, 2).toLowerCase(), this.title.slice(6)];
+  /** Show the frames with pictures that are wrong at the place pointed at. */
+  async showBehind() {
+    if (!this.pointed || !browser) return;
+    const [outcome, variant] = [this.title.slice(0, 2), this.title.slice(6)];
     const [x, y] = this.pointed;
     const cell = Math.floor(((y + 0.5) / this.rows) * 30) * 40 + Math.floor(((x + 0.5) / this.columns) * 40);
-    const known = browser?.live ? "opened so far" : "with pictures";
-    showFrames(`${this.title} here, of the frames ${known}`, variant, browser?.wrongAt(`${variant}: errors`, outcome, cell) ?? []);
+    const show = ({ frames, count }) => {
+      const some = frames.length < count ? `: the ${frames.length} with the highest ERR` : "";
+      showFrames(`${this.title} here, ${count} of ${browser.pictured(true).length} frames with pictures${some}`, variant, frames);
+    };
+    if (!browser.live) return show(browser.wrongAt(variant, outcome, cell));
+    enlarge(["Looking through the frames \u2026"]);
+    const answer = await fetch(`wrong/${cell}`);
+    if (!dialog.open) return;
+    if (answer.ok) show((await answer.json())[variant]?.[outcome] ?? { frames: [], count: 0 });
+    else enlarge([(await answer.text()).trim()]);
   }
 
   key(event) {
