@@ -151,7 +151,7 @@ def write(folder: Path, source: Source, gigabytes: float, files: int = 1) -> Pat
             header = _header(at, f"cam_{name}")
             topic = f"/cameras/{name}"
             kind = "sensor_msgs/msg/CompressedImage"
-            message = {"header": header, "format": "jpeg", "data": image}
+            message = {"header": header, "format": "jpeg", "data": _commented(image, tick)}
             recorder.write(f"{topic}/image/compressed", kind, message, at + 30_000_000)
             info = "sensor_msgs/msg/CameraInfo"
             recorder.write(f"{topic}/camera_info", info, _info(header), at + 30_000_000)
@@ -170,6 +170,12 @@ def _noisy(image: np.ndarray, truth: np.ndarray) -> tuple[bytes, bytes]:
     noise = np.random.default_rng(len(image)).normal(0, 2.5, image.shape)
     image = np.clip(image + noise, 0, 255).astype(np.uint8)
     return jpeg(image), cv2.imencode(".png", truth)[1].tobytes()
+
+
+def _commented(image: bytes, tick: int) -> bytes:
+    """Return a JPEG file with a comment, for a file that was trained on is evaluated nowhere."""
+    text = str(tick).encode()
+    return b"".join((image[:2], b"\xff\xfe", (2 + len(text)).to_bytes(2, "big"), text, image[2:]))
 
 
 def _others(recorder: Recorder, tick: int, now: int, cloud: bytes) -> None:

@@ -32,6 +32,10 @@ from roadeval.logs.settings import NS
 
 PROBES: Final = 3
 """Messages to try before a topic counts as undecodable."""
+KEPT: Final = 32
+"""Messages of a topic to keep, those of at most `KEPT_BYTES`: a label's stamp is looked at before
+its turn, and its chunk, mostly of other topics, is long forgotten when its picture is needed."""
+KEPT_BYTES: Final = 1 << 18
 GAP: Final = 2.5
 """A step of more than so many median periods is a gap."""
 
@@ -273,18 +277,27 @@ class TopicReader:
         self._chunks = table[:, 3].astype(np.int32)
         # An array of Python's own: each image asks for some thirty stamps, one by one.
         self._stamps = array("q", [UNREAD]) * len(table)
+        self._kept: dict[int, Message] = {}
 
     def __len__(self) -> int:
         return len(self.log_times)
 
     def message(self, position: int) -> Message:
         """Read a message; a `FrameError` if it cannot be read."""
+        if position in self._kept:
+            return self._kept[position]
         message = self._read(position)
         if message is None and int(self._chunks[position]) != OUTSIDE:
             self._correct(position)
             message = self._read(position)
         if message is None:
             raise self._error(position, "no message where the index says")
+        if len(message.data) <= KEPT_BYTES:
+            # A copy: its own bytes hold the whole chunk in memory.
+            message = message._replace(data=memoryview(bytes(message.data)))
+            self._kept[position] = message
+            if len(self._kept) > KEPT:
+                del self._kept[next(iter(self._kept))]
         return message
 
     def _read(self, position: int) -> Message | None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from itertools import islice, pairwise
+from itertools import islice, pairwise, takewhile
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -178,7 +178,8 @@ def _images(folder: Path) -> list[Path]:
 
 
 REACH: Final = 4
-"""Messages to look at on either side: topics are logged nearly, not always, in stamp order."""
+"""Messages to look at on either side: topics are logged nearly, not always, in stamp order. Where
+the first ones are in order, those within so many frame periods: others cost a chunk each."""
 ALONE_NS: Final = 50_000_000
 """Half the period of a camera of 10 Hz."""
 LOOKED_AT: Final = 10
@@ -282,6 +283,8 @@ class Pairing:
     labels: Stamps
     tolerance: int
     """Largest difference of the stamps of a pair."""
+    reach_ns: int | None = None
+    """Where both are in order: the first stamp on a side that is farther away ends the search."""
     unused: int = 0
     """Labels that belong to no frame of the log, as far as that is known beforehand."""
     unsure: int = 0
@@ -301,18 +304,26 @@ class Partners:
 
     def of(self, image: int) -> int | None:
         """Return the position of the label of an image; None if it has none."""
-        images, labels = self._pairing.images, self._pairing.labels
+        images, labels, reach = self._pairing.images, self._pairing.labels, self._pairing.reach_ns
         stamp = images.stamp(image)
         if stamp == UNREADABLE or not len(labels):
             return None
-        label = self._near = _closest(labels, stamp, self._near)
-        if exact := _equal(labels, stamp, label):
-            rank = _equal(images, stamp, image).index(image)
-            return exact[rank] if rank < len(exact) else None
+        middle = _seek(labels, stamp, _expected(labels, stamp, self._near))
+        exact = next(_equal(labels, stamp, middle, reach), None)
+        if exact is not None:
+            self._near = exact
+            before = _equal(images, stamp, image, reach, image)
+            rank = sum(1 for _ in before)
+            return next(islice(_equal(labels, stamp, exact, reach), rank, None), None)
+        label = self._near = _closest(labels, stamp, middle, reach)
         theirs = labels.stamp(label)
         if theirs == UNREADABLE or abs(theirs - stamp) > self._pairing.tolerance:
             return None
-        return label if _closest(images, theirs, image) == image else None
+        return (
+            label
+            if _closest(images, theirs, _seek(images, theirs, image), reach) == image
+            else None
+        )
 
 
 def frames_of(pairing: Pairing) -> Iterator[int]:
@@ -326,23 +337,46 @@ def frames_of(pairing: Pairing) -> Iterator[int]:
             yield image
 
 
-def _closest(stamps: Stamps, stamp: int, hint: int) -> int:
-    """Return the position of the nearest stamp (the first of equals); search from a hint."""
+def _closest(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> int:
+    """Return the position of the nearest stamp around a position (the first of equals)."""
 
     def distance(position: int) -> int:
         theirs = stamps.stamp(position)
         return 2**64 if theirs == UNREADABLE else abs(theirs - stamp)
 
-    around = _around(stamps, _seek(stamps, stamp, hint))
+    around = _around(stamps, stamp, middle, reach)
     return min(around, key=lambda position: (distance(position), position))
 
 
-def _equal(stamps: Stamps, stamp: int, middle: int) -> list[int]:
-    return [place for place in _around(stamps, middle) if stamps.stamp(place) == stamp]
+def _equal(
+    stamps: Stamps, stamp: int, middle: int, reach: int | None, end: int | None = None
+) -> Iterator[int]:
+    """Yield the positions with a stamp around a position, before ``end`` if it is given."""
+    around = _around(stamps, stamp, middle, None if reach is None else 0)
+    before = around if end is None else takewhile(lambda place: place < end, around)
+    return (place for place in before if stamps.stamp(place) == stamp)
 
 
-def _around(stamps: Stamps, middle: int) -> range:
-    return range(max(middle - REACH, 0), min(middle + REACH + 1, len(stamps)))
+def _around(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> Iterator[int]:
+    """Yield the positions around one, in order, to the first stamp on a side beyond the reach."""
+    first, last = max(middle - REACH, 0), min(middle + REACH, len(stamps) - 1)
+    if reach is not None:
+        left = range(middle - 1, first, -1)
+        beyond = (at for at in left if UNREADABLE < stamps.stamp(at) < stamp - reach)
+        first = next(beyond, first)
+    for place in range(first, last + 1):
+        yield place
+        if reach is not None and place >= middle and stamps.stamp(place) > stamp + reach:
+            return
+
+
+def _expected(stamps: Stamps, stamp: int, near: int) -> int:
+    """Return where a stamp lies if log times are as far from stamps as at the position ``near``."""
+    if not isinstance(stamps, TopicReader) or (known := stamps.stamp(near)) == UNREADABLE:
+        return near
+    logged = int(stamps.log_times[near]) - known + stamp
+    place = np.searchsorted(stamps.log_times, min(max(logged, -(2**63)), 2**63 - 1))
+    return min(int(place), len(stamps) - 1)
 
 
 def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
@@ -379,13 +413,22 @@ def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
     """
     images, clock = camera.images, camera.clock
     if clock is Clock.STAMP:
-        return Pairing(images, labels, camera.tolerance_ns)
+        period = median_period(images.log_times)
+        in_order = period > 0 and _rise(images) and _rise(labels)
+        reach = max(REACH * period, camera.tolerance_ns) if in_order else None
+        return Pairing(images, labels, camera.tolerance_ns, reach)
     if clock is Clock.LOG_TIME:
         return Pairing(Times(images.log_times), Times(labels.log_times), camera.tolerance_ns)
     count = min(labels.sure, len(labels) if len(images) == len(labels) else 0)
     unsure = len(images) - min(images.sure, labels.sure)
     frames = Times(range(len(images)), images.sure)
     return Pairing(frames, Times(range(count)), camera.tolerance_ns, unsure=unsure)
+
+
+def _rise(stamps: Stamps) -> bool:
+    """Whether the first stamps are in order."""
+    first = [stamps.stamp(place) for place in range(min(LOOKED_AT, len(stamps)))]
+    return all(one < other for one, other in pairwise(first))
 
 
 def check_times(pairing: Pairing, name: str, clock: Clock) -> None:
@@ -442,7 +485,8 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
             f"{first + 1}"
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
-    return Pairing(Times(range(frames), images.sure), labels, 0, unused, frames - images.sure)
+    unsure = frames - images.sure
+    return Pairing(Times(range(frames), images.sure), labels, 0, unused=unused, unsure=unsure)
 
 
 def _help(labels: NamedLabels, first: int) -> str:

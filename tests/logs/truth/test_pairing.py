@@ -100,3 +100,28 @@ def test_no_frame_is_given_twice_where_stamps_are_equal_and_out_of_order():
     labels = [0, 0, 1, 2, 5, 2, 5, 5, 5, 5, 6, 6, 7, 8, 8]
     found = [*frames_of(Pairing(Stamps(images), Stamps(labels), 20))]
     assert sorted({*found}) == sorted(found)
+
+
+rising = st.lists(st.integers(0, 60), max_size=30, unique=True).map(sorted)
+
+
+@given(rising, rising, st.integers(0, 6), st.integers(6, 20))
+def test_stamps_in_order_pair_the_same_however_few_are_read(images, labels, tolerance, reach):
+    few, all_around = (
+        Partners(Pairing(Stamps(images), Stamps(labels), tolerance, reach_ns))
+        for reach_ns in (reach, None)
+    )
+    for image in range(len(images)):
+        assert few.of(image) == all_around.of(image)
+
+
+def test_labels_far_apart_are_read_one_at_a_time():
+    images, labels = Stamps(range(0, 100_000, 10)), Stamps(range(0, 100_000, 200))
+    partners = Partners(Pairing(images, labels, 5, reach_ns=40), near=34)
+    assert partners.of(700) == 35
+    assert images.read == {699, 700}
+    assert labels.read <= {34, 35}
+    images.read.clear()
+    assert partners.of(705) is None
+    assert images.read == {705}
+    assert labels.read <= {34, 35, 36}
