@@ -115,6 +115,12 @@ class Shape:
         """The intervals as an SVG path."""
         return "".join(f"M{x:g} {low:g}V{high:g}" for x, low, high in self.ends)
 
+    @property
+    def cuts(self) -> list[tuple[float, int]]:
+        """Where intervals reach beyond the chart: a position, and 0 at the top or 100 below."""
+        beyond = ((x, ((high < 0, 0), (low > 100, 100))) for x, low, high in self.ends)
+        return [(x, edge) for x, edges in beyond for is_cut, edge in edges if is_cut]
+
 
 @dataclass(frozen=True, slots=True)
 class Mark:

@@ -10,6 +10,7 @@ import pytest
 from roadeval import Recording
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import Chart, ChartKind, Look, Series
+from roadeval.report.charts.standard import ForestRow, caption, forest
 from roadeval.report.page.render import write_page
 from roadeval.results.fleet import FleetFolder
 from tests.e2e.commands import here
@@ -456,7 +457,7 @@ def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
 
 def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path, watched):
     curve = Series("a", Look("#0072B2"), [0.0, 40.0, 90.0], [100.0, 95.0, 60.0])
-    mask = Series("a: the mask", Look("#0072B2"), [40.0], [93.0])
+    mask = Series("a: the mask", Look("#0072B2"), [40.0], [93.0], frames=[[3]])
     chart = Chart("precision", ChartKind.LINES, [curve, mask], across="recall", x_range=(0, 101))
     page = write_page(tmp_path / "page.html", a_document(Figure([chart], "")))
     tab = watched(page.as_uri()).tab
@@ -466,9 +467,14 @@ def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path,
         tab.keyboard.press("ArrowRight")
         said.append([*filter(None, tab.locator(".tip:visible").inner_text().split("\n"))])
     assert said == [
-        ["recall 40.00 %", "a", "95.00 %", "a: the mask", "93.00 %"],
-        ["recall 90.00 %", "a", "60.00 %"],
+        ["recall 40.00 %", "a", "95.00 %", "a: the mask", "93.00 %", "click: the frames behind it"],
+        ["recall 90.00 %", "a", "60.00 %", "adds up all frames, so it leads to none"],
     ]
+    box = tab.locator(".area").bounding_box()
+    cursor = "getComputedStyle(document.querySelector('.area')).cursor"
+    for recall, shape in ((40, "pointer"), (90, "auto")):
+        tab.mouse.move(box["x"] + recall / 101 * box["width"], box["y"] + 20)
+        assert tab.evaluate(cursor) == shape
 
 
 def test_a_chart_is_read_by_the_keyboard(drive, watched):
@@ -585,6 +591,24 @@ def test_of_many_drives_each_is_a_point_with_its_interval(many, watched):
     assert told[:2] == ["worse", f"{mean} pp ({low} to {high})".replace("-", "\u2212")]
     assert seen.complaints == []
     assert violations(seen.tab) == []
+
+
+def test_of_many_drives_an_interval_beyond_the_chart_ends_in_an_arrow(tmp_path, watched):
+    mean = ForestRow("mean", None, 0.0, -0.01, 0.01)
+    rows = [ForestRow(f"d{n}", None, n / 1000, n / 1000 - 0.01, n / 1000 + 0.01) for n in range(69)]
+    rows += [ForestRow("wide", None, 0.01, -0.5, 0.5), ForestRow("high", None, 0.02, 0.0, 0.6)]
+    (chart,) = forest(rows, mean, "change")
+    page = write_page(tmp_path / "page.html", a_document(Figure([chart], caption(rows, mean))))
+    tab = watched(page.as_uri()).tab
+    beyond = int(re.search(r"(\d+) intervals reach beyond", tab.inner_text("figcaption"))[1])
+    box = tab.locator(".area").bounding_box()
+    edges = []
+    for arrow in tab.locator(".cut path").all():
+        own = arrow.bounding_box()
+        assert box["x"] < own["x"] < box["x"] + box["width"]
+        edges.append(round((own["y"] + own["height"] / 2 - box["y"]) / box["height"], 1))
+    assert set(edges) == {0, 1}
+    assert len(edges) == beyond + 1  # one at either end of the widest
 
 
 def test_a_results_folder_gives_a_page_without_pictures(demo, tmp_path, watched):

@@ -134,6 +134,14 @@ def test_an_interval_beyond_the_chart_ends_in_an_arrow_at_its_edge(low, high, cu
     assert f"({low:.2f} to {high:.2f})" in mark.text
 
 
+def test_an_interval_beyond_a_chart_of_points_is_cut_at_the_top_and_below():
+    own = series([0, 1, 2, 3], [2.0] * 4, low=[1.0, -9.0, 1.0, -9.0], high=[3.0, 3.0, 9.0, 9.0])
+    made = drawn(Chart("change", ChartKind.POINTS, [own], names=[*"abcd"], y_range=(0.0, 4.0)))
+    (shape,) = made.shapes
+    at = [x for x, _ in shape.marks]
+    assert shape.cuts == [(at[1], 100), (at[2], 0), (at[3], 0), (at[3], 100)]
+
+
 # --- Heat maps ------------------------------------------------------------------------------------
 
 

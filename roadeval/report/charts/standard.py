@@ -450,8 +450,11 @@ CURVES_CAPTION: Final = (
 Masks = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 
-def curves(levels: Rows, quoted: Masks, totals: Masks) -> list[Chart]:
+def curves(levels: Rows, quoted: Masks, totals: Masks, behind: Behind = UNKNOWN) -> list[Chart]:
     """Return precision over recall, the ROC, and reliability; none without a probability.
+
+    A mask has frames behind it, those with its highest ERR. A point of a curve has none: it adds up
+    the pixels of all frames, and results hold no counts by level of each.
 
     Parameters
     ----------
@@ -459,6 +462,8 @@ def curves(levels: Rows, quoted: Masks, totals: Masks) -> list[Chart]:
         As ``probabilities.csv``.
     quoted, totals
         As ``curves`` and ``totals`` in ``summary.json``: of every variant.
+    behind
+        The frames with the highest rate, by variant, stage and rate.
     """
     if not len(levels):
         return []
@@ -469,10 +474,12 @@ def curves(levels: Rows, quoted: Masks, totals: Masks) -> list[Chart]:
         # From the threshold that nothing reaches.
         ends = (np.concatenate([[0.0], rates]) for rates in (each.fpr, each.recall))
         roc.append(_curve(name, drawn[name], *ends))
-    masks = {name: _mask([*totals[name].values()][-1]) for name in drawn if name in totals}
+    finals = {name: [*totals[name]][-1] for name in drawn if name in totals}
+    masks = {name: _mask(totals[name][stage]) for name, stage in finals.items()}
     for name, (fpr, tpr, precision) in masks.items():
-        recall.append(_mark(f"{name}: the mask", drawn[name], tpr, precision))
-        roc.append(_mark(f"{name}: the mask", drawn[name], fpr, tpr))
+        title, frames = f"{name}: the mask", behind.get((name, finals[name], score.TESTED), ())
+        recall.append(_mark(title, drawn[name], tpr, precision, frames))
+        roc.append(_mark(title, drawn[name], fpr, tpr, frames))
     bins = [
         _curve(name, drawn[name], *([b[key] for b in own["bins"]] for key in _AXES))
         for name, stages in quoted.items()
@@ -527,6 +534,7 @@ def _curve(name: str, look: Look, x: Any, y: Any) -> Series:
     return Series(name, look, across[known].tolist(), up[known].tolist())
 
 
-def _mark(name: str, look: Look, x: float, y: float) -> Series:
+def _mark(name: str, look: Look, x: float, y: float, frames: Sequence[int]) -> Series:
     there = math.isfinite(x) and math.isfinite(y)
-    return Series(name, look, [x] * there, [y] * there)
+    own = [frames] * there if frames else ()
+    return Series(name, look, [x] * there, [y] * there, frames=own)

@@ -372,7 +372,7 @@ def _compensation(findings: Findings) -> Iterator[Text]:
 def thresholds(findings: Findings) -> Iterator[Block]:
     """Yield the curves and what is quoted of them; nothing without a probability."""
     quoted = findings.facts.curves
-    charts = curves(findings.levels, quoted, findings.totals)
+    charts = curves(findings.levels, quoted, findings.totals, findings.behind)
     if not quoted or not charts:
         return
     yield Heading("Over thresholds")

@@ -1,5 +1,7 @@
 """Over thresholds: curves, and what is quoted of them beside the mask as it is."""
 
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 
@@ -65,6 +67,17 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
     assert (roc.series[1].x, roc.series[1].y) == ([25.0], [83.0])
     assert recall.x_range == roc.y_range
     assert [*reliability.series[0].points()] == [(10, 20), (90, 70)]
+
+
+def test_behind_a_mask_are_its_worst_frames_and_behind_a_curve_none():
+    found = replace(findings(), behind={("filtered", "post", "ERR"): [7, 3]})
+    (figure,) = (block for block in opened(thresholds(found)) if isinstance(block, Figure))
+    recall, roc, reliability = figure.charts
+    for chart in (recall, roc):
+        behind = {each.name: each.frames for each in chart.series}
+        assert behind.pop("filtered: the mask") == [[7, 3]]
+        assert not any(behind.values())
+    assert not any(each.frames for each in reliability.series)
 
 
 def test_the_axes_begin_and_end_where_the_masks_lie():

@@ -204,7 +204,10 @@ class ChartView {
       const left = value === null && series.length > 1 && (unit === "pp" || !this.values.frames);
       return left ? null : tipLine(each.name, withEnds(value, each.low?.[place], each.high?.[place], unit), each.colour);
     });
-    if (series.some((each) => each.frames)) lines.push(tipHead("click: the frames behind it", "hint"));
+    const leads = series.some((each) => each.frames && this.placeIn(each) >= 0);
+    if (!this.values.frames) this.area.classList.toggle("leads", leads);
+    if (leads) lines.push(tipHead("click: the frames behind it", "hint"));
+    else if (this.values.across) lines.push(tipHead("adds up all frames, so it leads to none", "hint"));
     if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
     this.tip.replaceChildren(tipHead(this.where()), ...lines.filter(Boolean));
     this.tip.hidden = false;

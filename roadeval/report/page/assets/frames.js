@@ -142,7 +142,8 @@ class Browser {
     });
     const draw = () => {
       const tiles = [...(this.held.get(frame)?.querySelectorAll(".tile") ?? [])];
-      const tile = tiles.find((each) => each.dataset.name === `${variant}: errors`) ?? tiles[0];
+      const own = (each) => `${variant}: `.startsWith(each.dataset.name.replace(/errors$/, ""));
+      const tile = tiles.find(own) ?? tiles[0];
       if (tile) link.prepend(tile.querySelector("img").cloneNode());
     };
     if (this.live && !this.held.has(frame) && this.byFrame.get(frame).classList.contains("pictured")) this.fetch(frame).then(draw);
