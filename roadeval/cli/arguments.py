@@ -118,6 +118,7 @@ def configuration(given: Given) -> RunConfig:
     masks = {name: _masks(name, path) for name, path in given.get("masks", ())}
     with usage():
         config = config.override({**_tables(given), "masks": masks}).with_variants(variants)
+        config = config.with_tuned(given.get("tunes", ()))
         if "only" in given:
             config = config.override({"only": given["only"]})
     config = config.with_drives(

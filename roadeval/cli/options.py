@@ -56,6 +56,10 @@ class MethodSettings:
     )
     """Score the masks of a folder, or of another log, as one more variant; a file holds their path
     and more, as a threshold of confidences."""
+    tunes: Annotated[tuple[str, ...], Flag("--tune", "NAME")] = ()
+    """One more variant, NAME_tuned: what a network, masks, or a method of your own would be with
+    this drive's first labelled frames to learn from. Trees that see what it says of each pixel,
+    and all that the preset robust sees, learn where it errs."""
     only: Annotated[tuple[str, ...], Flag("--only", "NAME")] = ()
     """Run these variants alone, masks included. Where none of them learns anything, no frame is
     taken for training."""

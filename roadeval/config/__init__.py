@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from roadeval.config.tables import ConfigError, in_file, read_tables
     from roadeval.config.variants import (
         PRESETS,
+        TUNED,
         Variant,
         check_variant_name,
         network_variant,

@@ -43,10 +43,11 @@ from roadeval.config.variants import (
     in_drive,
     pipeline_of,
     preset_of,
+    tuned_variant,
     variants_of,
     with_masks,
 )
-from roadeval.data import FINAL_STAGE
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.logs.settings import LabelSettings, LogConfig
@@ -231,6 +232,28 @@ class RunConfig(LogConfig):
         extra = {variant.name: variant for variant in (*self.extra, *variants)}
         return replace(self, extra=tuple(extra.values()))
 
+    def with_tuned(self, names: Iterable[str]) -> RunConfig:
+        """Return the configuration with a variant for each named method that is tuned to a drive.
+
+        A `ConfigError` if there is no such method, or it learns itself; see `tuned_variant`.
+        """
+        made = {
+            variant.name: variant.pipeline for variant in variants_of(self.pipeline, self.extra)
+        }
+        masks = {*self.topics.masks, *self.masks}
+        variants = []
+        for name in names:
+            if name not in made and name not in masks:
+                known = either({*made, *masks} - {FILTERED, UNFILTERED})
+                raise ConfigError(f"`tunes` {name}: there is no such method; choose {known}")
+            variants.append(tuned_variant(name, made.get(name)))
+        return self.with_variants(variants)
+
+    def given(self) -> set[str]:
+        """Return the names of the masks that the variants see."""
+        used = (each.settings.get("given") for each in self.pipelines().values())
+        return {own.name for own in used if own is not None}
+
     def with_drives(self, drives: Iterable[DriveSettings]) -> RunConfig:
         """Return the configuration with further settings of single drives.
 
@@ -250,7 +273,9 @@ class RunConfig(LogConfig):
         for own, each in config.masks.items():
             if not each.path:
                 raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
-        only = {*config.only} or {*config.masks, *config.topics.masks}
+        only = {*config.masks, *config.topics.masks}
+        if config.only:
+            only &= {*config.only, *config.given()}
         masks = {own: in_drive(each, path) for own, each in config.masks.items() if own in only}
         topics = {own: topic for own, topic in config.topics.masks.items() if own in only}
         return replace(

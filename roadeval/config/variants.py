@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -165,6 +165,9 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
         for each in stages.stages_of(chain)
     }
     pipeline = Pipeline(chain, settings)
+    for stage in pipeline.heard():
+        if stage.fit is not None:
+            raise ConfigError(f"chain: {stage.name} learns, so no later stage can learn from it")
     layers = [spec.name for spec in (*pipeline.layers(), ERRORS)]
     for name in layers:
         if layers.count(name) > 1:
@@ -234,6 +237,33 @@ def network_variant(name: str, path: str) -> Variant:
         settings["file"] = str(Path(path).parent / file)
     chain = {"chain": ("net", "post"), "net": settings, "post": {**AS_IT_IS, **post}}
     return Variant.of(name, chain, path if in_a_file else "")
+
+
+TUNED: Final = "_tuned"
+"""Ends the name of a tuned variant."""
+
+
+def tuned_variant(name: str, method: Pipeline | None) -> Variant:
+    """Return the variant that corrects a method by what training frames teach.
+
+    It is the preset ``robust`` with what the method says of a pixel among the features of its
+    trees. ``method`` is None for one whose masks another system has made. A `ConfigError` if the
+    method learns, for of frames that taught it, it would say too much.
+    """
+    before: tuple[str, ...] = ("given",)
+    settings = {"given": {"name": name}}
+    if method is not None:
+        if learning := method.learning():
+            raise ConfigError(
+                f"`tunes` {name}: it learns itself ({', '.join(learning)}), and of frames that "
+                "taught it, it says too much to learn from"
+            )
+        before = tuple(each for each in method.chain if each != FINAL_STAGE)
+        settings = {key: asdict(own) for key, own in method.settings.items() if key != FINAL_STAGE}
+    exposure = () if "exposure" in before else ("exposure",)
+    chain = (*before, *exposure, "trees", FINAL_STAGE)
+    tables = {"preset": "robust", "chain": chain, **settings, "trees": {"opinion": True}}
+    return Variant.of(f"{name}{TUNED}", tables, f"`tunes` {name}")
 
 
 def with_masks(current: Masks, tables: Any) -> Masks:

@@ -121,6 +121,8 @@ class Output:
     """How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1, where the mask is a
     threshold on it.
     """
+    by_class: tuple[Probability, ...] = ()
+    """The same of each class of road, where there are several."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -39,6 +39,8 @@ class Road:
     graded: bool
     """Whether the mask is a threshold on them; otherwise the network gives classes alone, and they
     are 0 and 65535."""
+    by_class: tuple[Probability, ...] = ()
+    """The codes of each class of road, where there are several and they are graded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,10 +73,17 @@ class Network:
         place = placement((width, height), settings.size, settings.resize)
         values = input_values(place.image(image), settings, self.file.inputs[0].dtype)
         outputs = self.file.run(values, settings.outputs or ())
-        codes = np.maximum.reduce([self._codes(output, place) for output in outputs])
+        codes = np.maximum.reduce([self._codes(output, place, settings) for output in outputs])
         limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * FULL)
         mask = (codes > limit).astype(np.uint8)
-        return Road(mask, codes, not any(map(is_labels, outputs)))
+        graded = not any(map(is_labels, outputs))
+        if not graded or len(settings.road_numbers) * len(outputs) == 1:
+            return Road(mask, codes, graded)
+        alone = [replace(settings, road=(each,)) for each in settings.road_numbers]
+        return Road(
+            *(mask, codes, graded),
+            tuple(self._codes(output, place, each) for each in alone for output in outputs),
+        )
 
     def facts(self) -> Mapping[str, Any]:
         """Return facts about the network for results, beside its settings."""
@@ -91,13 +100,15 @@ class Network:
             "road": [names.get(each, str(each)) for each in self.settings.road_numbers],
         }
 
-    def _codes(self, output: npt.NDArray[Any], place: Placement) -> Probability:
-        scores = as_scores(output, self.settings.layout)
+    def _codes(
+        self, output: npt.NDArray[Any], place: Placement, settings: NetSettings
+    ) -> Probability:
+        scores = as_scores(output, settings.layout)
         assert scores is not None
         if is_labels(output):
-            road = np.isin(scores[0], self.settings.road_numbers).astype(np.uint16)
+            road = np.isin(scores[0], settings.road_numbers).astype(np.uint16)
             return place.back(FULL * road, exact=True)
-        shares = road_probability(scores.astype(np.float32), self.settings)
+        shares = road_probability(scores.astype(np.float32), settings)
         if not np.isfinite(shares).all():
             raise self.file.error("gives NaN")
         framed = np.clip(place.back(shares, exact=False), 0, 1)

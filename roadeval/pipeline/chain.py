@@ -69,15 +69,25 @@ class Pipeline:
     def relevant(self) -> dict[str, dict[str, Any]]:
         """Return the settings that the learnt parameters depend on, by stage.
 
-        Those of stages that learn or change the image, except where they are `inference_only`.
+        Those of stages that learn, change the image, or are heard, except where they are
+        `inference_only` or `places`.
         """
+        heard = {stage.name for stage in self.heard()}
         return {
             stage.name: {
-                key: value for key, value in asdict(own).items() if key not in stage.inference_only
+                key: value
+                for key, value in asdict(own).items()
+                if key not in (*stage.inference_only, *stage.places)
             }
             for stage, own in self._each()
-            if stage.fit is not None or not stage.yields_mask
+            if stage.fit is not None or not stage.yields_mask or stage.name in heard
         }
+
+    def heard(self) -> tuple[Stage, ...]:
+        """Return the stages whose masks a later one learns from; none where no stage hears any."""
+        pairs = [*self._each()]
+        last = max((n for n, (s, own) in enumerate(pairs) if s.hears and s.hears(own)), default=0)
+        return tuple(stage for stage, _ in pairs[:last] if stage.yields_mask)
 
     def resolved(self) -> Pipeline:
         """Return the pipeline with settings stated that its stages find in files.

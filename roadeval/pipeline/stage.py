@@ -24,7 +24,7 @@ Recording, tables and report iterate over stages and layers, and know none by na
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar, cast, dataclass_transform
 
 import cv2
@@ -33,12 +33,22 @@ import numpy.typing as npt
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import ROAD, LayerSpec, Moment, Output, Packed, Rgb, Truth
+from roadeval.data import (
+    ROAD,
+    Frame,
+    LayerSpec,
+    Moment,
+    Output,
+    Packed,
+    Probability,
+    Rgb,
+    Truth,
+)
 from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
 from roadeval.runtime.discovery import Code
 
-__all__ = ["Output", "Stage", "TrainingSet", "View", "perfect_mask", "stage_settings"]
+__all__ = ["Opinion", "Output", "Stage", "TrainingSet", "View", "perfect_mask", "stage_settings"]
 
 T = TypeVar("T")
 
@@ -57,6 +67,26 @@ class StageError(RoadevalError):
     """A stage that fails on a frame, which is then skipped: which stage, and why."""
 
 
+class AbsentError(StageError):
+    """A frame of which another method says nothing: the variant alone leaves it out."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opinion:
+    """What a method says of a frame."""
+
+    mask: Packed
+    """Its road mask."""
+    planes: tuple[Probability, ...] = ()
+    """How probable each class of road is, ``(H, W)`` uint16 codes; none where it gives masks alone.
+    """
+
+    def mirrored(self) -> Opinion:
+        """Return what it says of the mirrored frame, left and right exchanged."""
+        planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in self.planes)
+        return Opinion(Packed.of(self.mask.pixels()[:, ::-1]), planes)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
     """What a stage sees of a frame: views of one image share its arrays."""
@@ -67,23 +97,45 @@ class View:
     """The same after the filters that ran before this stage, C-contiguous."""
     planes: Planes = field(repr=False)
     """Red, green and blue of ``image``, ``(H, W)`` uint8 each."""
-    mask: Packed | None = None
-    """The previous stage's road mask, if there was one."""
+    opinion: Opinion | None = None
+    """That of the previous stage that made a road mask, if there was one."""
     moment: Moment | None = None
     """When the image was taken; None for one that belongs to no drive."""
+    given: Mapping[str, Opinion] = field(default_factory=dict)
+    """What other methods' masks say of the frame, by the names of their variants."""
 
     @classmethod
-    def of(cls, image: Rgb, moment: Moment | None = None) -> View:
+    def of(
+        cls, image: Rgb, moment: Moment | None = None, given: Mapping[str, Opinion] | None = None
+    ) -> View:
         """Return what the first stage sees of an ``(H, W, 3)`` uint8 RGB image."""
         image = np.ascontiguousarray(image)
-        return cls(image, image, split(image), moment=moment)
+        return cls(image, image, split(image), moment=moment, given=given or {})
+
+    @classmethod
+    def of_frame(cls, frame: Frame) -> View:
+        """Return what the first stage sees of a frame."""
+        likely = {name: (plane,) for name, plane in frame.probabilities.items()}
+        given = {
+            name: Opinion(Packed.of(mask), likely.get(name, ()))
+            for name, mask in frame.external.items()
+        }
+        return cls.of(frame.image, frame.moment, given)
+
+    @property
+    def mask(self) -> Packed | None:
+        """The road mask of the opinion."""
+        return None if self.opinion is None else self.opinion.mask
 
     def after(self, output: Output) -> View:
         """Return what the next stage sees."""
         image = self.image if output.image is None else output.image
         planes = self.planes if image is self.image else split(image)
-        mask = self.mask if output.mask is None else output.mask
-        return View(self.original, image, planes, mask, self.moment)
+        opinion = self.opinion
+        if output.mask is not None:
+            one = () if output.probability is None else (output.probability,)
+            opinion = Opinion(output.mask, output.by_class or one)
+        return replace(self, image=image, planes=planes, opinion=opinion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +175,9 @@ class Stage:
     inference_only: tuple[str, ...] = ()
     """Settings that the learnt parameters do not depend on: a model may be used with other values
     than it was trained with."""
+    hears: Callable[[Any], bool] | None = None
+    """``hears(settings)`` tells whether it learns from what the stage before says of a frame, which
+    must learn nothing itself: of frames that taught it, that would say too much. None: never."""
     mask: str = ""
     """The layer of its mask, and its name in tables and timing, where that is not ``name``: stages
     that do the same in different ways are tabled under one name."""
@@ -189,6 +244,8 @@ class TrainingSet:
     share: float | None = None
     """Of road among the labelled pixels of the frames, from which as many pixels of road as of the
     rest are sampled; None where the labels are a guess, whose share is not to be trusted."""
+    opinions: tuple[Opinion | None, ...] = ()
+    """What the stage before says of each frame, if it makes a mask; empty where none is asked."""
 
     def colours(self) -> npt.NDArray[np.uint8]:
         """Return the colours of the sampled pixels, ``(n, 3)`` uint8 RGB."""

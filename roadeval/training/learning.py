@@ -23,7 +23,7 @@ from roadeval.pipeline.beyond.features import reach
 from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
-from roadeval.pipeline.stage import StageError, TrainingSet, View
+from roadeval.pipeline.stage import Output, StageError, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
 from roadeval.training.schedule import Likeness, Schedule, fingerprint
@@ -70,7 +70,7 @@ def fit(
                 sampled, share=(road / sum(np.count_nonzero(truth != IGNORE) for truth in truths))
             )
         pixels = len(sampled.road)
-        each = partial(_fit_variant, sampled, {} if base is None else base.parameters)
+        each = partial(_fit_variant, frames, sampled, {} if base is None else base.parameters)
         for name, learnt, warned in ordered(each, learning.items(), _AT_ONCE):
             parameters[name] = learnt
             warnings += warned
@@ -115,19 +115,27 @@ def _sampled(
 
 
 def _fit_variant(
-    sampled: TrainingSet, base: Mapping[str, Mapping[str, Any]], variant: tuple[str, Pipeline]
+    frames: Sequence[Frame],
+    sampled: TrainingSet,
+    base: Mapping[str, Mapping[str, Any]],
+    variant: tuple[str, Pipeline],
 ) -> tuple[str, dict[str, Any], list[str]]:
     """Return the variant's name, what its stages learn, and the warnings."""
     name, pipeline = variant
-    learnt = _fit_stages(sampled, pipeline, base.get(name, {}))
-    return name, learnt, _collapsed(name, sampled.images, pipeline, learnt)
+    learnt = _fit_stages(frames, sampled, pipeline, base.get(name, {}))
+    return name, learnt, _collapsed(name, frames, pipeline, learnt)
 
 
 def _fit_stages(
-    training_set: TrainingSet, pipeline: Pipeline, base: Mapping[str, Any]
+    frames: Sequence[Frame], training_set: TrainingSet, pipeline: Pipeline, base: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Fit the stages in order; what follows a filter learns from the filtered images."""
+    """Fit the stages in order.
+
+    What follows a filter learns from the filtered images, and what hears another method from what
+    that says of them.
+    """
     parameters: dict[str, Any] = dict(base)
+    heard = {stage.name for stage in pipeline.heard()}
     for stage in pipeline.stages():
         settings = pipeline.settings[stage.name]
         if stage.fit is not None and stage.name not in base:
@@ -138,20 +146,27 @@ def _fit_stages(
             only = pipeline.alone(stage.name).bind(parameters)
             filtered = tuple(only.filtered(image) for image in training_set.images)
             training_set = dataclasses.replace(training_set, images=filtered)
+        elif stage.name in heard:
+            (step,) = pipeline.alone(stage.name).bind(parameters).steps
+            seen = zip(frames, training_set.images, strict=True)
+            views = (View.of_frame(each).after(Output(image=image)) for each, image in seen)
+            opinions = tuple(view.after(step.run(view)).opinion for view in views)
+            training_set = dataclasses.replace(training_set, opinions=opinions)
     return parameters
 
 
 def _collapsed(
-    variant: str, images: Sequence[Rgb], pipeline: Pipeline, parameters: Mapping[str, Any]
+    variant: str, frames: Sequence[Frame], pipeline: Pipeline, parameters: Mapping[str, Any]
 ) -> list[str]:
     """Return a warning for each stage that calls all or none of its training frames road."""
     chain = pipeline.bind(parameters)
     shares: dict[str, list[float]] = {}
-    for image in images:
+    for frame in frames:
         with suppress(StageError):  # it is reported when the frame is replayed
-            for name, output in chain.run(View.of(image)):
+            for name, output in chain.run(View.of_frame(frame)):
                 if output.mask is not None:
-                    shares.setdefault(name, []).append(output.mask.area() / image[..., 0].size)
+                    pixels = frame.image[..., 0].size
+                    shares.setdefault(name, []).append(output.mask.area() / pixels)
     return [
         f"{variant}: {name} has collapsed: it calls {share:.1%} of its own training frames road"
         for name, share in ((name, float(np.mean(values))) for name, values in shares.items())

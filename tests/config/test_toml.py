@@ -87,8 +87,8 @@ def tables(setting: str) -> dict:
 
 
 def test_every_option_is_tried_here():
-    # In a file a network is a variant like others.
-    assert OTHER.keys() == {option.setting for option in OPTIONS} - {"config", "nets"}
+    # In a file a network is a variant like others, and so is a tuned one.
+    assert OTHER.keys() == {option.setting for option in OPTIONS} - {"config", "nets", "tunes"}
 
 
 @pytest.mark.parametrize("setting", OTHER)

@@ -57,6 +57,9 @@ def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
     shares = softmax(scores(values, IMAGE.transpose(2, 0, 1) / 255))
     expected = cv2.resize((shares[0] + shares[2]).astype(np.float32), SIZE)
     assert np.abs(road.codes / FULL - expected).max() < 1e-4
+    for codes, number in zip(road.by_class, (0, 2), strict=True):
+        alone = cv2.resize(shares[number].astype(np.float32), SIZE)
+        assert np.abs(codes / FULL - alone).max() < 1e-4
 
 
 def test_two_classes_can_be_road_together(tmp_path):

@@ -23,7 +23,7 @@ Drives = Annotated[
 
 
 @takes(
-    *("preset", "config", "variants", "nets", "masks", "only", "drives"),
+    *("preset", "config", "variants", "nets", "masks", "tunes", "only", "drives"),
     *("training", "truth", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @takes(
-    *("output", "preset", "config", "variants", "nets", "masks", "only"),
+    *("output", "preset", "config", "variants", "nets", "masks", "tunes", "only"),
     *("training", "truth", "topics", "labels", "frames", "run"),
 )
 def replay(

@@ -12,8 +12,8 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("preset", "config", "variants", "drives", "training.frames"),
-    *("truth", "topics.image", "topics.truth", "labels"),
+    *("preset", "config", "variants", "nets", "masks", "tunes", "drives", "training.frames"),
+    *("truth", "topics.image", "topics.truth", "topics.masks", "labels"),
     *("topics.sync_tolerance_ms", "topics.resize_truth"),
     *("frames.scale", "frames.keep_corrupt", "frames.max_pixels"),
     *("frames.start", "frames.end"),

@@ -43,25 +43,35 @@ def run_variant(
     *,
     truth: Truth | None = None,
     shadow_truth: Truth | None = None,
-    known: dict[Any, dict[str, Packed]] | None = None,
+    known: dict[Any, Any] | None = None,
     repeats: Mapping[int, Chain] | None = None,
 ) -> VariantResult:
     """Run a chain on a frame and time each of its stages.
 
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
-    ``known`` is what the frame's variants share of it, see `Chain.oracles`. Then the chains of
-    further trainings run, too, by their seeds.
+    ``known`` is what the frame's variants share: what `Chain.oracles` says, and the first stage of
+    chains that makes a mask and has learnt nothing, as a network that is tuned besides. Then the
+    chains of further trainings run, too, by their seeds.
     """
-    results, outputs = [], []
-    start = perf_counter()
-    for stage, output in chain.run(view):
-        seconds = perf_counter() - start
-        results.append(StageResult(stage, output, seconds))
-        outputs.append(output)
-        start = perf_counter()
+    shared = {} if known is None else known
+    results, seen = [], view
+    for step in chain.steps:
+        # A network that is one variant, and tuned in another, runs once.
+        stage, found = step.stage, None
+        is_shared = seen is view and stage.yields_mask and stage.fit is None
+        if is_shared:
+            found = shared.get((stage.name, step.settings))
+        if found is None:
+            start = perf_counter()
+            output = step.run(seen)
+            found = StageResult(stage.reported, output, perf_counter() - start)
+        if is_shared:
+            shared[stage.name, step.settings] = found
+        results.append(found)
+        seen = seen.after(found.output)
     if truth is None:
         return VariantResult(name, tuple(results))
-    shared = {} if known is None else known
+    outputs = [each.output for each in results]
     oracles = dict(chain.oracles(view, outputs, truth, shadow_truth, shared))
     again = {s: dict(other.repeated(view, outputs)) for s, other in (repeats or {}).items()}
     return VariantResult(name, tuple(results), oracles, again)

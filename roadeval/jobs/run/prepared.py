@@ -25,7 +25,7 @@ from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError, StageError, View
+from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
 from roadeval.recording import Layout
 from roadeval.results.rows import Key, csv_lines, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
@@ -397,13 +397,15 @@ def _process(
     use = run.schedule.use(frame)
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
-    view = View.of(frame.image, frame.moment)
+    view = View.of_frame(frame)
     variants = []
     for name, chain in run.chains.items():
         repeats = {seed: chains[name] for seed, chains in run.repeats.items()}
         truths = {"truth": known[0], "shadow_truth": known[1]}
         try:
             found = run_variant(name, chain, view, **truths, known=shared, repeats=repeats)
+        except AbsentError:
+            continue
         except StageError as error:
             where = "".join(traceback.format_exception(error))
             return Failure(frame.number, use.role, name, str(error), where)

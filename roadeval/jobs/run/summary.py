@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, Final
 
+from roadeval.config import TUNED
 from roadeval.data import BASELINE, Role
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.results.facts import (
@@ -98,11 +99,33 @@ def warnings(run: Run) -> tuple[str, ...]:
         *_sparse(run),
         *run.frames.oddities,
         *tuple(warned),
+        *_tuned(run),
         *_missing(run),
         *_near_training(run),
         *_constant(run),
         *run.model.warnings,
     )
+
+
+def _tuned(run: Run) -> Iterator[str]:
+    """Yield for each method that was tuned where its trees have learnt."""
+    settings, roles = run.config.training, Counter(run.board.roles())
+    number = roles[Role.TRAINING]
+    frames = "labelled frames" if run.model.source == "truth" else "frames, without labels"
+    is_first = settings.placement == "first"
+    own = (
+        f"this drive's first {number} {frames}" if is_first else f"{number} {frames} of this drive"
+    )
+    where = own
+    if settings.model is not None:
+        where = f"other drives and {own}" if settings.adapt else f"other drives ({settings.model})"
+    for variant in run.variants:
+        if variant.pipeline.heard():
+            method = variant.name.removesuffix(TUNED)
+            yield (
+                f"{variant.name}: learnt on {where}, on top of what {method} says: its rates are "
+                f"not those of {method}" + (" on other drives" if "this drive" in where else "")
+            )
 
 
 def _sparse(run: Run) -> Iterator[str]:

@@ -32,7 +32,7 @@ def train(
     listed in `Model.losses`. A `RoadevalError` if some drives have truth and others none, or there
     is nothing to learn.
     """
-    config, paths = config or RunConfig(), listed(drives)
+    config, paths = (config or RunConfig()).resolved(), listed(drives)
     settings = config.training
     for path in config.unused(paths):
         names = ", ".join(map(str, paths))
@@ -78,7 +78,9 @@ def _draw(
 ) -> _Drawn:
     """Decode the training frames of a drive and hold them."""
     own, frames, streams = config.for_drive(drive), list[Frame](), list[logs.FrameStream]()
-    with logs.open_log(drive, replace(own, masks={})) as log:
+    needed = config.given()
+    masks = {name: each for name, each in own.masks.items() if name in needed}
+    with logs.open_log(drive, replace(own, masks=masks)) as log:
         selection = log.select(several=several and own.labels == config.labels)
 
         def begin() -> logs.FrameStream:

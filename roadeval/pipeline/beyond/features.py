@@ -17,7 +17,7 @@ from roadeval.data import Mask, Rgb
 from roadeval.data.arrays import Values
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond.scene import Scene, mean, slopes_of, steepness, tones_of
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.stage import Opinion, TrainingSet
 
 Places = npt.NDArray[np.intp]
 
@@ -335,21 +335,50 @@ def features(scene: Scene, groups: Sequence[str]) -> Values:
     return found
 
 
-def at_samples(sample: TrainingSet, see: Callable[[Rgb], Values]) -> tuple[Values, Values]:
+SURE: Final = np.float32(1 / 65535)
+"""The probability nearest to 0 or 1 that a log-odds is computed of."""
+
+
+def opinions(opinion: Opinion, shape: tuple[int, int]) -> Values:
+    """Return the log-odds of road of each plane of an opinion, ``(P, h, w)`` float32.
+
+    Of a mask without any it is the signed distance to the mask's edge in pixels of the working
+    image, positive inside. ``shape`` is the working image's height and width.
+    """
+    size = shape[::-1]
+    if not opinion.planes:
+        mask = cv2.resize(opinion.mask.pixels(), size, interpolation=cv2.INTER_NEAREST_EXACT)
+        inside, outside = (
+            cv2.distanceTransform(side, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+            for side in (mask, 1 - mask)
+        )
+        signed: Values = np.clip(inside - outside, -max(size), max(size))[None]
+        return signed
+    planes = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in opinion.planes]
+    share = np.stack(planes).astype(np.float32) * SURE
+    odds: Values = np.log((share + SURE) / (np.float32(1) - share + SURE))
+    return odds
+
+
+def at_samples(
+    sample: TrainingSet, see: Callable[[Rgb, Opinion | None], Values]
+) -> tuple[Values, Values]:
     """Return the features of the sampled pixels, and of the same in the mirrored images.
 
     Nothing but habit makes traffic keep to one side: the mirror doubles what there is to learn
     from. Both are ``(n, F)`` float32, in the sample's order; ``see`` returns the features of an
-    image, ``(F, h, w)``.
+    image and what is said of it, ``(F, h, w)``.
     """
     order, straight, mirrored = [], [], []
-    for index, image in enumerate(sample.images):
+    heard = sample.opinions or (None,) * len(sample.images)
+    for index, (image, opinion) in enumerate(zip(sample.images, heard, strict=True)):
         here = np.flatnonzero(sample.frame == index)
         row, column = sample.row[here], sample.column[here]
         flipped = np.ascontiguousarray(image[:, ::-1])
         order.append(here)
-        straight.append(_at(see(image), image, row, column))
-        mirrored.append(_at(see(flipped), image, row, image.shape[1] - 1 - column))
+        straight.append(_at(see(image, opinion), image, row, column))
+        opposite = None if opinion is None else opinion.mirrored()
+        mirrored.append(_at(see(flipped, opposite), image, row, image.shape[1] - 1 - column))
     back = np.argsort(np.concatenate(order))
     return np.concatenate(straight)[back], np.concatenate(mirrored)[back]
 

@@ -32,6 +32,7 @@ def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
             (Layer(PROBABILITY, levels), Layer(NET, mask)),
             mask=mask,
             probability=road.codes if road.graded else None,
+            by_class=road.by_class,
         )
 
     return run

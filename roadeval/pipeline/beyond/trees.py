@@ -17,7 +17,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any, Final, NamedTuple
 
@@ -38,16 +38,19 @@ from roadeval.pipeline.beyond.features import (
     features,
     lit,
     names_of,
+    opinions,
     reach_inputs,
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
-from roadeval.pipeline.beyond.scene import guided, scene_of, stretched
+from roadeval.pipeline.beyond.scene import Scene, guided, scene_of, stretched
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
     GREATEST,
     MisfitError,
+    Opinion,
     Output,
     Stage,
+    StageError,
     TrainingSet,
     View,
     check_arrays,
@@ -247,6 +250,9 @@ class TreesSettings:
     """Columns of the working image."""
     features: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(GROUPS)
     """Groups of features, see `roadeval.pipeline.beyond.features`."""
+    opinion: bool = False
+    """Whether what the stage before says of a pixel is a feature, too: its log-odds of road, or the
+    distance to its mask's edge."""
     patch: ReferencePatch = ReferencePatch()
     """The reference patch, from which distances of colour and paths are measured."""
     trees: Annotated[int, Field(ge=1, le=1000)] = 150
@@ -339,9 +345,22 @@ class Stack:
         return self.top.log_odds(values, weight)
 
 
-def see(settings: TreesSettings, image: Rgb) -> Values:
-    """Compute the features of ``(H, W, 3)`` uint8 RGB, ``(F, h, w)`` float32."""
-    return features(scene_of(image, settings.width, settings.patch), settings.features)
+def see(settings: TreesSettings, image: Rgb, opinion: Opinion | None = None) -> Values:
+    """Compute the features of ``(H, W, 3)`` uint8 RGB, ``(F, h, w)`` float32.
+
+    Those of the opinion come last, where the settings ask for it.
+    """
+    return seen(scene_of(image, settings.width, settings.patch), settings, opinion)
+
+
+def seen(scene: Scene, settings: TreesSettings, opinion: Opinion | None) -> Values:
+    """Return the features of a scene, and of an opinion where the settings ask for it."""
+    own = features(scene, settings.features)
+    if not settings.opinion:
+        return own
+    if opinion is None:
+        raise StageError("trees: `opinion` asks for a stage before it that makes a road mask")
+    return np.concatenate([own, opinions(opinion, scene.shape)])
 
 
 def fit(sample: TrainingSet, settings: TreesSettings) -> Stack:
@@ -385,7 +404,7 @@ def balanced_back(road: Flags, share: float) -> Floats:
 def check_fit(learnt: Stack, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
     known = len(names_of(settings.features))
-    if learnt.inputs != known:
+    if settings.opinion == (learnt.inputs == known) or learnt.inputs < known:
         raise MisfitError(
             f"the model's trees were grown on {learnt.inputs} features of a pixel, and this "
             f"version computes {known}; train it again"
@@ -424,20 +443,26 @@ def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
     check_fit(learnt, settings)
     names = names_of(settings.features)
     known = [names.index(name) for name in REACH if name in names]
+    _, share_spec, _ = layers(settings)
 
     def run(view: View) -> Output:
         scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
-        seen = features(scene, settings.features)
-        over, around, light = seen[known] if len(known) == len(REACH) else reach_inputs(scene)
+        values = seen(scene, settings, view.opinion)
+        if len(values) != learnt.inputs:
+            raise StageError(
+                f"trees: {len(values)} features of a pixel, and it has learnt from {learnt.inputs}:"
+                " the stage before says how probable other classes of road are"
+            )
+        over, around, light = values[known] if len(known) == len(REACH) else reach_inputs(scene)
         far = combined(over, around)
-        opinion = log_odds(seen, learnt, settings)
-        odds = opinion - np.float32(settings.reach_weight) * beyond(far, light)
+        learnt_odds = log_odds(values, learnt, settings)
+        odds = learnt_odds - np.float32(settings.reach_weight) * beyond(far, light)
         share = np.clip(guided(probability(odds), scene.image, view.image), 0, 1)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
         shown = (
             Layer(GEODESIC, stretched(far, shape)),
-            Layer(PROBABILITY, (codes >> 8).astype(np.uint8)),
+            Layer(share_spec, (codes >> 8).astype(np.uint8)),
             Layer(TREES, road),
         )
         return Output(shown, mask=road, probability=codes)
@@ -445,15 +470,22 @@ def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
     return run
 
 
+def layers(settings: TreesSettings) -> tuple[LayerSpec, ...]:
+    """Return the layers; the stage before has a ``probability`` of its own where it is heard."""
+    share = replace(PROBABILITY, name="tuned_probability") if settings.opinion else PROBABILITY
+    return GEODESIC, share, TREES
+
+
 STAGE: Final = Stage(
     name="trees",
     title="Boosted trees on colour, place, texture, surroundings and paths from the patch",
     settings=TreesSettings,
     bind=bind,
-    layers=(GEODESIC, PROBABILITY, TREES),
+    layers=layers,
     fit=fit,
     adapt=adapt,
     parameters=Stack,
     oracle=perfect_mask,
     inference_only=("reach_weight", "threshold"),
+    hears=lambda settings: settings.opinion,
 )

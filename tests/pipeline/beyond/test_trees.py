@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 
+from roadeval.data import Packed
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.features import at_samples, names_of, reach
+from roadeval.pipeline.beyond.features import at_samples, names_of, opinions, reach
 from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.beyond.trees import (
     ALL,
@@ -22,7 +23,7 @@ from roadeval.pipeline.beyond.trees import (
     bin_edges,
     grow,
 )
-from roadeval.pipeline.stage import MisfitError, TrainingSet, View
+from roadeval.pipeline.stage import MisfitError, Opinion, StageError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)
 
@@ -159,7 +160,7 @@ def test_samples_are_seen_as_they_are_and_mirrored():
     where = np.array([0, 0]), np.array([23, 3]), np.array([31, 5])
     sample = TrainingSet((image,), *where, np.array([True, False]))
 
-    def see(seen):
+    def see(seen, _opinion):
         return np.moveaxis(seen, 2, 0).astype(np.float32)
 
     straight, mirrored = at_samples(sample, see)
@@ -172,15 +173,56 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
     image[:, :10] = 20
     sample = TrainingSet((image,), *np.array([[0], [20], [3]]), np.array([True]))
     place = replace(SMALL, features=("place",))
-    straight, mirrored = at_samples(sample, lambda seen: trees.see(place, seen))
+    straight, mirrored = at_samples(sample, partial(trees.see, place))
     np.testing.assert_allclose(straight[0, 0], -mirrored[0, 0])
     np.testing.assert_allclose(straight[0, 1:], mirrored[0, 1:])
+
+
+def opinion_of(road):
+    """What a method says that knows the left side alone, by its mask and by two planes."""
+    codes = np.where(road, 60000, 3000).astype(np.uint16)
+    return Opinion(Packed.of(road), (codes, 65535 - codes))
+
+
+def test_a_mirrored_image_has_the_mirrored_opinion():
+    image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    opinion = opinion_of(np.indices((24, 32))[1] < 12)
+    where = np.array([[0, 0], [20, 3], [2, 30]])
+    sample = TrainingSet((image,), *where, np.array([True, False]), opinions=(opinion,))
+    straight, mirrored = at_samples(sample, partial(trees.see, replace(SMALL, opinion=True)))
+    known = len(names_of(SMALL.features))
+    sure = np.log(60000 / 5535)
+    expected = [[sure, -sure], [-np.log(62535 / 3000), np.log(62535 / 3000)]]
+    np.testing.assert_allclose(straight[:, known:], expected, rtol=1e-3)
+    np.testing.assert_array_equal(straight[:, known:], mirrored[:, known:])
+
+
+def test_a_mask_alone_says_how_far_its_edge_is():
+    mask = np.zeros((24, 32), bool)
+    mask[:, :12] = True
+    (signed,) = opinions(Opinion(Packed.of(mask)), (24, 32))
+    np.testing.assert_array_equal(signed[5, [0, 11, 12, 31]], [12, 1, -1, -20])
+    everywhere = opinions(Opinion(Packed.of(np.ones_like(mask))), (24, 32))
+    assert np.isfinite(everywhere).all()
+
+
+def test_trees_that_hear_nothing_say_so():
+    heard = replace(SMALL, opinion=True)
+    sample = replace(every_pixel((5, 9)), opinions=(opinion_of(picture(5)[1] > 0),) * 2)
+    learnt = trees.fit(sample, heard)
+    with pytest.raises(StageError, match="asks for a stage before it"):
+        trees.bind(heard, learnt)(VIEW)
+    more = replace(VIEW, opinion=Opinion(sample.opinions[0].mask))
+    with pytest.raises(StageError, match="how probable other classes"):
+        trees.bind(heard, learnt)(more)
+    with pytest.raises(MisfitError, match="train it again"):
+        trees.bind(SMALL, learnt)
 
 
 def test_samples_keep_their_order():
     images = tuple(np.full((24, 32, 3), grey, np.uint8) for grey in (10, 200))
     sample = TrainingSet(images, *np.array([[1, 0, 1], [0, 1, 2], [0, 1, 2]]), np.ones(3, bool))
-    straight, _ = at_samples(sample, lambda seen: np.moveaxis(seen, 2, 0).astype(np.float32))
+    straight, _ = at_samples(sample, lambda seen, _: np.moveaxis(seen, 2, 0).astype(np.float32))
     assert straight[:, 0].tolist() == [200, 10, 200]
 
 
@@ -222,7 +264,7 @@ def test_groups_must_be_known_and_named_once(names):
 
 def test_the_layers_are_those_that_are_announced(learnt):
     found = trees.bind(SMALL, learnt)(VIEW).layers
-    assert tuple(layer.spec for layer in found) == trees.STAGE.layers
+    assert tuple(layer.spec for layer in found) == trees.layers(SMALL)
     far = reach(scene_of(VIEW.image, SMALL.width, SMALL.patch))
     np.testing.assert_allclose(found[0].array, stretched(far, VIEW.image.shape), rtol=1e-6)
 

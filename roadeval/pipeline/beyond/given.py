@@ -1,0 +1,41 @@
+"""Road as another method has found it: its masks in the log, or beside it, as a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from roadeval.data import Layer, mask_spec
+from roadeval.pipeline.stage import AbsentError, Output, Stage, View, stage_settings
+
+GIVEN: Final = mask_spec("given", "Road by another method")
+
+
+@stage_settings
+class GivenSettings:
+    """Settings of another method's masks as a stage."""
+
+    name: str = ""
+    """The variant whose masks they are, one of ``[masks]`` or ``topics.masks``."""
+
+
+def bind(settings: GivenSettings, _parameters: None) -> Callable[[View], Output]:
+    """Return the masks as a function of what is seen; an `AbsentError` for a frame without."""
+
+    def run(view: View) -> Output:
+        if (found := view.given.get(settings.name)) is None:
+            which = f"frame {view.moment.number}" if view.moment else "the image"
+            raise AbsentError(f"given: {which} has no mask of {settings.name}")
+        likely = found.planes[0] if found.planes else None
+        return Output((Layer(GIVEN, found.mask),), mask=found.mask, probability=likely)
+
+    return run
+
+
+STAGE: Final = Stage(
+    name="given",
+    title="Another method's masks",
+    settings=GivenSettings,
+    bind=bind,
+    layers=(GIVEN,),
+)

@@ -1,0 +1,220 @@
+"""A method that errs in the shade, and what ten frames of the drive make of it."""
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+import roadeval
+from roadeval.config import ConfigError, configure, network_variant
+from roadeval.jobs.run import prepared
+from roadeval.jobs.run.prepared import prepare
+from roadeval.logs import LogWriter, open_log
+from roadeval.networks import network as networks
+from roadeval.training.model import arrays_of
+from tests.networks.making import red_network
+
+SIZE = (48, 64)
+NS = 100_000_000
+TRAINED = 10
+FRAMES = 22
+SMALL = {"preset": "robust", "trees": {"width": 64, "trees": 20, "hidden": 8, "passes": 4}}
+
+
+def picture(number):
+    """A red road between green verges, half of it in the shade; house fronts are as red."""
+    height, width = SIZE
+    rng = np.random.default_rng(number)
+    image = np.empty((height, width, 3), np.uint8)
+    image[:] = (60, 120, 50)
+    image[: height // 3] = (150, 110, 100)
+    rows, columns = np.indices(SIZE)
+    middle = width / 2 + 6 * np.sin(number)
+    road = (rows >= height // 3) & (np.abs(columns - middle) < 4 + rows * 0.4)
+    image[road] = (150, 120, 110)
+    edge = width * (0.3 + 0.4 * rng.random())
+    image[columns < edge] = image[columns < edge] // 3
+    noise = rng.integers(-6, 7, image.shape)
+    return np.clip(image + noise, 0, 255).astype(np.uint8), road.astype(np.uint8)
+
+
+def write(path, *, mirrored_truth_from=FRAMES, without=(), confidence=False):
+    """A drive with masks that are blind to shade; some frames may have another truth, or none."""
+    with LogWriter(path) as writer:
+        for number in range(FRAMES):
+            image, road = picture(number)
+            truth = road if number < mirrored_truth_from else np.ascontiguousarray(road[::-1])
+            stamp = (number + 1) * NS
+            _, png = cv2.imencode(".png", image[..., ::-1])
+            writer.image("/camera/image", stamp, png.tobytes(), "png")
+            writer.mask("/truth/road", stamp, truth * 255)
+            if number not in without:
+                writer.mask("/net/mask", stamp, (image[..., 0] > 105).astype(np.uint8) * 255)
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tuned")
+    write(folder / "drive.mcap")
+    red_network(folder / "red.onnx", size=SIZE[::-1])
+    return folder
+
+
+def with_network(folder, **tables):
+    config = configure({**SMALL, **tables})
+    config = config.with_variants([network_variant("mine", str(folder / "red.onnx"))])
+    return small(config.with_tuned(["mine"]))
+
+
+def small(config):
+    """The trees of every variant as small as those of the preset's own."""
+    trees = {each.name: {**each.pipeline.as_dict(), "preset": each.preset} for each in config.extra}
+    for own in trees.values():
+        if "trees" in own:
+            own["trees"] = {**own["trees"], **SMALL["trees"]}
+    return config.override({"variants": trees})
+
+
+def replay(drive, config, to):
+    outcome = roadeval.replay(drive, config, reports=to)
+    return outcome, pd.read_csv(to / "frames.csv")
+
+
+def err(rows, variant, stage="post"):
+    return rows.query("variant == @variant and stage == @stage").ERR.mean()
+
+
+@pytest.fixture(scope="module")
+def once(folder, tmp_path_factory):
+    config = with_network(folder, output={"record": "none"})
+    return replay(folder / "drive.mcap", config, tmp_path_factory.mktemp("once") / "r")
+
+
+def test_a_network_that_is_blind_to_shade_is_mended(once):
+    _, rows = once
+    assert err(rows, "mine") > 0.2
+    assert err(rows, "mine_tuned") < err(rows, "mine") / 5
+    assert err(rows, "mine_tuned", "net") == err(rows, "mine")
+
+
+def test_it_says_where_it_has_learnt(once):
+    outcome, _ = once
+    (told,) = [each for each in outcome.warnings if each.startswith("mine_tuned")]
+    assert told == (
+        "mine_tuned: learnt on this drive's first 10 labelled frames, on top of what mine says: "
+        "its rates are not those of mine on other drives"
+    )
+
+
+def test_the_network_runs_once_a_frame(folder, tmp_path, monkeypatch):
+    calls = []
+    road = networks.Network.road
+
+    def counted(self, image):
+        calls.append(image)
+        return road(self, image)
+
+    monkeypatch.setattr(networks.Network, "road", counted)
+    config = with_network(folder, output={"record": "none"}, run={"jobs": 1})
+    outcome, _ = replay(folder / "drive.mcap", config, tmp_path / "r")
+    in_training = 2 * TRAINED  # what it says of them, and whether the trees have collapsed
+    assert len(calls) == FRAMES + in_training
+    seconds = outcome.summary["seconds"]
+    assert seconds["mine_tuned"]["net"] == seconds["mine"]["net"] > 0
+
+
+def learnt(drive, config):
+    with open_log(drive, config) as log:
+        run = prepare(log, config.resolved(), lambda _: None)
+    return arrays_of(run.model.parameters["mine_tuned"]["trees"])
+
+
+def test_labels_of_scored_frames_change_nothing_that_is_learnt(folder, tmp_path):
+    other = write(tmp_path / "other.mcap", mirrored_truth_from=TRAINED)
+    config = with_network(folder)
+    first, second = (learnt(each, config) for each in (folder / "drive.mcap", other))
+    assert all(np.array_equal(first[name], second[name]) for name in first)
+    third = learnt(write(tmp_path / "third.mcap", mirrored_truth_from=TRAINED - 1), config)
+    assert not all(np.array_equal(first[name], third[name]) for name in first)
+
+
+def test_masks_of_the_log_are_mended_too_and_frames_without_one_left_out(folder, tmp_path):
+    drive = write(tmp_path / "drive.mcap", without=(15, 16))
+    config = configure({**SMALL, "topics": {"masks": {"mine": "/net/mask"}}})
+    outcome, rows = replay(drive, small(config.with_tuned(["mine"])), tmp_path / "r")
+    assert err(rows, "mine") > 0.2
+    assert err(rows, "mine_tuned") < err(rows, "mine") / 5
+    scored = rows.groupby("variant").frame.nunique()
+    assert scored["mine"] == scored["mine_tuned"] == scored["unfiltered"] - 2
+    assert not outcome.losses
+
+
+def test_a_training_frame_without_a_mask_ends_the_run(folder, tmp_path):
+    drive = write(tmp_path / "drive.mcap", without=(3,))
+    config = configure({**SMALL, "topics": {"masks": {"mine": "/net/mask"}}})
+    with pytest.raises(roadeval.RoadevalError, match="frame 3 has no mask of mine"):
+        replay(drive, config.with_tuned(["mine"]), tmp_path / "r")
+
+
+def test_confidences_beside_the_log(folder, tmp_path):
+    (tmp_path / "shares").mkdir()
+    for number in range(FRAMES):
+        share = picture(number)[0][..., 0].astype(np.float32) / 255
+        np.save(tmp_path / "shares" / f"{number}.npy", share)
+    masks = {"mine": {"path": str(tmp_path / "shares"), "threshold": 0.41}}
+    config = small(configure({**SMALL, "masks": masks}).with_tuned(["mine"]))
+    _, rows = replay(folder / "drive.mcap", config, tmp_path / "r")
+    assert err(rows, "mine_tuned") < err(rows, "mine") / 5
+
+
+def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
+    config = with_network(folder)
+    roadeval.train(folder / "drive.mcap", tmp_path / "mine.model", config)
+    drive = write(tmp_path / "drive.mcap")
+    for adapt in (False, True):
+        training = {"model": str(tmp_path / "mine.model"), "adapt": adapt, "frames": 4}
+        own = config.override({"training": training, "frames": {"start": "1.05s"}})
+        outcome, rows = replay(drive, own, tmp_path / f"{adapt}")
+        told = "on other drives" if not adapt else "on other drives and this drive's first"
+        assert any(told in each for each in outcome.warnings)
+        assert err(rows, "mine_tuned") < err(rows, "mine") / 3
+
+
+def test_a_model_is_refused_with_another_network(folder, tmp_path):
+    config = with_network(folder)
+    roadeval.train(folder / "drive.mcap", tmp_path / "mine.model", config)
+    red_network(tmp_path / "red.onnx", size=SIZE[::-1], bias=-90)
+    other = with_network(tmp_path, training={"model": str(tmp_path / "mine.model")})
+    with pytest.raises(roadeval.RoadevalError, match="other settings of net"):
+        replay(folder / "drive.mcap", other, tmp_path / "r")
+
+
+def test_run_toml_repeats_it(folder, tmp_path):
+    config = with_network(folder, output={"record": "none"})
+    _, rows = replay(folder / "drive.mcap", config, tmp_path / "a")
+    again = roadeval.load_config(tmp_path / "a" / "run.toml")
+    _, repeated = replay(folder / "drive.mcap", again, tmp_path / "b")
+    pd.testing.assert_frame_equal(rows, repeated)
+
+
+def test_one_frame_in_a_notebook(folder):
+    config = with_network(folder).resolved()
+    with open_log(folder / "drive.mcap", config) as log:
+        run = prepared.prepare(log, config, lambda _: None)
+    image, road = picture(FRAMES)
+    found = roadeval.run_frame(image, run.model, config, variant="mine_tuned").final()
+    assert (found != road).mean() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("other", "there is no such method; choose mine"),
+        ("unfiltered", "it learns itself (trees)"),
+    ],
+)
+def test_what_cannot_be_tuned(folder, name, told):
+    config = configure(SMALL).with_variants([network_variant("mine", "n.onnx")])
+    with pytest.raises(ConfigError, match=told.replace("(", r"\(").replace(")", r"\)")):
+        config.with_tuned([name])
