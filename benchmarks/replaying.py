@@ -157,7 +157,7 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
                 results.append(done.lines)
             recorder.finish({})
             cost = meter.read()
-            results.append(csv_lines(run.key, sum_rows(run.board.sums())))
+            results.append(csv_lines(run.key, sum_rows(run.board)))
             results.finish(summary.of(run, [], results.tables), "")
         return cost
 

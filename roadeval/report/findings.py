@@ -31,7 +31,7 @@ class PairedComparison:
     frames: Rows
     """See `roadeval.evaluation.score.pairs`."""
     pixels: tuple[int, int, int] | None = None
-    """Newly right, newly wrong and labelled pixels of the frames sampled; None if not known."""
+    """Newly right, newly wrong and labelled pixels; None of a run that was killed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,8 +114,6 @@ class Findings:
     """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
     levels: Rows
     """As ``probabilities.csv``; empty where no stage says how probable road is."""
-    sampled: int
-    """Frames that ``heatmaps`` and ``changes`` were counted on; 0 if there are none."""
     examples: Sequence[ExampleFrame]
     """Frames for figure 2."""
     thumbnails: Sequence[LayerImage]

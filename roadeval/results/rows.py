@@ -18,8 +18,7 @@ from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
-    from roadeval.data.arrays import Sums
-    from roadeval.evaluation.score import DriveSums, HeatMap, Name, Window
+    from roadeval.evaluation.score import Scoreboard, Window
     from roadeval.results.facts import Facts
 
 Row = tuple[str | int | float, ...]
@@ -92,13 +91,32 @@ def _pairs(changes: Mapping[Transition, Change]) -> Iterator[tuple[str, str, Cha
             yield one, other, change
 
 
-def sum_rows(sums: DriveSums) -> dict[str, list[Row]]:
-    """Return the rows of each table of sums over the drive."""
+def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
+    """Return the rows of each table of sums over the drive.
+
+    Cells of heat maps that are never labelled, and levels of probabilities that do not occur, have
+    none.
+    """
+    heat: list[Row] = []
+    for variant, each in board.heat.items():
+        side, sums = each.cells()
+        tops, lefts = sums[0].nonzero()
+        cells = (tops * side, lefts * side, np.full_like(tops, side), *sums[:, tops, lefts])
+        heat += [(variant, *cell) for cell in np.column_stack(cells).tolist()]
+    probabilities: list[Row] = []
+    for name, counts in board.curves.counts.items():
+        other, road = at_levels(counts)
+        levels = (other + road).nonzero()[0]
+        columns = (levels.tolist(), road[levels].tolist(), other[levels].tolist())
+        probabilities += [(*name, *level) for level in zip(*columns, strict=True)]
     return {
-        "windows": window_rows(sums.windows),
-        "changes": change_rows(sums.changes),
-        "heat": heat_rows(sums.heat),
-        "probabilities": probability_rows(sums.probabilities),
+        "windows": window_rows(board.windows()),
+        "changes": [
+            (*step, change.repaired, change.spoiled, change.labelled)
+            for step, change in board.changes.items()
+        ],
+        "heat": heat,
+        "probabilities": probabilities,
     }
 
 
@@ -113,39 +131,6 @@ def window_rows(windows: Iterable[Window]) -> list[Row]:
         )
         for each in windows
     ]
-
-
-def change_rows(changes: Mapping[Transition, Change]) -> list[Row]:
-    """Return the rows of ``changes``."""
-    return [
-        (*step, change.repaired, change.spoiled, change.labelled)
-        for step, change in changes.items()
-    ]
-
-
-def heat_rows(heat: Mapping[str, HeatMap]) -> list[Row]:
-    """Return the rows of ``heat``, without cells that are never labelled."""
-    rows: list[Row] = []
-    for variant, each in heat.items():
-        side, sums = each.cells()
-        tops, lefts = sums[0].nonzero()
-        cells = np.column_stack(
-            (tops * side, lefts * side, np.full_like(tops, side), *sums[:, tops, lefts])
-        )
-        rows += [(variant, *cell) for cell in cells.tolist()]
-    return rows
-
-
-def probability_rows(found: Mapping[Name, Sums]) -> list[Row]:
-    """Return the rows of ``probabilities``, without levels that do not occur."""
-    rows: list[Row] = []
-    for name, counts in found.items():
-        other, road = at_levels(counts)
-        rows += [
-            (*name, level, int(road[level]), int(other[level]))
-            for level in (other + road).nonzero()[0].tolist()
-        ]
-    return rows
 
 
 def _counts(counts: Counts) -> tuple[int, ...]:

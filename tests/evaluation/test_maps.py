@@ -5,7 +5,7 @@ import pytest
 
 from roadeval.data import IGNORE, Change, Packed, TruthBits
 from roadeval.evaluation import score
-from roadeval.evaluation.score import HeatMap, Maps, error_map
+from roadeval.evaluation.score import HeatMap, error_map
 from tests.evaluation.making import pixels
 
 TRUTH = pixels("##..", "##.?")
@@ -93,13 +93,3 @@ def test_changes_equal_a_plain_loop_over_pixels():
     found = changes([("x", "svm", before), ("x", "post", after)], truth)
     expected = Change(repaired, spoiled, int((truth != IGNORE).sum()))
     assert found == {("x", "svm", "x", "post"): expected}
-
-
-def test_maps_add_up_over_frames():
-    found = Maps()
-    mask = pixels("#...", "##..")
-    for _ in range(3):
-        found.add({"a": error_map(mask, TRUTH)}, {("a", "svm", "a", "post"): Change(1, 2, 7)})
-    assert found.frames == 3
-    assert found.changes == {("a", "svm", "a", "post"): Change(3, 6, 21)}
-    assert found.heat["a"].cells()[1][2, 0, 1] == 3

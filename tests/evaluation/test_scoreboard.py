@@ -181,7 +181,7 @@ class TestOracles:
 
 
 def test_changes_and_heat_maps_are_summed_up_over_the_drive() -> None:
-    sums = a_drive(3, a_board(BlindPrior.of_truths([TRUTH]))).sums()
+    sums = a_drive(3, a_board(BlindPrior.of_truths([TRUTH])))
     assert sums.changes["filtered", "svm", "filtered", "post"] == Change(3, 0, 21)
     assert sums.changes["unfiltered", "post", "filtered", "post"] == Change(0, 3, 21)
     assert sums.changes["filtered", "post", "unfiltered", "post"] == Change(3, 0, 21)
@@ -189,8 +189,3 @@ def test_changes_and_heat_maps_are_summed_up_over_the_drive() -> None:
     side, cells = sums.heat["filtered"].cells()
     assert (side, cells[:, 1, 1].tolist(), cells[:, 1, 3].tolist()) == (1, [3, 0, 3], [0, 0, 0])
     assert sums.heat["unfiltered"].cells()[1][:, 1, 1].tolist() == [3, 0, 0]
-
-
-def test_a_drive_without_scores_has_no_sums() -> None:
-    sums = a_board().sums()
-    assert (sums.windows, sums.changes, sums.heat) == ((), {}, {})

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from roadeval.data import Counts
+from roadeval.data import Counts, Tally
 from roadeval.evaluation import metrics, score
 from roadeval.evaluation.score import FrameCounts, GrowingCounts, sum_up
 
@@ -14,8 +14,8 @@ from roadeval.evaluation.score import FrameCounts, GrowingCounts, sum_up
 def counts_of(*counts: tuple[int, int, int, int]) -> FrameCounts:
     growing = GrowingCounts()
     for position, row in enumerate(counts):
-        growing.append(position, Counts(*row))
-    return growing.so_far("filtered", "post")
+        growing.add(position, [Tally("filtered", "post", Counts(*row))])
+    return growing.so_far()["filtered", "post"]
 
 
 def test_a_window_averages_rates_and_pools_counts() -> None:
@@ -45,8 +45,8 @@ def test_the_last_window_may_be_short() -> None:
 def test_a_mask_that_is_missing_on_some_frames_says_how_many_it_has() -> None:
     growing = GrowingCounts()
     for position in (0, 4, 5):
-        growing.append(position, Counts(1, 1, 1, 1))
-    rows = list(score.cut(growing.so_far("net", "post"), [0, 1, 2, 3, 4, 5, 6], size=2))
+        growing.add(position, [Tally("net", "post", Counts(1, 1, 1, 1))])
+    rows = list(score.cut(growing.so_far()["net", "post"], [0, 1, 2, 3, 4, 5, 6], size=2))
     assert [(row.number, row.frames) for row in rows] == [(0, 1), (2, 2)]
 
 

@@ -107,7 +107,6 @@ def some_findings(**changes):
         "heatmaps": [],
         "oracles": [],
         "levels": NO_LEVELS,
-        "sampled": 1200,
         "examples": [],
         "thumbnails": [],
         "worst": [],

@@ -10,8 +10,8 @@ def lines(result):
     return csv_lines(KEY, frame_rows(result))
 
 
-def sum_lines(sums):
-    return csv_lines(KEY, sum_rows(sums))
+def sum_lines(board):
+    return csv_lines(KEY, sum_rows(board))
 
 
 def facts_of(**parts):

@@ -69,7 +69,7 @@ result = board.score(a_frame(pixels("##..", "##.?")), Role.EVALUATED, (variant,)
 board.add(result)
 with ResultsWriter(folder / "out") as writer:
     writer.append(lines(result))
-    writer.append(sum_lines(board.sums()))
+    writer.append(sum_lines(board))
     writer.finish(facts_of(**board.summary()), "")
 read = ResultsFolder(folder / "out")
 assert read.table("frames")["FDR"].tolist() == [0.25]

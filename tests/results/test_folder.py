@@ -55,7 +55,7 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
     with ResultsWriter(folder) as writer:
         for result in scored(board, role):
             writer.append(lines(result))
-        writer.append(sum_lines(board.sums()))
+        writer.append(sum_lines(board))
         files = writer.finish(the_rest(board), RUN_TOML).files
     return [folder / name for name in files]
 
@@ -158,7 +158,7 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
         )
         board.add(result)
         writer.append(lines(result))
-        writer.append(sum_lines(board.sums()))
+        writer.append(sum_lines(board))
         writer.finish(the_rest(board), RUN_TOML)
     assert names(tmp_path) == {
         *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "run.toml", "summary.json"),
@@ -196,7 +196,7 @@ def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
     with ResultsWriter(tmp_path / "new") as writer:
         for result in scored(board):
             writer.append(lines(result))
-        writer.append(sum_lines(board.sums()))
+        writer.append(sum_lines(board))
         writer.finish(the_rest(board), RUN_TOML)
         assert names(tmp_path) == {writer.folder.name}
         assert writer.folder.name.startswith(".new.")
@@ -324,7 +324,7 @@ def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: 
             result = board.score(a_frame(truth, number), Role.EVALUATED, tuple(variants))
             board.add(result)
             writer.append(lines(result))
-        writer.append(sum_lines(board.sums()))
+        writer.append(sum_lines(board))
         writer.finish(the_rest(board), RUN_TOML)
     tables = {name: ResultsFolder(tmp_path).table(name) for name in OF_A_DRIVE}
     assert len(tables["frames"]) == 3 * 2 + 1 + 1

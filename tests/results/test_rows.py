@@ -5,16 +5,20 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from roadeval.evaluation.score import Scoreboard
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.comparison import junit_xml
 from roadeval.results.over_drives import drive_cases
-from roadeval.results.rows import drive_row, probability_rows
+from roadeval.results.rows import drive_row, sum_rows
 from tests.results.making import facts_of
 
 
 def test_a_level_with_as_many_pixels_of_road_as_of_the_rest_has_a_row():
     counts = np.zeros((2, 1 << 16), np.int64)
     counts[:, 300] = 4
-    assert probability_rows({("net", "post"): counts}) == [("net", "post", 1, 4, 4)]
+    board = Scoreboard(EvaluationSettings(), ["net"], None)
+    board.curves.counts["net", "post"] = counts
+    assert sum_rows(board)["probabilities"] == [("net", "post", 1, 4, 4)]
 
 
 @pytest.mark.parametrize(("losses", "code"), [([], 0), (["2 frames"], 3)])

@@ -7,6 +7,7 @@ from array import array
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -93,21 +94,23 @@ class FrameCounts:
 
 
 class GrowingCounts:
-    """Counts of one mask, added frame by frame: 20 bytes each."""
+    """The counts of masks, added frame by frame: 20 bytes each."""
 
     def __init__(self) -> None:
-        self._positions = array("I")
-        self._counts = array("I")
+        self._rows: Final[defaultdict[Name, array[int]]] = defaultdict(partial(array, "I"))
 
-    def append(self, position: int, counts: Counts) -> None:
-        """Add the counts of the evaluated frame at ``position``, counted from 0."""
-        self._positions.append(position)
-        self._counts.extend((counts.tp, counts.tn, counts.fp, counts.fn))
+    def add(self, position: int, tallies: Iterable[Tally]) -> None:
+        """Add the evaluated frame at ``position``, counted from 0."""
+        for each in tallies:
+            c = each.counts
+            self._rows[each.variant, each.stage].extend((position, c.tp, c.tn, c.fp, c.fn))
 
-    def so_far(self, variant: str, stage: str) -> FrameCounts:
-        """Return what was added, as counts of this mask."""
-        counts = np.array(self._counts, np.int64).reshape(-1, 4)
-        return FrameCounts(variant, stage, np.array(self._positions, np.int64), counts)
+    def so_far(self) -> dict[Name, FrameCounts]:
+        """Return what was added, mask by mask as they first came."""
+        tables = {
+            name: np.array(rows, np.int64).reshape(-1, 5) for name, rows in self._rows.items()
+        }
+        return {name: FrameCounts(*name, own[:, 0], own[:, 1:]) for name, own in tables.items()}
 
 
 class RegionSums:

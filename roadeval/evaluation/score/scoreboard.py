@@ -26,11 +26,9 @@ from roadeval.data import (
     Frame,
     FrameResult,
     Role,
-    Tally,
     Transition,
     VariantResult,
 )
-from roadeval.data.arrays import Sums
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
     EdgesAndFlicker,
@@ -45,7 +43,7 @@ from roadeval.evaluation.score.counts import (
     sum_up,
 )
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
-from roadeval.evaluation.score.thresholds import Curves, HeatMap, Maps
+from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference, holm, within_drive
 
@@ -147,35 +145,6 @@ Totals = dict[str, dict[str, Total]]
 """By variant and stage."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DriveSums:
-    """The content of the drive's tables of sums.
-
-    Windows, changes of masks, heat maps, and pixels by how probable road is.
-    """
-
-    windows: Sequence[Window]
-    changes: Mapping[Transition, Change]
-    heat: Mapping[str, HeatMap]
-    probabilities: Mapping[Name, Sums]
-
-
-class _Masks:
-    """The counts of masks, added frame by frame."""
-
-    def __init__(self) -> None:
-        self._counts: Final[defaultdict[Name, GrowingCounts]] = defaultdict(GrowingCounts)
-
-    def add(self, position: int, tallies: Sequence[Tally]) -> None:
-        """Add the evaluated frame at ``position``, counted from 0."""
-        for tally in tallies:
-            self._counts[tally.variant, tally.stage].append(position, tally.counts)
-
-    def so_far(self) -> dict[Name, FrameCounts]:
-        """Return what was added, mask by mask as they first came."""
-        return {name: counts.so_far(*name) for name, counts in self._counts.items()}
-
-
 class Scoreboard:
     """Scores frames against their truth and sums up the drive.
 
@@ -194,12 +163,15 @@ class Scoreboard:
         self._frames: Final[list[int]] = []
         self._roles: Final[Counter[str]] = Counter()
         self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
-        self._counts: Final = _Masks()
-        self._oracles: Final[defaultdict[str, _Masks]] = defaultdict(_Masks)
-        self._repeats: Final[defaultdict[int, _Masks]] = defaultdict(_Masks)
+        self._counts: Final = GrowingCounts()
+        self._oracles: Final[defaultdict[str, GrowingCounts]] = defaultdict(GrowingCounts)
+        self._repeats: Final[defaultdict[int, GrowingCounts]] = defaultdict(GrowingCounts)
         self._regions: Final = RegionSums()
-        self._maps: Final = Maps()
-        self._curves: Final = Curves()
+        self.heat: Final[defaultdict[str, HeatMap]] = defaultdict(HeatMap)
+        """Where each variant's final mask errs."""
+        self.changes: Final[defaultdict[Transition, Change]] = defaultdict(Change)
+        """Every change between masks."""
+        self.curves: Final = Curves()
         self._edges: Final = EdgesAndFlicker(settings.boundary_width)
         self._seconds: Final[defaultdict[Name, list[float]]] = defaultdict(lambda: [0.0, 0])
 
@@ -227,18 +199,16 @@ class Scoreboard:
         for seed, tallies in result.repeats.items():
             self._repeats[seed].add(position, tallies)
         self._regions.add(result.tallies)
-        self._maps.add(result.errors, result.changes)
-        self._curves.add(result.histograms)
+        for name, layer in result.errors.items():
+            self.heat[name].add(layer.array.astype(np.uint8, copy=False))
+        for step, change in result.changes.items():
+            self.changes[step] += change
+        self.curves.add(result.histograms)
         self._frames.append(result.frame.number)
 
     def lose(self) -> None:
         """Note that a frame was read here and could not be decoded."""
         self._edges.interrupt()
-
-    def sums(self) -> DriveSums:
-        """Sum up the drive for its tables; nothing without a score."""
-        maps, curves = self._maps, self._curves
-        return DriveSums(tuple(self.windows()), maps.changes, maps.heat, curves.counts)
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
@@ -300,7 +270,7 @@ class Scoreboard:
         seconds: dict[str, dict[str, float]] = {}
         for (variant, stage), (total, runs) in self._seconds.items():
             seconds.setdefault(variant, {})[stage] = total / runs
-        curves = self._curves.totals()
+        curves = self.curves.totals()
         return {
             "totals": self.totals(),
             "beyond": self._edges.totals(),

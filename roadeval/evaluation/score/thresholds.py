@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise, permutations
 from typing import Any, Final
 
@@ -30,7 +30,6 @@ from roadeval.data import (
     ROAD,
     Change,
     Histogram,
-    Layer,
     Probability,
     Transition,
     Truth,
@@ -280,20 +279,3 @@ def _steps(names: Sequence[Name]) -> Iterator[tuple[int, int]]:
             yield before, after
     last = {variant: place for place, (variant, _) in enumerate(names)}
     yield from permutations(last.values(), 2)
-
-
-@dataclass(slots=True)
-class Maps:
-    """The heat map of every variant's final mask, and every change between masks, of a drive."""
-
-    heat: dict[str, HeatMap] = field(default_factory=dict)
-    changes: dict[Transition, Change] = field(default_factory=dict)
-    frames: int = 0
-
-    def add(self, errors: Mapping[str, Layer], found: Mapping[Transition, Change]) -> None:
-        """Add a frame: the final masks' errors by variant, and what `changes` counted."""
-        self.frames += 1
-        for variant, layer in errors.items():
-            self.heat.setdefault(variant, HeatMap()).add(layer.array.astype(np.uint8, copy=False))
-        for step, change in found.items():
-            self.changes[step] = self.changes.get(step, Change()) + change

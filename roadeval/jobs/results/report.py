@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import Packed, Rows, TruthBits
+from roadeval.data import Rows
 from roadeval.data.result import Cells
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
@@ -35,7 +35,7 @@ from roadeval.report.findings import (
 from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
+from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.tables import parquet_rows
 from roadeval.runtime.files import leads_outside
 
@@ -133,7 +133,7 @@ def page_of(
 
 
 SAMPLED: Final = 100
-"""Frames whose masks are read for the maps, at most; tables know every frame."""
+"""Frames whose masks are read for how much they cover, at most, where there is no truth."""
 WINDOWS: Final = 30
 """Points of the figures over the drive, at most."""
 EXAMPLES: Final = 4
@@ -146,7 +146,7 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     rows, facts = result.rows, result.facts
     evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
     pictured = [number for number in result.pictured if number in evaluated]
-    changes, heat, sampled = _mask_sums(result, pictured)
+    changes, heat = result.table("changes"), result.table("heat")
     paired = list(_paired(result, changes))
     picker = FramePicker(result)
     worst, drawn = picker.worst(), facts.examples
@@ -170,7 +170,6 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         heatmaps=[_heatmap(name, heat.of_variant(name)) for name in heat.distinct("variant")],
         oracles=[*score.perfect_stages(result.table("oracles"), rows)],
         levels=result.table("probabilities"),
-        sampled=sampled,
         examples=picker.examples(
             drawn if drawn and set(drawn) <= set(result.pictured) else evenly(pictured, EXAMPLES)
         ),
@@ -232,41 +231,6 @@ def _stage_changes(changes: Rows) -> dict[tuple[str, str], tuple[float, float]]:
     masks = zip(own["to_variant"].tolist(), own["to_stage"].tolist(), strict=True)
     shares = ((own[name] / own["N"]).tolist() for name in ("repaired", "spoiled"))
     return dict(zip(masks, zip(*shares, strict=True), strict=True))
-
-
-def _mask_sums(result: DriveResult, numbers: Sequence[int]) -> tuple[Rows, Rows, int]:
-    """Return the tables ``changes`` and ``heat``, and the number of frames that they sum up.
-
-    A run that was killed did not get to write them: they are made of the masks of evenly spread
-    frames then.
-    """
-    changes, heat = result.table("changes"), result.table("heat")
-    if len(changes) or len(heat):
-        return changes, heat, len(result.rows.distinct("frame"))
-    sample = _sample(result, numbers)
-    changes = as_arrays("changes", change_rows(sample.changes))
-    return changes, as_arrays("heat", heat_rows(sample.heat)), sample.frames
-
-
-def _sample(result: DriveResult, numbers: Sequence[int]) -> score.Maps:
-    """Sum up the masks of evenly spread frames."""
-    sums, recording = score.Maps(), result.recording
-    if recording is None or not len(result.rows):
-        return sums
-    for number in evenly(numbers, SAMPLED):
-        truth = recording.truth(number)
-        masks = {
-            (variant.name, stage): mask
-            for variant in recording.variants
-            for stage in variant.stages
-            if (mask := result.layer(variant.name, stage, number)) is not None
-        }
-        finals = {variant: mask for (variant, _), mask in masks.items()}
-        errors = {name: score.error_map(mask, truth) for name, mask in finals.items()}
-        packed = TruthBits.of(truth)
-        stacked = packed.bits_of(map(Packed.of, masks.values()))
-        sums.add(errors, score.changes(list(masks), stacked, packed))
-    return sums
 
 
 def _heatmap(variant: str, cells: Rows) -> ErrorHeatmap:

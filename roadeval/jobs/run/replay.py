@@ -139,7 +139,7 @@ def _written(
         examples = _record(
             run, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
         )
-        rows = sum_rows(run.board.sums())
+        rows = sum_rows(run.board)
         sums = csv_lines(run.key, rows)
         results.append(sums)
         shown = [each.frame for each in examples]

@@ -10,7 +10,6 @@ from roadeval.data.words import percent
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Cell, ImageFile
 from roadeval.report.chart import looks
-from roadeval.report.findings import Findings
 from roadeval.report.images import ExampleFrame, LayerImage, faded, jpeg, variants_of
 
 ROAD: Final = mask_spec("road", "road")
@@ -24,19 +23,6 @@ def variant_cell(name: str, names: Sequence[str]) -> Cell:
 def rate_cells(rates: Mapping[str, float], *, bold: bool) -> list[Cell]:
     """Return a mask's cells in a short table of rates; its ERR may be bold."""
     return [Cell(percent(rates.get(name)), bold=bold and name == "ERR") for name in SHORT]
-
-
-def sampled_frames(findings: Findings) -> str:
-    """Describe the frames whose masks were compared pixel by pixel."""
-    evaluated = findings.facts.frames.evaluated
-    if findings.sampled == evaluated:
-        return f"all {evaluated} evaluated frames"
-    if findings.pictured == evaluated:
-        return f"{findings.sampled} frames spread evenly over the {evaluated} evaluated"
-    return (
-        f"{findings.sampled} of the {findings.pictured} frames whose pictures were kept, out of "
-        f"{evaluated} evaluated (which may not be a fair sample)"
-    )
 
 
 def example_pictures(examples: Sequence[ExampleFrame]) -> Iterator[tuple[str, ImageFile]]:

@@ -34,7 +34,6 @@ from roadeval.report.images import variants_of
 from roadeval.report.sections.common import (
     example_pictures,
     rate_cells,
-    sampled_frames,
     variant_cell,
 )
 from roadeval.results.facts import Totals
@@ -96,7 +95,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
             yield Text("ERR is undefined on every frame, so what the filter does to it is unknown.")
             continue
         if pair.pixels is not None:
-            yield Text(pixels_changed(findings, pair))
+            yield Text(pixels_changed(pair))
         columns = pair.frames["frame"], pair.frames["ERR"]
         drawn = difference(*columns, pair.treated, pair.control, change)
         yield Figure([drawn], f"ERR of {pair.treated} minus {pair.control}, frame by frame.")
@@ -154,14 +153,14 @@ def _method(pairs: Sequence[PairedComparison]) -> str:
     return " ".join(filter(None, [*told, correction(changes)]))
 
 
-def pixels_changed(findings: Findings, pair: PairedComparison) -> str:
+def pixels_changed(pair: PairedComparison) -> str:
     """Return which share of the pixels the filter made right and wrong, and what remains."""
     assert pair.pixels is not None
     right, wrong, labelled = pair.pixels
     net = int(pair.frames["wrong"].sum())
     change = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
     return (
-        f"Of the labelled pixels of {sampled_frames(findings)}, {percent(right / labelled)} % are "
+        f"Of the labelled pixels of all evaluated frames, {percent(right / labelled)} % are "
         f"newly right with the filter and {percent(wrong / labelled)} % newly wrong; over all "
         f"frames that leaves {change}."
     )
@@ -212,7 +211,7 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
     if isinstance(findings, Findings) and findings.heatmaps:
         yield Figure(
             [*charts.heat(findings.heatmaps)],
-            f"Where the final masks go wrong, over {sampled_frames(findings)}. FP: non-road called "
+            "Where the final masks go wrong, over all evaluated frames. FP: non-road called "
             "road; FN: road missed. Percent of the frames that label the pixel; grey: none does.",
         )
 
@@ -242,7 +241,7 @@ def stages(findings: Findings) -> Iterator[Block]:
     if findings.changes:
         note = (
             "Repaired and spoiled: labelled pixels that the stage has right and the mask before it "
-            f"wrong, and the reverse, over {sampled_frames(findings)}."
+            "wrong, and the reverse, over all evaluated frames."
         )
         numbers.append(Text(note, "note"))
     yield Details("Every stage in numbers", numbers)
