@@ -94,13 +94,7 @@ def _root(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code.
-
-    Parameters
-    ----------
-    arguments
-        Words after the program's name; those of the process if None.
-    """
+    """Run the words after the program's name, by default the process', and return the exit code."""
     if arguments is not None:
         return _run(arguments)
     streams.take_over(debug=debug())

@@ -240,10 +240,7 @@ def with_flags(text: str) -> str:
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     """Make a command take the options of some settings, which it receives as ``given``.
 
-    Parameters
-    ----------
-    settings
-        Names of settings in `OPTIONS`, or of whole tables. For any other name a ValueError.
+    The settings are those of `OPTIONS`, or whole tables; for any other name a ValueError.
     """
     named_by = {option: {option.setting, option.setting.partition(".")[0]} for option in OPTIONS}
     if unknown := {*settings}.difference(*named_by.values()):

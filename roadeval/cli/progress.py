@@ -34,16 +34,9 @@ def watched(quiet: bool = False) -> Iterator[Callable[[Progress | FleetProgress]
 
 
 class Watch:
-    """Shows each progress on a Rich display, or writes it as plain lines.
+    """Shows each progress on a `rich.progress.Progress`, which measures the pace in any case.
 
-    Parameters
-    ----------
-    display
-        A `rich.progress.Progress`; it measures the pace even where it shows nothing.
-    write
-        Writes a line.
-    lines
-        Whether to write plain lines: when a stage begins or ends, and one in `LINE_PERIOD_S`.
+    With ``lines`` it writes plain ones: when a stage begins or ends, and one in `LINE_PERIOD_S`.
     """
 
     def __init__(self, display: Any, write: Callable[[str], None], *, lines: bool) -> None:

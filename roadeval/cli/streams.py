@@ -23,12 +23,7 @@ def take_over(*, debug: bool) -> None:
     """Prepare the streams of this process, and keep other libraries off them.
 
     Messages of C libraries, of Rerun and of Python's warnings are dropped: the rooms report what
-    concerns the user. Only the reason of a crash is written.
-
-    Parameters
-    ----------
-    debug
-        Whether to let everything through.
+    concerns the user. Only the reason of a crash is written; to ``debug`` everything is.
     """
     _fill_closed()
     sys.stderr = _stderr(os.dup(2))

@@ -314,24 +314,11 @@ def describe(
     verify: bool = False,
     on_bytes: Callable[[int, int], object] | None = None,
 ) -> LogDescription:
-    """Describe a log by its summary and indexes.
+    """Describe a log by its summary and indexes, and what a replay would pick of it.
 
-    Parameters
-    ----------
-    path
-        The log.
-    config
-        What a replay would be asked for.
-    verify
-        Whether the log is read whole, so that all damage is found. One of at most `SMALL` bytes is
-        in any case.
-    on_bytes
-        Called now and then with the bytes that were read, and with all that will be.
-
-    Raises
-    ------
-    LogError
-        If it is missing, unreadable, or no MCAP log.
+    To ``verify`` it, or where it has at most `SMALL` bytes, it is read whole, so that all damage is
+    found; ``on_bytes`` is called now and then with the bytes that were read, and with all that will
+    be. A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     with open_log(path, config) as log:
         picks: tuple[str, ...] = ()

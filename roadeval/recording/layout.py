@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from typing import Any, Final
+from typing import Final
+
+from pydantic import TypeAdapter
 
 from roadeval.data import (
     BASELINE,
@@ -133,21 +135,7 @@ class Layout:
     @classmethod
     def from_json(cls, text: str) -> Layout:
         """Return the layout that `to_json` wrote; unknown fields are ignored."""
-        found = read_json(text)
-        raw = {each.name: found[each.name] for each in fields(cls) if each.name in found}
-        raw["rates"] = tuple(raw["rates"])
-        raw["variants"] = tuple(
-            VariantLayout(v["name"], v["title"], tuple(v["stages"]), tuple(map(_spec, v["layers"])))
-            for v in raw["variants"]
-        )
-        return cls(**raw)
-
-
-def _spec(raw: dict[str, Any]) -> LayerSpec:
-    classes = tuple(LabelClass(c["value"], c["name"], tuple(c["rgba"])) for c in raw["classes"])
-    low, high = raw["value_range"]
-    kind = LayerKind(raw["kind"])
-    return LayerSpec(raw["name"], kind, raw["title"], classes, (low, high), raw["exact"])
+        return TypeAdapter(cls).validate_python(read_json(text))
 
 
 SHADOW_TRUTH: Final = LayerSpec(

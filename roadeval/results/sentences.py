@@ -87,25 +87,11 @@ def sentence(
 ) -> str:
     """Return what a difference says of these frames or drives, and then of others like them.
 
-    Parameters
-    ----------
-    found
-        With ``what`` minus without.
-    what
-        Brings it about, as ``the filter``, or ``net instead of blind``.
-    rate
-        What changes, as ``ERR of post``.
-    settings
-        What is negligible.
-    levels
-        The rate without and with it; given only where they are of the same frames or drives.
-    windows
-        In how many windows it is lower, in brackets.
-    said
-        What a sentence before has said of others like them, which is not repeated.
+    The difference is with ``what`` minus without: ``the filter``, or ``net instead of blind``;
+    ``rate`` is what changes, as ``ERR of post``. ``levels`` are the rate without and with it, given
+    only where they are of the same frames or drives; ``windows`` says in how many it is lower, in
+    brackets; ``said`` is what a sentence before has said of others like them.
 
-    Examples
-    --------
     >>> found = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
     >>> sentence(found, "the filter", "ERR", EvaluationSettings())
     'On these 91 frames the filter lowers ERR by 2.0 pp; on frames like these by 1.0 to 3.0 pp.'
@@ -244,18 +230,9 @@ def verdict(
     """Return the verdict on a drive or a fleet, at most four sentences.
 
     Which variant is best, and whether it beats the baseline; what the filter changes; and which
-    step adds most to the filtered variant's errors.
-
-    Parameters
-    ----------
-    totals
-        Rates by variant and stage; empty where nothing was scored.
-    effects
-        Of final masks at least.
-    settings
-        What is negligible.
-    claims
-        In how many windows each claim of the paper holds; of a drive.
+    step adds most to the filtered variant's errors. ``totals`` are by variant and stage, empty
+    where nothing was scored; ``effects`` are of final masks at least; ``claims`` says in how many
+    windows of a drive each claim of the paper holds.
     """
     if not totals:
         return NOTHING_SCORED
@@ -397,13 +374,7 @@ def seeds_in_words(seeds: Mapping[str, Any]) -> str:
 
 
 def of_seeds(seeds: Mapping[str, Any]) -> str:
-    """Return what other seeds make of the final masks' ERR and of the filter's effect.
-
-    Parameters
-    ----------
-    seeds
-        As ``seeds`` in ``summary.json``.
-    """
+    """Return what other seeds, as in ``summary.json``, make of the masks and the filter."""
     parts = [
         f"{variant} {percent(least)} to {percent(most)} % (middle {percent(middle)})"
         for variant, stages in seeds["totals"].items()
@@ -439,15 +410,7 @@ def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
 def notes(
     finals: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
 ) -> Iterator[str]:
-    """Yield what a person should know of a frame, in sentences.
-
-    Parameters
-    ----------
-    finals
-        The rates of each variant's final mask.
-    blind
-        Those of the baseline, or None.
-    """
+    """Yield what a person should know of a frame, by the final masks' rates and the baseline's."""
     if FILTERED in finals and UNFILTERED in finals:
         change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
         if abs(change) >= NOTEWORTHY:

@@ -21,8 +21,8 @@ from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import Stage, check_arrays, check_range
 from roadeval.pipeline.stages import STAGES
+from roadeval.results.facts import another_format
 from roadeval.runtime.files import check_input, put
-from roadeval.runtime.text import visible
 from roadeval.training.schedule import SIDE
 from roadeval.version import VERSION as ROADEVAL
 
@@ -163,23 +163,14 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
     if header.get("version") != VERSION:
-        raise ModelError(f"{path}: {_another_format(header)}")
+        number = version if isinstance(version := header.get("version"), int) else 0
+        writer = header.get("roadeval") or WROTE.get(number)
+        told = another_format(writer, later=number > VERSION, remedy="train it again")
+        raise ModelError(f"{path}: {told}")
     try:
         return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
         raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
-
-
-def _another_format(header: Mapping[str, Any]) -> str:
-    """Return which version of roadeval wrote a file of another format, and what to do."""
-    version, writer = header.get("version"), header.get("roadeval")
-    number = version if isinstance(version, int) else 0
-    writer = writer if isinstance(writer, str) else WROTE.get(number)
-    age = "a later" if number > VERSION else "an earlier"
-    made = f"made by roadeval {visible(writer)}" if writer else f"made by {age} version of roadeval"
-    if number > VERSION:
-        return f"{made}: update roadeval, or train it again"
-    return f"{made}, whose format is no longer read: train it again"
 
 
 def kept_model(path: Path, stages: tuple[Stage, ...] = ()) -> Model:

@@ -16,17 +16,7 @@ if TYPE_CHECKING:
 
 
 def show(seeds: Mapping[str, Any], titles: Mapping[str, str], out: Console) -> None:
-    """Print the spread of each rate of the final masks, and what it says.
-
-    Parameters
-    ----------
-    seeds
-        As ``seeds`` in ``summary.json``.
-    titles
-        The rates to show, with the titles of their columns.
-    out
-        Where to.
-    """
+    """Print the spread of each rate of the final masks, by titles of columns, and what it says."""
     out.print(
         f"Final masks with {seeds_in_words(seeds)} of the training: the middle (and from the least "
         "to the greatest)"

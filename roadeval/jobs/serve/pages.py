@@ -59,22 +59,10 @@ def serve(
 ) -> None:
     """Serve results as pages on 127.0.0.1 until the process is interrupted, as by Ctrl-C.
 
-    Parameters
-    ----------
-    results
-        Recordings, results folders and fleets.
-    on_address
-        Called with the address to open, before anything is answered. It holds a token without which
-        nothing is answered.
-    trust_sources
-        Whether a fleet's drives may be replayed from where its folder says that their logs lie.
-    commands
-        Makes the commands that pages name; none by default.
-
-    Raises
-    ------
-    RoadevalError
-        If a result cannot be read.
+    ``on_address`` is called with the address to open, before anything is answered: it holds a token
+    without which nothing is. With ``trust_sources`` a fleet's drives may be replayed from where its
+    folder says that their logs lie. ``commands`` makes the commands that pages name; none by
+    default. A `RoadevalError` if a result cannot be read.
     """
     with serving(results, trust_sources=trust_sources, commands=commands) as server:
         on_address(server.address)
@@ -165,17 +153,7 @@ def _served(result: Result, commands: MakeCommands | None, replayer: Replayer) -
 
 
 class _Served:
-    """The page of a result, with its pictures.
-
-    Parameters
-    ----------
-    result
-        The result.
-    make_commands
-        Makes the commands that its page names.
-    place
-        Where its page lies.
-    """
+    """The page of a result, with its pictures, and the commands that it names."""
 
     def __init__(self, result: Result, make_commands: MakeCommands | None, place: Place) -> None:
         (self.path,) = result.paths

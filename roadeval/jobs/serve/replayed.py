@@ -36,24 +36,9 @@ def recording_of(
 ) -> tuple[Path, tuple[str, ...]]:
     """Return the recording of a fleet's drive, made again from its log where it was not kept.
 
-    Parameters
-    ----------
-    fleet, drive
-        Which, by its name in the fleet.
-    on_progress
-        As of `roadeval.replay`.
-    on_replay
-        Called with a sentence where the drive is replayed.
-
-    Returns
-    -------
-    tuple
-        The file, and warnings.
-
-    Raises
-    ------
-    RoadevalError
-        If there is no such drive, its log has gone or may not be read, or it cannot be replayed.
+    Returned are the file, and warnings. ``on_replay`` is called with a sentence where the drive is
+    replayed. A `RoadevalError` if there is no such drive, its log has gone or may not be read, or
+    it cannot be replayed.
     """
     row = fleet.drives.get(drive)
     if row is None:
@@ -135,13 +120,7 @@ class _Running:
         return f"Replaying {self.name}: {self.progress} \N{HORIZONTAL ELLIPSIS}"
 
     def report(self, progress: Progress) -> None:
-        """Note how far it is.
-
-        Raises
-        ------
-        CancelledReplayError
-            If it is to end.
-        """
+        """Note how far it is; a `CancelledReplayError` if it is to end."""
         if self.stop.is_set():
             raise CancelledReplayError(f"the replay of {self.name} was cancelled")
         of = "" if progress.total is None else f" of {progress.total}"
@@ -156,27 +135,10 @@ class Replayer:
         self._running: _Running | None = None
 
     def want(self, recording: Path, name: str, replay: Replay) -> str:
-        """Have a recording made, or see how far it is.
+        """Have a drive's recording made, or return how far that is; empty once it is there.
 
-        Parameters
-        ----------
-        recording
-            The file that will be there.
-        name
-            Of the drive.
-        replay
-            Makes it.
-
-        Returns
-        -------
-        str
-            How far the replay is; empty once the recording is there.
-
-        Raises
-        ------
-        RoadevalError
-            If it failed or was cancelled, or another drive's replay has not ended; who asks again
-            begins again.
+        A `RoadevalError` if it failed or was cancelled, or another drive's replay has not ended;
+        who asks again begins again.
         """
         with self._lock:
             running = self._running

@@ -303,23 +303,15 @@ def pack(
     masks: str | Path | None = None,
     rate_hz: float | None = None,
 ) -> PackResult:
-    """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
+    """Write a folder of images, in natural order, or a video as a log: see `roadeval.pack`.
 
-    JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. Masks belong to the
-    image of the same name, endings such as ``_mask`` aside. The same files give the same bytes. A
-    `LogError` if there is nothing to pack, a file is unreadable, or no mask belongs to an image.
+    JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. ``masks`` is a folder
+    of label images without loss; each belongs to the image of the same name, endings such as
+    ``_mask`` aside. The same files give the same bytes. A `LogError` if there is nothing to pack, a
+    file is unreadable, or no mask belongs to an image.
 
-    Parameters
-    ----------
-    images
-        A folder, taken in natural order (``2.png`` before ``10.png``), or a video file.
-    output
-        The log to write.
-    masks
-        A folder of label images without loss (PNG), for a folder of images.
-    rate_hz
-        Images a second. By default a video's own; of images, the times in their names if every
-        name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
+    ``rate_hz`` is images a second: by default a video's own; of images, the times in their names if
+    every name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
     """
     images, output = Path(images), Path(output)
     if rate_hz is not None and not 1e-4 <= rate_hz <= 1000:
