@@ -225,7 +225,7 @@ OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "trust_sources": "--trust-sources"
 }
-_MARKED: Final = re.compile(r"`(\w+(?:\.\w+)?)`")
+_MARKED: Final = re.compile(r"`([\w-]+(?:\.[\w-]+)*)`")
 
 
 def with_flags(text: str) -> str:
@@ -233,8 +233,18 @@ def with_flags(text: str) -> str:
 
     >>> with_flags("nothing is left to evaluate; lower `training.frames`")
     'nothing is left to evaluate; lower --train-frames'
+    >>> with_flags("set `masks.net.first` to 1")
+    'set `first` in the file of --masks net=FILE.toml to 1'
     """
-    return _MARKED.sub(lambda found: FLAGS.get(found[1], found[0]), text)
+    return _MARKED.sub(_flag_of, text)
+
+
+def _flag_of(found: re.Match[str]) -> str:
+    table, _, rest = found[1].partition(".")
+    name, _, key = rest.partition(".")
+    if table == "masks" and key:
+        return f"`{key}` in the file of {FLAGS[table]} {name}=FILE.toml"
+    return FLAGS.get(found[1], found[0])
 
 
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:

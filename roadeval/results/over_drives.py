@@ -224,6 +224,9 @@ def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
     return rows
 
 
+NO_TRUTH: Final = "nothing can be checked, for no frame with truth was evaluated"
+
+
 @dataclass(frozen=True, slots=True)
 class DriveJudgement:
     """A condition judged on a drive."""
@@ -264,10 +267,14 @@ def judge_drives(
     """Judge conditions on each scored drive: on the rates of its own frames.
 
     ``scores`` are rows of that table; the conditions are on levels alone, see `check_conditions`. A
-    drive with fewer than ``least`` evaluated frames is not judged. A `ConditionError` if nothing
-    scored is the mask that a condition names.
+    drive with fewer than ``least`` evaluated frames is not judged, and nothing is where no drive is
+    scored. A `ConditionError` if nothing scored is the mask that a condition names.
     """
     rows = [row for row in scores if row["region"] == ALL]
+    if conditions and not rows:
+        every = ", ".join(condition.text for condition in conditions)
+        yield DriveJudgement("", every, None, NO_TRUTH)
+        return
     for condition in conditions:
         own = [
             r for r in rows if (r["stage"], r["variant"]) == (condition.stage, condition.variant)

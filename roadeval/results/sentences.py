@@ -16,12 +16,14 @@ from roadeval.data.words import (
     in_percent,
     interval,
     listing,
+    number,
     percent,
     plain_points,
 )
 from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
 from roadeval.evaluation.stats import Difference
+from roadeval.results.facts import FrameAccount
 
 PROBABLY: Final = 0.2
 """The greatest p-value of a difference that is called probable: without an effect, one drive in ten
@@ -186,6 +188,34 @@ def _family(found: Difference, settings: EvaluationSettings) -> str:
     """Return how many differences a p-value was corrected for, where that decided."""
     decided = degree(replace(found, p_holm=None), settings) is not degree(found, settings)
     return f" (corrected for {found.comparisons} comparisons)" if decided else ""
+
+
+# --- The frames of a drive -----------------------------------------------------------------------
+
+_WHY: Final = {
+    "trained on": "to train on",
+    "unlabelled": "without truth",
+    "undecodable": "that cannot be decoded",
+    "failed in a stage": "on which a stage failed",
+    "gap after training": "in the gap after training",
+    "gap beside training": "in the gap beside training",
+}
+"""Reasons of `roadeval.results.facts.FrameAccount`, as they follow a number."""
+
+
+def account(frames: FrameAccount, windows: int | None = None) -> str:
+    """Return how many frames of a log were evaluated, and why the others were not.
+
+    >>> account(FrameAccount(in_log=100, evaluated=90, skipped={"trained on": 10}), 9)
+    '90 of 100 frames were evaluated, in 9 windows. Left out: 10 to train on.'
+    """
+    whole = frames.evaluated if frames.in_log is None else frames.in_log
+    of = "" if frames.evaluated == whole else f"{number(frames.evaluated)} of "
+    verb = "was" if frames.evaluated == 1 else "were"
+    within = f", in {counted(windows, 'window')}" if windows else ""
+    told = f"{of}{counted(whole, 'frame')} {verb} evaluated{within}."
+    why = [f"{number(count)} {_WHY.get(name, name)}" for name, count in frames.skipped.items()]
+    return f"{told} Left out: {', '.join(why)}." if why else told
 
 
 # --- Marks in tables ------------------------------------------------------------------------------

@@ -163,6 +163,11 @@ def test_every_option_s_words_are_a_setting_s_value(asked):
         ("a.toml: frames.every: bad", "a.toml: frames.every: bad"),
         ("output.mcap: No such file", "output.mcap: No such file"),
         ("`training.source` has no flag", "`training.source` has no flag"),
+        ("`masks` my-net: bad", "--masks my-net: bad"),
+        (
+            "`masks.my-net.labels.road` is missing",
+            "`labels.road` in the file of --masks my-net=FILE.toml is missing",
+        ),
     ],
 )
 def test_names_of_settings_become_flags(text, shown):
@@ -172,7 +177,7 @@ def test_names_of_settings_become_flags(text, shown):
 def test_the_result_goes_to_stdout_and_progress_to_stderr(asked, capsys):
     main(["replay", "drive.mcap"])
     shown = capsys.readouterr()
-    assert "3 frames read" in shown.out
+    assert "0 of 3 frames were evaluated" in shown.out
     assert shown.err == "replaying: 3 of 3 frames\n"
 
 

@@ -8,9 +8,11 @@ import pytest
 from roadeval.evaluation.score import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
+from roadeval.results.facts import FrameAccount
 from roadeval.results.sentences import (
     NOTHING_SCORED,
     Degree,
+    account,
     correction,
     degree,
     sentence,
@@ -129,6 +131,29 @@ def test_the_mark_in_tables_is_explained_by_the_families(sizes, told):
     found = [replace(HARM, p_holm=size and 0.001, comparisons=size) for size in sizes]
     assert correction(found) == told
     assert correction(replace(each, p_holm=0.2) for each in found) == ""
+
+
+@pytest.mark.parametrize(
+    ("frames", "windows", "told"),
+    [
+        (
+            FrameAccount(1101, 40, evaluated=30, skipped={"outside the range": 1061, "gap": 10}),
+            3,
+            "30 of 1,101 frames were evaluated, in 3 windows. Left out: 1,061 outside the "
+            "range, 10 gap.",
+        ),
+        (
+            FrameAccount(3, 3, evaluated=1, skipped={"trained on": 1, "undecodable": 1}),
+            1,
+            "1 of 3 frames was evaluated, in 1 window. Left out: 1 to train on, 1 that cannot "
+            "be decoded.",
+        ),
+        (FrameAccount(5, 5, evaluated=5), None, "5 frames were evaluated."),
+        (FrameAccount(evaluated=38), None, "38 frames were evaluated."),
+    ],
+)
+def test_the_account_says_how_many_frames_were_evaluated_and_why_not_others(frames, windows, told):
+    assert account(frames, windows) == told
 
 
 # --- The verdict ----------------------------------------------------------------------------------

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Final
 from roadeval.cli import console
 from roadeval.cli.screens import seeds, tables, thresholds
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import counted, percent, points
+from roadeval.data.words import percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Cell, Table
 from roadeval.results.facts import Facts, FrameAccount, Totals
-from roadeval.results.sentences import correction, lowest, marked_interval
+from roadeval.results.sentences import account, correction, lowest, marked_interval
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,7 +32,7 @@ OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 def show(outcome: Outcome, out: Console) -> None:
     """Print what a replay read, how well each variant did, and where everything was written."""
     facts = outcome.facts
-    out.print(f"{facts.drive.name}: {accounting(facts)}")
+    out.print(f"{facts.drive.name}: {account(facts.frames, facts.windows)}")
     out.print()
     if facts.totals:
         out.print(facts.verdict)
@@ -42,17 +42,6 @@ def show(outcome: Outcome, out: Console) -> None:
         out.print(f"Nothing to score: {_why_nothing(facts.frames)}.")
     out.print()
     _show_files(outcome, out)
-
-
-def accounting(facts: Facts) -> str:
-    """Return the account of the frames in a line."""
-    frames = facts.frames
-    done = f"{frames.evaluated or 'none'} evaluated"
-    if facts.windows:
-        done += f" in {counted(facts.windows, 'window')}"
-    skipped = (f"{number} {why}" for why, number in frames.skipped.items())
-    of = "" if frames.read == frames.in_log else f" of {frames.in_log}"
-    return ", ".join([f"{frames.read}{of} frames read", *skipped, done])
 
 
 def _show_scores(facts: Facts, out: Console) -> None:

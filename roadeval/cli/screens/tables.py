@@ -76,17 +76,24 @@ def ascii_of(number: str) -> str:
 
 
 def _parts(table: Table, columns: Sequence[Sequence[str]], room: int) -> Iterator[list[int]]:
-    """Part the columns of numbers into those that fit beside the words, one at least a part."""
+    """Part the columns of numbers into those that fit beside the words, one at least a part.
+
+    As few parts as there can be, of about as many columns each: none is left alone below.
+    """
     from rich.cells import cell_len
 
     titled = zip(table.columns, columns, strict=True)
     widths = [GAP + max(map(cell_len, [title, *texts])) for title, texts in titled]
     names = [*table.text_columns]
     free = room + GAP - sum(min(widths[place], GAP + LONGEST) for place in names)
-    part: list[int] = []
-    for place in (place for place in range(len(widths)) if place not in names):
-        if part and sum(widths[other] for other in (*part, place)) > free:
-            yield sorted(names + part)
-            part = []
-        part.append(place)
-    yield sorted(names + part)
+    parts: list[list[int]] = [[]]
+    numbers = [place for place in range(len(widths)) if place not in names]
+    for place in numbers:
+        if parts[-1] and sum(widths[other] for other in (*parts[-1], place)) > free:
+            parts.append([])
+        parts[-1].append(place)
+    size = max(-(-len(numbers) // len(parts)), 1)
+    even = [numbers[begin : begin + size] for begin in range(0, len(numbers), size)]
+    if all(sum(widths[place] for place in part) <= free for part in even):
+        parts = even or parts
+    yield from (sorted(names + part) for part in parts)

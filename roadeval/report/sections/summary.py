@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
 from typing import Final
 
 from roadeval.data import BASELINE, FINAL_STAGE
@@ -26,10 +25,9 @@ from roadeval.report.findings import Findings, FleetFindings, worse_than_baselin
 from roadeval.report.images import jpeg
 from roadeval.report.sections.common import variant_cell
 from roadeval.report.sections.drives import WORST_AT
-from roadeval.results.facts import FleetFacts, FrameAccount, OverDrives
-from roadeval.results.rows import ACCOUNT
+from roadeval.results.facts import FleetFacts, OverDrives
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
-from roadeval.results.sentences import of_seeds, seeds_in_words, spread_in_words
+from roadeval.results.sentences import account, of_seeds, seeds_in_words, spread_in_words
 
 LOSSES: Final = 3
 """Losses that are named."""
@@ -74,7 +72,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
                 "from the least to the greatest.",
             )
             yield Text(of_seeds(seeds), "note")
-    yield Text(_accounting(findings.facts.frames), "note")
+    yield Text(account(findings.facts.frames, findings.facts.windows), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
         yield ImageGrid(pictures, 4, caption=_legend(findings))
@@ -345,19 +343,6 @@ def _legend(findings: Findings) -> str:
 
 
 # --- Accounts -------------------------------------------------------------------------------------
-
-
-def _accounting(frames: FrameAccount) -> str:
-    """Return what became of the frames; names of one count are together."""
-    counts = ((name.replace("_", " "), getattr(frames, name)) for name in ACCOUNT)
-    known = [each for each in counts if each[1] is not None and each[0] not in frames.skipped]
-    kept = [
-        f"{number(count)} {listing([name for name, _ in group])}"
-        for count, group in groupby(known, lambda each: each[1])
-    ]
-    left_out = [f"{number(count)} {why}" for why, count in frames.skipped.items()]
-    told = f"Frames: {'; '.join(kept)}."
-    return f"{told} Left out: {'; '.join(left_out)}." if left_out else told
 
 
 def _statuses(facts: FleetFacts) -> Table:

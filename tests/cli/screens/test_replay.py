@@ -107,15 +107,7 @@ def test_a_difference_without_an_interval_has_none():
 
 def test_the_frames_are_accounted_for():
     assert screen(summary()).startswith(
-        "drive: 101 frames read, 10 trained on, 91 evaluated in 10 windows\n"
-    )
-
-
-def test_frames_that_were_not_read_are_accounted_for_too():
-    skipped = {"outside the range": 61, "trained on": 10}
-    frames = FrameAccount(101, 40, evaluated=30, skipped=skipped)
-    assert outcome.accounting(summary(frames=frames, windows=3)) == (
-        "40 of 101 frames read, 61 outside the range, 10 trained on, 30 evaluated in 3 windows"
+        "drive: 91 of 101 frames were evaluated, in 10 windows. Left out: 10 to train on.\n"
     )
 
 
@@ -125,7 +117,7 @@ def test_frames_that_were_not_read_are_accounted_for_too():
 def test_where_nothing_is_scored_it_says_why(labelled, why):
     frames = FrameAccount(39, 39, labelled=labelled, skipped={"unlabelled": 39})
     shown = screen(summary(frames=frames, totals={}, difference={}, windows=0))
-    assert shown.startswith("drive: 39 frames read, 39 unlabelled, none evaluated\n")
+    assert shown.startswith("drive: 0 of 39 frames were evaluated. Left out: 39 without truth.\n")
     assert "Nothing to score: " in shown
     assert why in shown
     assert "%" not in shown

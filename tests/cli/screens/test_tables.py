@@ -34,6 +34,14 @@ def test_columns_that_do_not_fit_stand_below_with_the_names_again():
     ]
 
 
+def test_no_column_of_numbers_is_left_alone_below_many():
+    out = Console(file=io.StringIO(), width=46)  # there is room for six beside the words
+    titles = ["drive", *(f"n{place}" for place in range(7))]
+    show_table(Table(titles, [["a", *["1.00"] * 7]]), out)
+    heads = [line.split() for line in out.file.getvalue().splitlines() if "drive" in line]
+    assert heads == [titles[:5], ["drive", *titles[5:]]]
+
+
 def test_a_long_name_is_folded_rather_than_parting_the_numbers():
     row = ["a-network-with-a-name-that-is-longer-than-others", *ROW[1:]]
     assert ["variant", "stage", "ERR", "%", "FPR", "%", "pooled", "ERR", "%"] in printed(60, row)

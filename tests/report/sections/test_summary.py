@@ -128,7 +128,7 @@ def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
     assert texts == [
         "It helps. It probably does.",
         "Probably: by chance alone, one drive in ten would show as much.",
-        "Frames: 1,210 in log and read; 1,200 evaluated. Left out: 10 trained on.",
+        "1,200 of 1,210 frames were evaluated. Left out: 10 to train on.",
     ]
 
 
