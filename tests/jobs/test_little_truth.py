@@ -276,5 +276,5 @@ def test_a_report_shows_frames_without_a_label_among_the_others(places, tmp_path
     done = replay(places, tmp_path / "reports", "6", ("net",), **saved)
     evaluated = {*pd.read_csv(tmp_path / "reports" / "frames.csv").frame}
     assert not {*done.facts.examples} <= evaluated
-    roadeval.report(tmp_path / "out.rrd", tmp_path / "report.pdf")
+    roadeval.write_report(tmp_path / "out.rrd", tmp_path / "report.pdf")
     assert (tmp_path / "report.pdf").stat().st_size > 10_000
