@@ -64,7 +64,7 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     for condition in outcome.facts.conditions:
         if condition.judged and (missing := [*condition.not_judged.values()]):
             more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
-            yield f"{condition.condition}: {missing[0]}{more}"
+            yield f"{missing[0]}{more}"
     reasons: dict[str, list[str]] = {}
     names = FleetFolder(outcome.folder).names
     for drive, text in outcome.problems.items():
