@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
     from roadeval.config.tables import ConfigError, in_file, read_tables
     from roadeval.config.variants import (
+        AS_IT_IS,
         PRESETS,
         TUNED,
         Variant,

@@ -37,12 +37,14 @@ from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings,
 from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
 from roadeval.config.variants import (
     PRESETS,
+    TRAINED,
     Variant,
     check_tables,
     check_variant_name,
     in_drive,
     pipeline_of,
     preset_of,
+    thresholded,
     tuned_variant,
     variants_of,
     with_masks,
@@ -157,7 +159,8 @@ class RunConfig(LogConfig):
 
     def variants(self) -> tuple[Variant, ...]:
         """Return the variants that are computed: the two by default, then the extra ones."""
-        every = variants_of(self.pipeline, self.extra)
+        trained = (thresholded(name) for name, own in self.masks.items() if own.decide == TRAINED)
+        every = (*variants_of(self.pipeline, self.extra), *trained)
         return tuple(each for each in every if not self.only or each.name in self.only)
 
     def pipelines(self) -> dict[str, Pipeline]:

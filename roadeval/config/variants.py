@@ -228,6 +228,9 @@ def network_variant(name: str, path: str) -> Variant:
     if in_a_file := Path(path).suffix == ".toml":
         tables = read_tables(path)
     settings = {key: value for key, value in tables.items() if key != "post"}
+    is_trained = settings.get("decide") == TRAINED
+    if is_trained:
+        del settings["decide"]
     file, post = settings.get("file"), tables.get("post", {})
     if not isinstance(file, str) or not file:
         raise ConfigError(f"{path}: file must name the network, an ONNX file")
@@ -235,10 +238,19 @@ def network_variant(name: str, path: str) -> Variant:
         raise ConfigError(f"{path}: [post] must be a table")
     if in_a_file:
         settings["file"] = str(Path(path).parent / file)
-    chain = {"chain": ("net", "post"), "net": settings, "post": {**AS_IT_IS, **post}}
+    stages_ = ("net", *(("threshold",) if is_trained else ()), FINAL_STAGE)
+    chain = {"chain": stages_, "net": settings, "post": {**AS_IT_IS, **post}}
     return Variant.of(name, chain, path if in_a_file else "")
 
 
+def thresholded(name: str) -> Variant:
+    """Return the variant of another method's confidences, above the training frames' threshold."""
+    chain = {"chain": ("given", "threshold", FINAL_STAGE), "given": {"name": name}}
+    return Variant.of(name, {**chain, "post": AS_IT_IS})
+
+
+TRAINED: Final = "trained"
+"""The value of ``decide`` with which the training frames choose the threshold."""
 TUNED: Final = "_tuned"
 """Ends the name of a tuned variant."""
 
@@ -253,13 +265,14 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     before: tuple[str, ...] = ("given",)
     settings = {"given": {"name": name}}
     if method is not None:
-        if learning := method.learning():
+        if learning := [name for name in method.learning() if name != "threshold"]:
             raise ConfigError(
                 f"`tunes` {name}: it learns itself ({', '.join(learning)}), and of frames that "
                 "taught it, it says too much to learn from"
             )
-        before = tuple(each for each in method.chain if each != FINAL_STAGE)
-        settings = {key: asdict(own) for key, own in method.settings.items() if key != FINAL_STAGE}
+        dropped = ("threshold", FINAL_STAGE)
+        before = tuple(each for each in method.chain if each not in dropped)
+        settings = {k: asdict(own) for k, own in method.settings.items() if k not in dropped}
     exposure = () if "exposure" in before else ("exposure",)
     chain = (*before, *exposure, "trees", FINAL_STAGE)
     tables = {"preset": "robust", "chain": chain, **settings, "trees": {"opinion": True}}

@@ -19,6 +19,7 @@ from roadeval.data.frame import (
     Role,
     Truth,
 )
+from roadeval.data.histogram import CODES, best_code, histogram, wrong_above
 from roadeval.data.layer import (
     ERRORS,
     ROAD_CLASSES,
@@ -54,6 +55,7 @@ from roadeval.data.result import (
 __all__ = [
     "BASELINE",
     "CAMERA",
+    "CODES",
     "ERRORS",
     "FILTERED",
     "FINAL_STAGE",
@@ -90,10 +92,13 @@ __all__ = [
     "TruthBits",
     "VariantLayout",
     "VariantResult",
+    "best_code",
     "everywhere",
+    "histogram",
     "is_plain",
     "mask_spec",
     "ones",
     "pack",
     "unpack",
+    "wrong_above",
 ]

@@ -174,6 +174,9 @@ class MaskSettings(LabelPlace):
     threshold: Annotated[float | None, Interval(gt=0, le=1)] = None
     """For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is a
     share of the greatest such value; one with a fraction is from 0 to 1."""
+    decide: Literal["threshold", "trained"] = "threshold"
+    """For confidence maps: whether road is what ``threshold`` says, or what another one says that
+    is chosen on the training frames, where it errs least."""
     labels: LabelSettings = LabelSettings()
     """For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean."""
 
@@ -181,6 +184,8 @@ class MaskSettings(LabelPlace):
         super().__post_init__()
         if self.threshold is not None and self.labels != LabelSettings():
             raise ValueError("threshold is for confidence maps, labels are for masks of classes")
+        if self.threshold is None and self.decide == "trained":
+            raise ValueError("a trained threshold is for confidence maps: give threshold as well")
 
 
 @dataclass(frozen=True)

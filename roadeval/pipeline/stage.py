@@ -77,14 +77,20 @@ class Opinion:
 
     mask: Packed
     """Its road mask."""
-    planes: tuple[Probability, ...] = ()
-    """How probable each class of road is, ``(H, W)`` uint16 codes; none where it gives masks alone.
-    """
+    probability: Probability | None = None
+    """How probable road is, ``(H, W)`` uint16 codes; None where it gives masks alone."""
+    by_class: tuple[Probability, ...] = ()
+    """The same of each class of road, where there are several."""
+
+    @property
+    def planes(self) -> tuple[Probability, ...]:
+        """How probable each class of road is."""
+        return self.by_class or (() if self.probability is None else (self.probability,))
 
     def mirrored(self) -> Opinion:
         """Return what it says of the mirrored frame, left and right exchanged."""
         planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in self.planes)
-        return Opinion(Packed.of(self.mask.pixels()[:, ::-1]), planes)
+        return Opinion(Packed.of(self.mask.pixels()[:, ::-1]), by_class=planes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,9 +121,8 @@ class View:
     @classmethod
     def of_frame(cls, frame: Frame) -> View:
         """Return what the first stage sees of a frame."""
-        likely = {name: (plane,) for name, plane in frame.probabilities.items()}
         given = {
-            name: Opinion(Packed.of(mask), likely.get(name, ()))
+            name: Opinion(Packed.of(mask), frame.probabilities.get(name))
             for name, mask in frame.external.items()
         }
         return cls.of(frame.image, frame.moment, given)
@@ -133,8 +138,7 @@ class View:
         planes = self.planes if image is self.image else split(image)
         opinion = self.opinion
         if output.mask is not None:
-            one = () if output.probability is None else (output.probability,)
-            opinion = Opinion(output.mask, output.by_class or one)
+            opinion = Opinion(output.mask, output.probability, output.by_class)
         return replace(self, image=image, planes=planes, opinion=opinion)
 
 
@@ -244,6 +248,8 @@ class TrainingSet:
     share: float | None = None
     """Of road among the labelled pixels of the frames, from which as many pixels of road as of the
     rest are sampled; None where the labels are a guess, whose share is not to be trusted."""
+    truths: tuple[Truth, ...] = ()
+    """Of the frames, whole: for what few pixels do not tell."""
     opinions: tuple[Opinion | None, ...] = ()
     """What the stage before says of each frame, if it makes a mask; empty where none is asked."""
 

@@ -182,6 +182,10 @@ class Facts(_Document):
     """Boundary F and flicker of each final mask."""
     curves: Totals = field(default_factory=dict)
     """Over all thresholds, by variant and stage that says how probable road is."""
+    thresholds: dict[str, dict[str, float]] = field(default_factory=dict)
+    """By a variant that learns nothing: its ``own`` threshold on how probable road is, the
+    ``threshold`` that errs least on the training frames, and the evaluated frames' ``ERR`` at it,
+    of all pixels together."""
     difference: Differences = field(default_factory=dict)
     """Filtered minus unfiltered, by stage."""
     against_unfiltered: Differences = field(default_factory=dict)
@@ -222,11 +226,11 @@ class Facts(_Document):
     AGAIN = "make it again with roadeval replay"
     VALUES = 200_000  # a run with two variants writes some two thousand
     RESULTS = (
-        *("verdict", "frames", "totals", "beyond", "curves", "difference"),
+        *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims"),
         *("health", "warnings", "losses", "settings", "methods"),
     )
-    OPTIONAL = ("curves", "seeds", "methods", "masks", "files")
+    OPTIONAL = ("curves", "thresholds", "seeds", "methods", "masks", "files")
 
     @cached_property
     def finals(self) -> dict[str, str]:

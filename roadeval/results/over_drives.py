@@ -6,20 +6,14 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts
 from roadeval.data.words import defined
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison import (
-    Change,
-    Condition,
-    ConditionError,
-    Judgement,
-    judge_mask,
-)
+from roadeval.evaluation.comparison import Change, Condition, ConditionError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED, Effect, corrected
@@ -233,6 +227,23 @@ def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
 NO_TRUTH: Final = "nothing can be checked, for no frame with truth was evaluated"
 
 
+@dataclass(frozen=True, slots=True)
+class DriveJudgement:
+    """A condition judged on a drive."""
+
+    drive: str
+    condition: str
+    holds: bool | None
+    """Whether it holds; None where it was not judged."""
+    sentence: str
+    """What was found, or why it was not judged."""
+
+    @property
+    def told(self) -> str:
+        """The sentence, which names the condition."""
+        return f"{self.condition}: {self.sentence}" if self.holds is None else self.sentence
+
+
 def check_conditions(conditions: Sequence[Condition]) -> None:
     """Raise a `ConditionError` for a condition on a change: one result alone has no base."""
     for condition in conditions:
@@ -252,7 +263,7 @@ def scores_of(folder: Path) -> Rows:
 
 def judge_drives(
     scores: Iterable[Mapping[str, Any]], conditions: Sequence[Condition], least: int
-) -> Iterator[Judgement]:
+) -> Iterator[DriveJudgement]:
     """Judge conditions on each scored drive: on the rates of its own frames.
 
     ``scores`` are rows of that table; the conditions are on levels alone, see `check_conditions`. A
@@ -262,7 +273,7 @@ def judge_drives(
     rows = [row for row in scores if row["region"] == ALL]
     if conditions and not rows:
         every = ", ".join(condition.text for condition in conditions)
-        yield Judgement.none(conditions[0], "", f"{every}: {NO_TRUTH}")
+        yield DriveJudgement("", every, None, NO_TRUTH)
         return
     for condition in conditions:
         own = [
@@ -277,11 +288,15 @@ def judge_drives(
         yield from (_judged(condition, row, least) for row in own)
 
 
-def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> Judgement:
+def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> DriveJudgement:
+    drive = row["drive"]
+    if row["frames"] < least:
+        few = f"{row['frames']} evaluated frames, and {least} are needed"
+        return DriveJudgement(drive, condition.text, None, f"not judged: {drive} has {few}")
     rates = {name: math.nan if row[name] is None else row[name] for name in (*METRICS, *POOLED)}
     rates |= metrics.overlap(Counts(*(row[name] for name in OUTCOMES)))
     mask = Change(
-        result=row["drive"],
+        result=drive,
         variant=row["variant"],
         stage=row["stage"],
         final=row["final"],
@@ -292,9 +307,10 @@ def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> Judgeme
         difference={},
     )
     try:
-        return judge_mask(condition, mask, (), least)
+        judgement = condition.judge(mask)
     except ConditionError as error:
-        return Judgement.none(condition, row["drive"], error)
+        return DriveJudgement(drive, condition.text, None, str(error))
+    return DriveJudgement(drive, condition.text, judgement.holds, judged(judgement))
 
 
 def flat_metrics(facts: FleetFacts) -> dict[str, float]:
@@ -326,7 +342,7 @@ _OF_STATUS: Final = {
 
 
 def drive_cases(
-    drives: Iterable[Mapping[str, Any]], conditions: Iterable[Judgement] = ()
+    drives: Iterable[Mapping[str, Any]], conditions: Iterable[DriveJudgement] = ()
 ) -> Iterator[Case]:
     """Yield a case a drive, and a case a drive and condition.
 
@@ -341,5 +357,5 @@ def drive_cases(
         yield Case("replay", row["drive"], parts, row["seconds"])
     for each in conditions:
         kind = "failure" if each.holds else "skipped"
-        said = {} if each.holds is False else {kind: judged(each)}
-        yield Case(each.condition.text, each.result, said)
+        said = {} if each.holds is False else {kind: each.sentence}
+        yield Case(each.condition, each.drive, said)

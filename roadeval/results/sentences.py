@@ -256,13 +256,15 @@ def verdict(
     effects: Sequence[Effect],
     settings: EvaluationSettings,
     claims: Mapping[str, Mapping[str, int]] | None = None,
+    thresholds: Mapping[str, Mapping[str, float]] | None = None,
 ) -> str:
-    """Return the verdict on a drive or a fleet, at most four sentences.
+    """Return the verdict on a drive or a fleet, a few sentences.
 
-    Which variant is best, and whether it beats the baseline; what the filter changes; and which
-    step adds most to the filtered variant's errors. ``totals`` are by variant and stage, empty
-    where nothing was scored; ``effects`` are of final masks at least; ``claims`` says in how many
-    windows of a drive each claim of the paper holds.
+    Which variant is best, and whether it beats the baseline; what another threshold would bring to
+    a method; what the filter changes; and which step adds most to the filtered variant's errors.
+    ``totals`` are by variant and stage, empty where nothing was scored; ``effects`` are of final
+    masks at least; ``claims`` says in how many windows of a drive each claim of the paper holds,
+    ``thresholds`` what other thresholds would bring on it, see `at_thresholds`.
     """
     if not totals:
         return NOTHING_SCORED
@@ -274,7 +276,7 @@ def verdict(
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     against = finals.get((BASELINE, best))
     blind = None if against is None else against.rates[TESTED]
-    parts = [_best(best, rates, blind, settings)]
+    parts = [_best(best, rates, blind, settings), *at_thresholds(thresholds or {}, rates)]
     of_filter = finals.get((UNFILTERED, FILTERED))
     if of_filter is not None and of_filter.rates[TESTED].units:
         found = of_filter.rates[TESTED]
@@ -283,6 +285,29 @@ def verdict(
         rate = f"{TESTED} of {of_filter.stage}"
         parts.append(sentence(found, "the filter", rate, settings, levels=ends, **more))
     return " ".join(filter(None, [*parts, _costs_most(totals)]))
+
+
+def at_thresholds(
+    thresholds: Mapping[str, Mapping[str, float]], rates: Mapping[str, Mapping[str, Any]]
+) -> Iterator[str]:
+    """Yield what the threshold of the training frames would bring to each method, in a sentence.
+
+    Parameters
+    ----------
+    thresholds
+        As in `roadeval.results.facts.Facts`.
+    rates
+        Those of final masks by variant. Where ERR would hardly change nothing is said.
+    """
+    for name, found in thresholds.items():
+        now = rates.get(name, {}).get(f"pooled_{TESTED}", math.nan)
+        if abs(now - found[TESTED]) >= ROUNDING:
+            digits = 1 if abs(now - found[TESTED]) >= FINE else 2
+            yield (
+                f"{name} at {found['threshold']:.2g} instead of {found['own']:.2g}, which the "
+                f"training frames choose: {in_percent(found[TESTED]):.{digits}f} instead of "
+                f"{in_percent(now):.{digits}f} %."
+            )
 
 
 def lowest(rates: Mapping[str, Mapping[str, Any]]) -> str | None:

@@ -111,7 +111,8 @@ def _sampled(
             "so nothing can be learnt from them; choose other frames with `frames.start` or "
             "`training.frames`, or give `training.model`"
         )
-    return dataclasses.replace(sampled, images=tuple(frame.image for frame in frames))
+    images = tuple(frame.image for frame in frames)
+    return dataclasses.replace(sampled, images=images, truths=tuple(truths))
 
 
 def _fit_variant(
@@ -423,6 +424,7 @@ class HeldFrames:
         masks = [frame.truth, frame.shadow_truth, *frame.external.values()]
         # Two filters in a row leave two more images of each frame while a variant is fitted.
         size = 3 * frame.image.nbytes + sum(mask.nbytes for mask in masks if mask is not None)
+        size += sum(each.nbytes for each in frame.probabilities.values())
         size += len(frame.payload)
         self.is_full = self._bytes + size > GREATEST_MEMORY
         if not self.is_full:

@@ -105,7 +105,7 @@ def test_masks_are_those_of_the_drive():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"path": "a", "thresold": 1}, "there is no such setting; choose first, images"),
+        ({"path": "a", "thresold": 1}, "there is no such setting; choose decide, first"),
         ({"path": "a", "threshold": 2}, "must be at most 1"),
         ({"path": "a", "threshold": 0.5, "labels": {"road": [3]}}, "threshold is for confidence"),
         ({"path": "a", "images": "b", "first": 1}, "with images labels are paired by name"),

@@ -13,14 +13,13 @@ from sklearn.metrics import (
     roc_curve,
 )
 
+from roadeval.data import CODES, histogram
 from roadeval.evaluation.score import (
-    CODES,
     Curves,
     Thresholds,
     at_levels,
     calibration,
     calibration_error,
-    histogram,
 )
 
 TOP = CODES - 1

@@ -22,12 +22,12 @@ SMALL = {"preset": "robust", "trees": {"width": 64, "trees": 20, "hidden": 8, "p
 
 
 def picture(number):
-    """A red road between green verges, half of it in the shade; house fronts are as red."""
+    """A red road between green verges, half of it in the shade; house fronts are nearly as red."""
     height, width = SIZE
     rng = np.random.default_rng(number)
     image = np.empty((height, width, 3), np.uint8)
     image[:] = (60, 120, 50)
-    image[: height // 3] = (150, 110, 100)
+    image[: height // 3] = (140, 110, 100)
     rows, columns = np.indices(SIZE)
     middle = width / 2 + 6 * np.sin(number)
     road = (rows >= height // 3) & (np.abs(columns - middle) < 4 + rows * 0.4)
@@ -107,6 +107,81 @@ def test_it_says_where_it_has_learnt(once):
     )
 
 
+def shares(number):
+    return picture(number)[0][..., 0].astype(np.float32) / 255
+
+
+def confidences(folder):
+    """How red each pixel is, beside the log; red things are road."""
+    folder.mkdir()
+    for number in range(FRAMES):
+        np.save(folder / f"{number}.npy", shares(number))
+    return {"path": str(folder), "threshold": 0.59}
+
+
+def wrong(numbers, threshold):
+    pairs = [(shares(n), picture(n)[1]) for n in numbers]
+    return np.mean([((share > threshold) != road).mean() for share, road in pairs])
+
+
+@pytest.fixture(scope="module")
+def at_trained(folder, tmp_path_factory):
+    to = tmp_path_factory.mktemp("trained")
+    masks = {"mine": confidences(to / "a"), "other": {**confidences(to / "b"), "decide": "trained"}}
+    config = configure({**SMALL, "masks": masks, "output": {"record": "none"}})
+    return replay(folder / "drive.mcap", config, to / "r")
+
+
+def test_the_headline_says_what_the_training_frames_threshold_would_bring(at_trained):
+    outcome, _ = at_trained
+    found = outcome.summary["thresholds"]
+    assert {*found} == {"mine"}
+    levels = np.arange(256) / 255 + 0.5 / 255
+    best = min(wrong(range(TRAINED), level) for level in levels)
+    threshold = found["mine"]["threshold"]
+    assert wrong(range(TRAINED), threshold) == pytest.approx(best)
+    scored = range(TRAINED, FRAMES)
+    now, then = wrong(scored, 0.59), wrong(scored, threshold)
+    assert found["mine"] == {
+        "own": 0.59,
+        "threshold": pytest.approx(threshold),
+        "ERR": pytest.approx(then),
+    }
+    told = f"mine at {threshold:.2g} instead of 0.59, which the training frames choose: "
+    assert f"{told}{100 * then:.1f} instead of {100 * now:.1f} %." in outcome.summary["verdict"]
+
+
+def test_decide_trained_takes_that_threshold(at_trained):
+    outcome, rows = at_trained
+    found = outcome.summary["thresholds"]["mine"]
+    assert err(rows, "other", "threshold") == pytest.approx(found["ERR"])
+    assert err(rows, "other") == err(rows, "other", "threshold")
+    assert err(rows, "other", "given") == err(rows, "mine")
+    assert any(each.startswith("other: its threshold is") for each in outcome.warnings)
+
+
+def test_a_network_may_have_its_threshold_chosen(folder, tmp_path):
+    red_network(tmp_path / "red.onnx", size=SIZE[::-1], bias=-150.0)
+    (tmp_path / "net.toml").write_text('file = "red.onnx"\ndecide = "trained"\n')
+    config = configure(SMALL).with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
+    _, rows = replay(folder / "drive.mcap", config, tmp_path / "r")
+    assert err(rows, "mine") < err(rows, "mine", "net")
+    # Its own threshold does not matter to what is learnt on top of it.
+    assert "threshold" not in config.with_tuned(["mine"]).pipelines()["mine_tuned"].settings
+
+
+def test_labels_of_scored_frames_do_not_choose_the_threshold(folder, tmp_path):
+    masks = {"mine": {**confidences(tmp_path / "a"), "decide": "trained"}}
+    config = configure({**SMALL, "masks": masks, "only": ["mine"]})
+    codes = []
+    for until in (FRAMES, TRAINED, 0):
+        drive = write(tmp_path / f"{until}.mcap", mirrored_truth_from=until)
+        with open_log(drive, config) as log:
+            run = prepare(log, config.resolved(), lambda _: None)
+        codes.append(run.model.parameters["mine"]["threshold"].code)
+    assert codes[0] == codes[1] != codes[2]
+
+
 def test_the_network_runs_once_a_frame(folder, tmp_path, monkeypatch):
     calls = []
     road = networks.Network.road
@@ -158,11 +233,7 @@ def test_a_training_frame_without_a_mask_ends_the_run(folder, tmp_path):
 
 
 def test_confidences_beside_the_log(folder, tmp_path):
-    (tmp_path / "shares").mkdir()
-    for number in range(FRAMES):
-        share = picture(number)[0][..., 0].astype(np.float32) / 255
-        np.save(tmp_path / "shares" / f"{number}.npy", share)
-    masks = {"mine": {"path": str(tmp_path / "shares"), "threshold": 0.41}}
+    masks = {"mine": confidences(tmp_path / "shares")}
     config = small(configure({**SMALL, "masks": masks}).with_tuned(["mine"]))
     _, rows = replay(folder / "drive.mcap", config, tmp_path / "r")
     assert err(rows, "mine_tuned") < err(rows, "mine") / 5

@@ -56,7 +56,6 @@ from roadeval.evaluation.score.scoreboard import (
 )
 from roadeval.evaluation.score.thresholds import (
     BINS,
-    CODES,
     LEVELS,
     Curves,
     HeatMap,
@@ -65,5 +64,4 @@ from roadeval.evaluation.score.thresholds import (
     calibration,
     calibration_error,
     changes,
-    histogram,
 )

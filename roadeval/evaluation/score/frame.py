@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
@@ -18,6 +18,7 @@ from roadeval.data import (
     Frame,
     FrameResult,
     Health,
+    Histogram,
     Packed,
     Rgb,
     Role,
@@ -25,13 +26,14 @@ from roadeval.data import (
     Truth,
     TruthBits,
     VariantResult,
+    histogram,
     ones,
 )
 from roadeval.data.arrays import Bits, Sums
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.score.counts import Name, boundary_f, count, error_map
-from roadeval.evaluation.score.thresholds import changes, histogram
+from roadeval.evaluation.score.thresholds import changes
 from roadeval.evaluation.settings import (
     DEGRADED_ERR,
     DEGRADED_MARGIN,
@@ -58,9 +60,13 @@ def score_frame(
 ) -> FrameResult:
     """Score one frame; one that is not `EVALUATED` is passed on without counts.
 
+    Of a training frame it counts alone how probable its road and the rest are.
+
     A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
     stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on.
     """
+    if role is Role.TRAINING and frame.truth is not None:
+        return FrameResult(frame, role, variants, histograms=_histograms(frame.truth, variants))
     if role is not Role.EVALUATED:
         return FrameResult(frame, role, variants)
     if frame.truth is None:
@@ -86,15 +92,19 @@ def score_frame(
         truth_bits=truth,
         changes=changes(names, bits, truth),
         contours=boundary_f(final_bits, truth, settings.boundary_width),
-        histograms={
-            (variant.variant, each.stage): histogram(each.output.probability, frame.truth)
-            for variant in variants
-            for each in variant.stages
-            if each.output.probability is not None
-        },
+        histograms=_histograms(frame.truth, variants),
         oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
         repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
     )
+
+
+def _histograms(truth: Truth, variants: Iterable[VariantResult]) -> dict[Name, Histogram]:
+    return {
+        (variant.variant, each.stage): histogram(each.output.probability, truth)
+        for variant in variants
+        for each in variant.stages
+        if each.output.probability is not None
+    }
 
 
 def tally(

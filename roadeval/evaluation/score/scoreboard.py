@@ -172,6 +172,7 @@ class Scoreboard:
         self.changes: Final[defaultdict[Transition, Change]] = defaultdict(Change)
         """Every change between masks."""
         self.curves: Final = Curves()
+        self._training: Final = Curves()
         self._edges: Final = EdgesAndFlicker(settings.boundary_width)
         self._seconds: Final[defaultdict[Name, list[float]]] = defaultdict(lambda: [0.0, 0])
 
@@ -189,6 +190,7 @@ class Scoreboard:
                 spent[0] += stage.seconds
                 spent[1] += 1
         if not result.tallies:
+            self._training.add(result.histograms)
             return
         for name, health in result.health.items():
             self._health[name][health] += 1
@@ -238,6 +240,14 @@ class Scoreboard:
     def effects(self) -> list[Effect]:
         """Return the paired differences of the drive."""
         return drive_effects(self._masks(), self._settings)
+
+    def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
+        """Return the evaluated frames' ERR at the threshold that the training frames choose.
+
+        It is the threshold of a method that learnt nothing; for one that learnt from these frames
+        it says little. See `Curves.at_best_of`.
+        """
+        return self.curves.at_best_of(self._training)
 
     def repeats(self) -> dict[str, Any]:
         """Return the rates with each seed, in their order: first those of the run's own.

@@ -26,37 +26,24 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import (
-    NON_ROAD,
-    ROAD,
+    CODES,
     Change,
     Histogram,
-    Probability,
     Transition,
-    Truth,
     TruthBits,
+    best_code,
     everywhere,
     ones,
+    wrong_above,
 )
 from roadeval.data.arrays import FN, FP, IGNORED, Bits, Floats, Sums
 from roadeval.evaluation.score.counts import Name, flat
 from roadeval.kernels import KERNELS
 
-CODES: Final = 1 << 16
-"""Codes of a probability: ``code / 65535`` is from 0 to 1."""
 BINS: Final = 15
 """Bins of the calibration, equally wide, as many as in [1]_ of `calibration`."""
 LEVELS: Final = 256
 """Levels of the table: each holds as many codes as it."""
-
-
-def histogram(probability: Probability, truth: Truth) -> Histogram:
-    """Count the labelled pixels by code: ``(2, 65536)`` uint32, non-road and road.
-
-    ``probability`` is ``(H, W)`` uint16 codes, ``truth`` ``(H, W)`` uint8: 0 non-road, 1 road, 255
-    ignored.
-    """
-    counts = [np.bincount(probability[truth == each], minlength=CODES) for each in (NON_ROAD, ROAD)]
-    return np.array(counts, np.uint32)
 
 
 def at_levels(counts: Sums) -> Sums:
@@ -175,6 +162,20 @@ class Curves:
         self.counts: Final[dict[Name, Sums]] = {}
         """``(2, 65536)`` int64 each: non-road and road."""
         self._frames: Final[Counter[Name]] = Counter()
+
+    def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
+        """Return ERR of all pixels at the threshold that errs least on other frames.
+
+        By variant and stage of both: the ``threshold`` as a fraction, and ``ERR``.
+        """
+        found: dict[str, dict[str, dict[str, float]]] = {}
+        for (variant, stage), counts in self.counts.items():
+            if (variant, stage) in others.counts:
+                code = best_code(others.counts[variant, stage])
+                err = float(wrong_above(counts)[code] / counts.sum())
+                at = {"threshold": code / (CODES - 1), "ERR": err}
+                found.setdefault(variant, {})[stage] = at
+        return found
 
     def add(self, histograms: Mapping[Name, Histogram]) -> None:
         """Add the histograms of a frame."""

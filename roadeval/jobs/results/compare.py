@@ -143,7 +143,8 @@ def _judged(
             yield from judge(found, [condition], settings)
         except ConditionError as error:
             new = ", ".join(each.label for each in found.results[1:])
-            yield Judgement.none(condition, new, error)
+            none = (np.nan, np.nan, np.nan, None, None, None)
+            yield Judgement(condition, new, 0, *none, why=str(error))
 
 
 def _sides(

@@ -185,7 +185,11 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     masks = selection.masks
     layouts = (
         *(each.layout() for each in variants),
-        *(external_layout(n, m.where, probable=m.is_confidence) for n, m in masks.items()),
+        *(
+            external_layout(name, own.where, probable=own.is_confidence)
+            for name, own in masks.items()
+            if name not in chains
+        ),
     )
     prior = None if model.prior is None else BlindPrior(model.prior)
     board = Scoreboard(config.evaluation, [layout.name for layout in layouts], prior)
@@ -413,6 +417,7 @@ def _process(
     variants += [
         external_variant(name, mask, frame.probabilities.get(name))
         for name, mask in frame.external.items()
+        if name not in run.chains
     ]
     result = run.board.score(frame, use.role, tuple(variants))
     result = replace(result, notes=notes_of(result.tallies))

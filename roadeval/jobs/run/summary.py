@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, Final
 
-from roadeval.config import TUNED
-from roadeval.data import BASELINE, Role
+from roadeval.config import AS_IT_IS, TUNED
+from roadeval.data import BASELINE, FINAL_STAGE, Role
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.results.facts import (
     DriveFacts,
@@ -34,10 +34,14 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     repeats = run.board.repeats()
     settings = run.config.training
     given = settings.model is not None and not settings.adapt
+    thresholds = dict(_thresholds(run))
     return Facts(
         **found,
         **as_parts(effects),
-        verdict=verdict(found["totals"], effects, run.config.evaluation, found["claims"]),
+        verdict=verdict(
+            *(found["totals"], effects, run.config.evaluation, found["claims"], thresholds)
+        ),
+        thresholds=thresholds,
         drive=DriveFacts(
             run.log.name,
             run.key.camera,
@@ -66,6 +70,25 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         masks=_masks(run),
         tables=tables,
     )
+
+
+def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield what the threshold of the training frames would bring to methods that learn nothing."""
+    found = run.board.thresholds()
+    masks = [(name, each.threshold) for name, each in run.config.masks.items()]
+    own = {name: at for name, at in masks if at is not None and name not in run.chains}
+    for variant in run.variants:
+        stages = variant.pipeline.settings
+        post = stages[FINAL_STAGE]
+        is_final = all(getattr(post, key) == value for key, value in AS_IT_IS.items())
+        if is_final and not variant.pipeline.learning():
+            net = stages.get("net")
+            own[variant.name] = 0.5
+            if net is not None and net.decide == "threshold":
+                own[variant.name] = net.threshold
+    for name, threshold in own.items():
+        for at in found.get(name, {}).values():
+            yield name, {"own": threshold, **at}
 
 
 def versions() -> dict[str, str]:
@@ -120,7 +143,9 @@ def _tuned(run: Run) -> Iterator[str]:
     if settings.model is not None:
         where = f"other drives and {own}" if settings.adapt else f"other drives ({settings.model})"
     for variant in run.variants:
-        if variant.pipeline.heard():
+        if "threshold" in variant.pipeline.settings:
+            yield f"{variant.name}: its threshold is the one with the fewest errors on {where}"
+        elif variant.pipeline.heard():
             method = variant.name.removesuffix(TUNED)
             yield (
                 f"{variant.name}: learnt on {where}, on top of what {method} says: its rates are "

@@ -26,8 +26,8 @@ def bind(settings: GivenSettings, _parameters: None) -> Callable[[View], Output]
         if (found := view.given.get(settings.name)) is None:
             which = f"frame {view.moment.number}" if view.moment else "the image"
             raise AbsentError(f"given: {which} has no mask of {settings.name}")
-        likely = found.planes[0] if found.planes else None
-        return Output((Layer(GIVEN, found.mask),), mask=found.mask, probability=likely)
+        own = (Layer(GIVEN, found.mask),)
+        return Output(own, mask=found.mask, probability=found.probability)
 
     return run
 

@@ -1,0 +1,44 @@
+"""Pixels by the code of their probability, and the threshold on it that errs least."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data.frame import NON_ROAD, ROAD, Histogram, Probability, Truth
+
+CODES: Final = 1 << 16
+"""Codes of a probability: ``code / 65535`` is from 0 to 1."""
+
+
+def histogram(probability: Probability, truth: Truth) -> Histogram:
+    """Count the labelled pixels by code: ``(2, 65536)`` uint32, non-road and road.
+
+    ``probability`` is ``(H, W)`` uint16 codes, ``truth`` ``(H, W)`` uint8: 0 non-road, 1 road, 255
+    ignored.
+    """
+    counts = [np.bincount(probability[truth == each], minlength=CODES) for each in (NON_ROAD, ROAD)]
+    return np.array(counts, np.uint32)
+
+
+def wrong_above(counts: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Return how many pixels are wrong where road is what exceeds each code, ``(65536,)``.
+
+    ``counts`` are ``(2, 65536)``: non-road and road.
+    """
+    other, road = counts.astype(np.int64).cumsum(axis=1)
+    wrong: npt.NDArray[np.int64] = other[-1] - other + road
+    return wrong
+
+
+def best_code(counts: npt.NDArray[Any]) -> int:
+    """Return the code that errs least where road is what exceeds it.
+
+    Of neighbours that err alike it is the middle one.
+    """
+    wrong = wrong_above(counts)
+    first = int(wrong.argmin())
+    beyond = np.flatnonzero(wrong[first:] != wrong[first])
+    return first + (int(beyond[0]) - 1 if len(beyond) else CODES - 1 - first) // 2

@@ -1,0 +1,76 @@
+"""The threshold on how probable road is, chosen where training frames have the fewest errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from roadeval.data import CODES, Layer, Packed, Probability, best_code, histogram, mask_spec
+from roadeval.pipeline.stage import (
+    Opinion,
+    Output,
+    Stage,
+    StageError,
+    TrainingSet,
+    View,
+    check_range,
+    stage_settings,
+)
+
+THRESHOLD: Final = mask_spec("threshold", "Road above the threshold of the training frames")
+
+
+@stage_settings
+class ThresholdSettings:
+    """The threshold has no settings: all labelled pixels of the training frames decide."""
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """What the training frames chose."""
+
+    code: int
+    """Road is what is more probable, 0..65535."""
+
+    def __post_init__(self) -> None:
+        check_range("code", self.code, 0, CODES - 1)
+
+
+def codes_of(opinion: Opinion | None) -> Probability:
+    """Return how probable road is by the stage before; a `StageError` if that does not say so."""
+    if opinion is None or opinion.probability is None:
+        raise StageError("threshold: the stage before does not say how probable road is")
+    return opinion.probability
+
+
+def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
+    """Choose the threshold with the fewest wrong pixels, of all that are labelled."""
+    pairs = zip(sample.opinions, sample.truths, strict=True)
+    counts = [histogram(codes_of(opinion), truth) for opinion, truth in pairs]
+    return Threshold(best_code(np.sum(counts, axis=0)))
+
+
+def bind(_settings: ThresholdSettings, learnt: Threshold) -> Callable[[View], Output]:
+    """Return the threshold as a function of what the stage before says."""
+
+    def run(view: View) -> Output:
+        road = Packed.of(codes_of(view.opinion) > learnt.code)
+        facts = {"threshold": learnt.code / (CODES - 1)}
+        return Output((Layer(THRESHOLD, road),), mask=road, facts=facts)
+
+    return run
+
+
+STAGE: Final = Stage(
+    name="threshold",
+    title="Threshold of the training frames",
+    settings=ThresholdSettings,
+    bind=bind,
+    layers=(THRESHOLD,),
+    fit=fit,
+    parameters=Threshold,
+    hears=lambda _settings: True,
+)
