@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import Any, Final
 
 from roadeval.data.words import number
@@ -11,6 +12,8 @@ from roadeval.report.findings import Findings, FleetFindings
 from roadeval.report.sections import drive, drives, frames, provenance, summary
 from roadeval.report.sections.frames import BrowsedFrames
 
+ACROSS: Final = 6
+"""Worst frames of a fleet beside each other on a page."""
 Section = Callable[[Any], Iterable[Block]]
 SCORED: Final = (
     *(drive.over_drive, drive.filter_effect, drive.regions, drive.stages, drive.thresholds),
@@ -30,7 +33,8 @@ def document(findings: Findings | FleetFindings) -> Document:
 def page_document(findings: Findings | FleetFindings, browsed: BrowsedFrames | None) -> Document:
     """Return the report as a page: with a browser of frames, or a table of all drives."""
     if isinstance(findings, FleetFindings):
-        parts: tuple[Section, ...] = (drives.table, drives.worst, drives.plots, drives.strata)
+        worst = partial(drives.worst, across=ACROSS)
+        parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
         return _of(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     scored = SCORED if findings.totals else (drive.masks,)
     frame_browser = frames.browser(browsed) if browsed else ()

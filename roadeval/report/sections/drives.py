@@ -11,7 +11,17 @@ from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import DASH, first_of, interval, number, percent, points
 from roadeval.evaluation.score import BASES, TESTED
 from roadeval.evaluation.stats import Difference
-from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, LongTable, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    Cell,
+    Details,
+    Figure,
+    Heading,
+    ImageGrid,
+    LongTable,
+    Table,
+    Text,
+)
 from roadeval.report.charts.standard import MEAN, ForestRow, caption, forest
 from roadeval.report.findings import FleetFindings, Row, WorstPicture
 from roadeval.results.facts import OverDrives, StratumFacts
@@ -35,12 +45,12 @@ def plots(findings: FleetFindings) -> Iterator[Block]:
     if not findings.scores:
         return
     yield Heading("Drive by drive")
-    for effect, title in chosen:
-        yield Heading(title, 2)
-        yield from _plot(findings, effect)
-    yield Heading("Drives with the highest error rate", 2)
-    yield worst_table(findings)
-    yield Text("Percent; the differences in percentage points. Tags as they were given.", "note")
+    for place, (effect, title) in enumerate(chosen):
+        plot = [*_plot(findings, effect)]
+        yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
+    units = "Percent; the differences in percentage points. Tags as they were given."
+    worst_drives = [worst_table(findings), Text(units, "note")]
+    yield Details("Drives with the highest error rate", worst_drives)
 
 
 def plotted(findings: FleetFindings) -> Iterator[tuple[OverDrives, str]]:
@@ -246,9 +256,7 @@ def strata(findings: FleetFindings) -> Iterator[Block]:
     if not tables:
         return
     yield Heading("By tag and by light")
-    for title, rows in tables:
-        yield Heading(title, 2)
-        yield from strata_table(rows)
+    yield from (Details(title, [*strata_table(rows)]) for title, rows in tables)
     if any(row.by in _LIGHT for _, rows in tables for row in rows):
         yield Text(_OF_LIGHT, "note")
 
@@ -327,6 +335,8 @@ def _legend(rows: Sequence[Part], left_out: int) -> str:
 
 WORST_AT: Final = "#the-worst-frames-over-all-drives"
 """Address of the worst frames on the page of a fleet: their heading."""
+SEEN: Final = 12
+"""Pictures that a page shows at once."""
 ACROSS = 4
 LACKING = 12
 """Frames without a picture that are named."""
@@ -334,8 +344,8 @@ LONGEST = 20
 """Letters of a drive's name below a picture."""
 
 
-def worst(findings: FleetFindings) -> Iterator[Block]:
-    """Yield the worst frames."""
+def worst(findings: FleetFindings, across: int = ACROSS) -> Iterator[Block]:
+    """Yield the worst frames, so many pictures beside each other."""
     if not findings.worst:
         return
     yield Heading("The worst frames over all drives")
@@ -345,7 +355,9 @@ def worst(findings: FleetFindings) -> Iterator[Block]:
         if frame.picture is not None
     ]
     if pictures:
-        yield ImageGrid(pictures, ACROSS)
+        yield ImageGrid(pictures[:SEEN], across)
+    if more := pictures[SEEN:]:
+        yield Details(f"{len(more)} more", [ImageGrid(more, across)])
     yield Text(_worst_legend(findings, len(pictures)), "note")
     if findings.inspect is not None:
         yield commands_table(findings, findings.inspect)

@@ -12,7 +12,7 @@ from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf
 from roadeval.report.sections import drive, drives, provenance, summary
 from roadeval.results.fleet import FleetFolder
-from tests.report.making import column, links_within, plain_rows, reader, text, the
+from tests.report.making import column, links_within, opened, plain_rows, reader, text, the
 from tests.results.fleet import making
 from tests.results.fleet.making import RUN, fleet_of
 
@@ -29,7 +29,7 @@ def findings(folder):
 
 
 def blocks(section, findings):
-    return list(section(findings))
+    return opened(section(findings))
 
 
 def tables(section, findings):
