@@ -7,6 +7,7 @@ import ctypes
 import errno
 import hashlib
 import heapq
+import json
 import math
 import os
 import shutil
@@ -226,6 +227,7 @@ class Recorder:
         self._states: dict[str, str] = {}
         self._sums = MessageSums(self.partial)
         self._shown: set[str] = set()
+        self._pictured: list[tuple[int, int]] = []
         self._blank: EncodedFrame | None = None
         self._stream: rr.RecordingStream | None = None
         images = self.partial.with_name(f"{self.partial.name}-images")
@@ -344,6 +346,8 @@ class Recorder:
         """
         self._log_static(views.after_the_last_frame(self._layout, results))
         self.flush()
+        self._log_static([(at.SHOWN, [rr.TextDocument(json.dumps(self._pictured))])])
+        self._flush_stream()
         self._log_static([(at.SUMS, [rr.TextDocument(self._sums.document())])])
         self._flush_stream()
         self._log_static([(self._sums.mark(), [rr.TextDocument("")])])
@@ -367,6 +371,8 @@ class Recorder:
 
     def _add_images(self, encoded: EncodedFrame) -> None:
         when = encoded.number, encoded.stamp_ns
+        if at.CAMERA in encoded.payloads:
+            self._pictured.append(when)
         for path, payload in encoded.payloads.items():
             self._rows.add(path, self._codecs[path].columns, *when, payload)
         # The viewer goes on showing an image until another comes, so a missing one is cleared.

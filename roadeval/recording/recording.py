@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -17,7 +18,7 @@ import pyarrow as pa
 from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.rrd_file import RrdFile, flat, whole
+from roadeval.recording.rrd_file import RrdFile, Span, flat, whole
 from roadeval.results.facts import Facts, another_format
 from roadeval.results.tables import TableFacts, read_rows, read_table
 from roadeval.runtime.documents import check_texts, read_json
@@ -81,6 +82,9 @@ class Recording:
     @cached_property
     def stamps(self) -> dict[int, int]:
         """The header stamps of the frames that have images, in nanoseconds."""
+        if (listed := self._file.document(at.SHOWN)) is not None:
+            with whole(self.path, at.SHOWN):
+                return {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
         stamps: dict[int, int] = {}
         for batch in self._file.batches(at.CAMERA, _CAMERA, static=False):
             frames, own = (batch.column(n).cast("int64").to_pylist() for n in (at.FRAME, at.STAMP))
@@ -232,9 +236,9 @@ class Recording:
 
 
 READ_AHEAD: Final = 8 << 20
-"""Bytes of an entity's images that are kept. Rerun reads a whole entity to give any frame of it, so
-each pass keeps what lies around the frame: reading frames in order, forwards or backwards, takes
-one pass for as many frames as fit."""
+"""Bytes of an entity's images that are kept of a file without an index. Rerun reads the whole file
+to give any frame of it, so each pass keeps what lies around the frame: reading frames in order,
+forwards or backwards, takes one pass for as many frames as fit."""
 
 
 class Page(NamedTuple):
@@ -249,14 +253,14 @@ class PayloadCache:
 
     def __init__(self, file: RrdFile) -> None:
         self._file = file
-        self._frames: dict[str, frozenset[int]] = {}
+        self._seen: dict[str, tuple[Span, frozenset[int]]] = {}
         self._payloads: dict[str, dict[int, pa.ListScalar]] = {}
 
     def holds(self, path: str, component: str, frame: int) -> bool:
         """Return whether the file has an image of the entity on a frame."""
-        if path not in self._frames:
+        if path not in self._seen or not self._seen[path][0].holds(frame):
             self._read_around(path, component, frame)
-        return frame in self._frames[path]
+        return frame in self._seen[path][1]
 
     def get(self, path: str, component: str, frame: int) -> bytes | None:
         """Return the encoded image of the entity on a frame; None if there is none."""
@@ -269,11 +273,13 @@ class PayloadCache:
 
     def _read_around(self, path: str, component: str, frame: int) -> None:
         self._payloads.pop(path, None)
+        span, batches = self._file.around(path, component, frame)
         pages = (
             Page(batch.column(at.FRAME).to_pylist(), flat(batch.column(component)))
-            for batch in self._file.batches(path, component, static=False)
+            for batch in batches
         )
-        self._frames[path], self._payloads[path] = around(frame, pages)
+        frames, self._payloads[path] = around(frame, pages)
+        self._seen[path] = span, frames
 
 
 def around(frame: int, pages: Iterable[Page]) -> tuple[frozenset[int], dict[int, pa.ListScalar]]:

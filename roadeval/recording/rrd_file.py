@@ -10,8 +10,8 @@ So each message has a checksum, which is verified before it is read. The checksu
 their own; its place and checksum are in the path of an entity (the *mark*), as the index lists
 paths. In a file that another program has rewritten they no longer match, and are not used.
 
-Rerun's compiled module reads the file: the package around it takes a third of a second to import,
-and gives no access to the index.
+Rerun's compiled module reads the index, and a file without one: the package around it takes a third
+of a second to import, and gives no access to the index.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ import struct
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import inf
 from mmap import ACCESS_READ, ALLOCATIONGRANULARITY, mmap
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -48,6 +49,11 @@ _BEGIN: Final = 12
 """Bytes before the first header."""
 _HEADER: Final = struct.Struct("<QQ")
 """The kind of a message, and its length in bytes."""
+_COMPRESSION, _SIZE, _CONTENT = 2, 3, 5
+"""Fields of a message: how its content is packed, the size of what is unpacked, and the content."""
+_BYTES: Final = 2
+"""The kind of a field with a length; all others are one number."""
+_LZ4: Final = 2
 _PROBE: Final = """
 import sys
 from rerun.chunk import RrdReader
@@ -61,11 +67,25 @@ except Exception:
 """
 
 
+class Span(NamedTuple):
+    """Frames from the first to the last one, both included."""
+
+    first: float = -inf
+    last: float = inf
+
+    def holds(self, frame: int) -> bool:
+        """Whether a frame is one of them."""
+        return self.first <= frame <= self.last
+
+
 class Place(NamedTuple):
-    """Where a message lies in the file, without its header, in bytes."""
+    """Where a message lies in the file, without its header, in bytes; and its frames."""
 
     offset: int
     size: int
+    static: bool
+    """Whether it was logged once, for every frame."""
+    span: Span
 
 
 class RrdFile:
@@ -79,7 +99,7 @@ class RrdFile:
         self._reader, self._entry = _open(path)
         self._store = _store(self._reader, self._entry)
         with whole(path, "its index"):
-            self._unchecked = {} if self._store is None else _places(self._store)
+            self._places = {} if self._store is None else _places(self._store)
         self._sums = self._read_sums()
 
     @property
@@ -98,16 +118,47 @@ class RrdFile:
 
         A `DamagedError` if they are not what was written.
         """
-        with self.path.open("rb") as file:
-            for place in self._unchecked.get(path, ()):
-                file.seek(place.offset)
-                if self._sums.get(place.offset) != crc32(file.read(place.size)):
-                    raise DamagedError(self.path, path)
-        self._unchecked.pop(path, None)
+        if self._places:
+            found = [each for each in self._places.get(path, ()) if each.static == static]
+            yield from self._at(path, component, found)
+            return
         chunks = self.stream().filter(content=[path], components=[component], is_static=static)
         for chunk in self._all(chunks, path):
             with whole(self.path, path):
                 batch = _filled(chunk.to_record_batch(), component)
+            if len(batch):
+                yield batch
+
+    def around(
+        self, path: str, component: str, frame: int
+    ) -> tuple[Span, Iterable[pa.RecordBatch]]:
+        """Return the rows of an entity in the chunks with a frame, and the frames of these.
+
+        Without an index these are all chunks. A `DamagedError` if they are not what was written.
+        """
+        if not self._places:
+            return Span(), self.batches(path, component, static=False)
+        places = [each for each in self._places.get(path, ()) if not each.static]
+        here = [each for each in places if each.span.holds(frame)]
+        if not here:
+            before = max((p.span.last for p in places if p.span.last < frame), default=-inf)
+            after = min((p.span.first for p in places if p.span.first > frame), default=inf)
+            return Span(before + 1, after - 1), ()
+        first = max(each.span.first for each in here)
+        span = Span(first, min(each.span.last for each in here))
+        return span, self._at(path, component, here)
+
+    def _at(self, path: str, component: str, places: Sequence[Place]) -> Iterator[pa.RecordBatch]:
+        """Yield the rows with a value of an entity's messages, read by their places alone."""
+        for place in places:
+            with self.path.open("rb") as file:
+                file.seek(place.offset)
+                message = file.read(place.size)
+            if self._sums and self._sums.get(place.offset) != crc32(message):
+                raise DamagedError(self.path, path)
+            with whole(self.path, path):
+                batch = unpacked(message)
+                batch = _filled(batch, component) if component in batch.schema.names else ()
             if len(batch):
                 yield batch
 
@@ -142,11 +193,10 @@ class RrdFile:
         hold what would abort this one.
         """
         with whole(self.path, "its index"):
-            self._sums = marked(self._unchecked)
+            self._sums = marked(self._places)
         if not self._sums:
             if not can_be_read(self.path):
                 raise DamagedError(self.path, "a place beyond which Rerun cannot read")
-            self._unchecked.clear()
             return {}
         with whole(self.path, SUMS):
             pairs = json.loads(self.document(SUMS) or "")
@@ -183,6 +233,36 @@ def flat(lists: pa.ListArray) -> pa.Array:
     # Arrow's own way imports everything that it can compute.
     begin, end = (lists.offsets[place].as_py() for place in (0, -1))
     return lists.values.slice(begin, end - begin)
+
+
+def unpacked(message: bytes) -> pa.RecordBatch:
+    """Return the rows of a message of the file: Protocol Buffers, in which LZ4 packs Arrow's own.
+
+    Rerun itself goes through the whole entity for any row of it, or aborts at damage.
+    """
+    import lz4.block
+
+    fields: dict[int, Any] = {}
+    at = 0
+    while at < len(message):
+        tag, at = _varint(message, at)
+        number, at = _varint(message, at)
+        fields[tag >> 3] = number
+        if tag & 7 == _BYTES:
+            fields[tag >> 3], at = message[at : at + number], at + number
+    content = fields[_CONTENT]
+    if fields.get(_COMPRESSION) == _LZ4:
+        content = lz4.block.decompress(content, uncompressed_size=fields[_SIZE])
+    return pa.ipc.open_stream(content).read_next_batch()
+
+
+def _varint(message: bytes, at: int) -> tuple[int, int]:
+    """Return the number that begins at a byte, seven bits a byte, and where it ends."""
+    number = shift = 0
+    while message[at] & 0x80:
+        number |= (message[at] & 0x7F) << shift
+        at, shift = at + 1, shift + 7
+    return number | message[at] << shift, at + 1
 
 
 def _filled(batch: pa.RecordBatch, component: str) -> pa.RecordBatch:
@@ -242,10 +322,19 @@ def _store(reader: RrdReaderInternal, entry: StoreEntryInternal) -> LazyStoreInt
 def _places(store: LazyStoreInternal) -> dict[str, list[Place]]:
     """Return where the messages of every entity lie, by its path, as the index says."""
     _, index = store._chunk_index()
-    columns = (f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size"))
+    names = ["entity_path", "byte_offset", "byte_size", "is_static"]
+    names = [f"chunk_{name}" for name in names]
+    names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in index.schema.names]
     places: dict[str, list[Place]] = {}
-    for path, offset, size in zip(*(index.column(c).to_pylist() for c in columns), strict=True):
-        places.setdefault(path, []).append(Place(offset, size))
+    for (
+        path,
+        *place,
+    ) in zip(*(index.column(c).to_pylist() for c in names), strict=True):
+        offset, size, static, *frames = place
+        span = Span() if static or not frames else Span(*frames)
+        places.setdefault(path, []).append(Place(offset, size, static, span))
+    for own in places.values():
+        own.sort(key=lambda place: (place.span.first, place.offset))
     return places
 
 

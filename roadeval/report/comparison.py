@@ -37,7 +37,6 @@ from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import MEAN, ForestRow
 from roadeval.report.sections.drives import Part, strata_table
 from roadeval.results import comparison as told
-from roadeval.results.over_drives import DriveJudgement
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
@@ -126,25 +125,25 @@ def comment(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     return (begin[:whole] if 2 * whole > LONGEST else begin) + _CUT
 
 
-def _title(judgements: Sequence[Judgement | DriveJudgement]) -> str:
+def _title(judgements: Sequence[Judgement]) -> str:
     if not judgements:
         return "roadeval comparison"
     return f"roadeval: {told.headline([each.holds for each in judgements])}"
 
 
-def replayed(judgements: Sequence[DriveJudgement], verdict: str) -> str:
+def replayed(judgements: Sequence[Judgement], verdict: str) -> str:
     """Return limits that were judged on a drive, and its verdict, as Markdown of a comment."""
-    limits = _limits([(each.holds, each.told) for each in judgements])
-    return f"## {_title(judgements)}\n\n{written([*limits, Text(verdict, 'verdict')])}"
+    blocks = [*_limits(judgements), Text(verdict, "verdict")]
+    return f"## {_title(judgements)}\n\n{written(blocks)}"
 
 
-def _limits(judged: Sequence[tuple[bool | None, str]]) -> Iterator[Block]:
+def _limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
     for title, kind, tone in (
         ("Limits exceeded", True, "warning"),
         ("Not judged", None, "warning"),
         ("Limits kept", False, "plain"),
     ):
-        if own := [sentence for holds, sentence in judged if holds is kind]:
+        if own := [told.judged(each) for each in judgements if each.holds is kind]:
             yield BulletList(title, own, tone)
 
 
@@ -176,7 +175,7 @@ def overview(
     most
         Changed settings that are named, at most.
     """
-    yield from _limits([(each.holds, told.judged(each)) for each in judgements])
+    yield from _limits(judgements)
     yield Text(told.verdict(comparison), "verdict")
     yield from (Text(line) for line in told.changed_settings(comparison, most))
     if comparison.paired:

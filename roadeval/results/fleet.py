@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import Rows, is_plain
-from roadeval.evaluation.comparison import Condition
+from roadeval.evaluation.comparison import Condition, Judgement
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.comparison import junit_xml
+from roadeval.results.comparison import judged, junit_xml
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -36,7 +36,6 @@ from roadeval.results.facts import (
     plain,
 )
 from roadeval.results.over_drives import (
-    DriveJudgement,
     drive_cases,
     flat_metrics,
     judge_drives,
@@ -350,7 +349,7 @@ class FleetWriter:
         with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
             write_tables(self.folder, members, _Records(self.folder, asked or {}))
             scores = scores_of(self.folder) if conditions else ()
-            judged = [*judge_drives(scores, conditions, settings.least_frames)]
+            judgements = [*judge_drives(scores, conditions, settings.least_frames)]
             drives = read_parquet(self.folder / "drives.parquet", "drives").to_pylist()
             facts = summarise(
                 self.folder,
@@ -358,23 +357,23 @@ class FleetWriter:
                 members,
                 settings,
                 run=dict(run),
-                conditions=[_condition(each, judged) for each in conditions],
+                conditions=[_condition(each, judgements) for each in conditions],
             )
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / METRICS, json_text(plain(flat_metrics(facts))).encode())
-            put(self.folder / JUNIT, junit_xml(self.folder.name, drive_cases(drives, judged)))
+            put(self.folder / JUNIT, junit_xml(self.folder.name, drive_cases(drives, judgements)))
             put(self.folder / FLEET, facts.text().encode())
         return facts
 
 
-def _condition(condition: Condition, judged: Sequence[DriveJudgement]) -> ConditionFacts:
+def _condition(condition: Condition, judgements: Sequence[Judgement]) -> ConditionFacts:
     """Return on which drives a condition holds."""
-    own = [each for each in judged if each.condition == condition.text]
+    own = [each for each in judgements if each.condition is condition]
     return ConditionFacts(
         condition.text,
         judged=sum(each.holds is not None for each in own),
-        not_judged={each.drive: each.sentence for each in own if each.holds is None},
-        holds={each.drive: each.sentence for each in own if each.holds},
+        not_judged={each.result: each.why for each in own if each.holds is None},
+        holds={each.result: judged(each) for each in own if each.holds},
     )
 
 

@@ -6,14 +6,20 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts
 from roadeval.data.words import defined
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison import Change, Condition, ConditionError
+from roadeval.evaluation.comparison import (
+    Change,
+    Condition,
+    ConditionError,
+    Judgement,
+    judge_mask,
+)
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED, Effect, corrected
@@ -227,23 +233,6 @@ def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
 NO_TRUTH: Final = "nothing can be checked, for no frame with truth was evaluated"
 
 
-@dataclass(frozen=True, slots=True)
-class DriveJudgement:
-    """A condition judged on a drive."""
-
-    drive: str
-    condition: str
-    holds: bool | None
-    """Whether it holds; None where it was not judged."""
-    sentence: str
-    """What was found, or why it was not judged."""
-
-    @property
-    def told(self) -> str:
-        """The sentence, which names the condition."""
-        return f"{self.condition}: {self.sentence}" if self.holds is None else self.sentence
-
-
 def check_conditions(conditions: Sequence[Condition]) -> None:
     """Raise a `ConditionError` for a condition on a change: one result alone has no base."""
     for condition in conditions:
@@ -263,7 +252,7 @@ def scores_of(folder: Path) -> Rows:
 
 def judge_drives(
     scores: Iterable[Mapping[str, Any]], conditions: Sequence[Condition], least: int
-) -> Iterator[DriveJudgement]:
+) -> Iterator[Judgement]:
     """Judge conditions on each scored drive: on the rates of its own frames.
 
     ``scores`` are rows of that table; the conditions are on levels alone, see `check_conditions`. A
@@ -273,7 +262,7 @@ def judge_drives(
     rows = [row for row in scores if row["region"] == ALL]
     if conditions and not rows:
         every = ", ".join(condition.text for condition in conditions)
-        yield DriveJudgement("", every, None, NO_TRUTH)
+        yield Judgement.none(conditions[0], "", f"{every}: {NO_TRUTH}")
         return
     for condition in conditions:
         own = [
@@ -288,15 +277,11 @@ def judge_drives(
         yield from (_judged(condition, row, least) for row in own)
 
 
-def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> DriveJudgement:
-    drive = row["drive"]
-    if row["frames"] < least:
-        few = f"{row['frames']} evaluated frames, and {least} are needed"
-        return DriveJudgement(drive, condition.text, None, f"not judged: {drive} has {few}")
+def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> Judgement:
     rates = {name: math.nan if row[name] is None else row[name] for name in (*METRICS, *POOLED)}
     rates |= metrics.overlap(Counts(*(row[name] for name in OUTCOMES)))
     mask = Change(
-        result=drive,
+        result=row["drive"],
         variant=row["variant"],
         stage=row["stage"],
         final=row["final"],
@@ -307,10 +292,9 @@ def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> DriveJu
         difference={},
     )
     try:
-        judgement = condition.judge(mask)
+        return judge_mask(condition, mask, (), least)
     except ConditionError as error:
-        return DriveJudgement(drive, condition.text, None, str(error))
-    return DriveJudgement(drive, condition.text, judgement.holds, judged(judgement))
+        return Judgement.none(condition, row["drive"], error)
 
 
 def flat_metrics(facts: FleetFacts) -> dict[str, float]:
@@ -342,7 +326,7 @@ _OF_STATUS: Final = {
 
 
 def drive_cases(
-    drives: Iterable[Mapping[str, Any]], conditions: Iterable[DriveJudgement] = ()
+    drives: Iterable[Mapping[str, Any]], conditions: Iterable[Judgement] = ()
 ) -> Iterator[Case]:
     """Yield a case a drive, and a case a drive and condition.
 
@@ -357,5 +341,5 @@ def drive_cases(
         yield Case("replay", row["drive"], parts, row["seconds"])
     for each in conditions:
         kind = "failure" if each.holds else "skipped"
-        said = {} if each.holds is False else {kind: each.sentence}
-        yield Case(each.condition, each.drive, said)
+        said = {} if each.holds is False else {kind: judged(each)}
+        yield Case(each.condition.text, each.result, said)

@@ -62,7 +62,7 @@ def test_a_condition_with_too_few_frames_behind_it_is_not_judged(tmp_path):
     words = ("--max-frames", 15, "--fail-if", "post.filtered.ERR > 99%")
     run = replay(tmp_path, drive, *words).run
     assert run.returncode == 1
-    assert "not judged: car_park has 5 evaluated frames, and 10 are needed" in run.stderr
+    assert "not judged, because car_park has 5 evaluated frames, and 10 are needed" in run.stderr
 
 
 def test_without_truth_one_line_says_that_no_condition_can_be_checked(tmp_path):

@@ -269,3 +269,12 @@ def test_train_and_info_take_truth_beside_the_log(places, tmp_path):
     picks = json.loads(run.stdout)["picks"]
     assert f"truth: {places / '21'} (21 labels, paired by number; " in picks[1]
     assert "no truth" not in " ".join(picks)
+
+
+def test_a_report_shows_frames_without_a_label_among_the_others(places, tmp_path):
+    saved = {"output": {"record": "all", "save": str(tmp_path / "out.rrd")}}
+    done = replay(places, tmp_path / "reports", "6", ("net",), **saved)
+    evaluated = {*pd.read_csv(tmp_path / "reports" / "frames.csv").frame}
+    assert not {*done.facts.examples} <= evaluated
+    roadeval.write_report(tmp_path / "out.rrd", tmp_path / "report.pdf")
+    assert (tmp_path / "report.pdf").stat().st_size > 10_000

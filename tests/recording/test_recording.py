@@ -2,7 +2,6 @@
 
 import weakref
 from dataclasses import replace
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 import rerun as rr
 
 from roadeval.data import Health, Role
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, rrd_file
 from roadeval.recording.recording import Page, around
 from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import (
@@ -228,19 +227,19 @@ def test_every_frame_comes_back_in_any_order(drive, recording, read_ahead, monke
         np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
 
 
-def test_an_entity_is_gone_through_once_whatever_frames_are_read(drive, recording, monkeypatch):
-    again, passes, batches = Recording(recording.path), [], RrdFile.batches
-
-    def counted(*given, **words):
-        passes.append(given)
-        return batches(*given, **words)
-
-    monkeypatch.setattr(RrdFile, "batches", counted)
-    for each in (drive[-1], *drive):
+def test_a_picture_costs_the_chunk_that_holds_it(drive, recording, monkeypatch):
+    again, read, unpacked = Recording(recording.path), [], rrd_file.unpacked
+    monkeypatch.setattr(rrd_file, "unpacked", lambda m: read.append(m) or unpacked(m))
+    for each in drive:
         again.layer("filtered", "post", each.frame.number)
+    chunks = [*read]
+    assert len({*chunks}) == len(chunks) > 1
+    read.clear()
+    again.layer("filtered", "post", drive[0].frame.number)
     with pytest.raises(RecordingError, match="nothing on frame 99"):
         again.layer("filtered", "post", 99)
-    assert len(passes) == 1
+    assert read == chunks[:1]
+    assert again.frame_numbers == tuple(each.frame.number for each in drive)
 
 
 def pages_of(sizes):
@@ -290,10 +289,8 @@ def test_rows_that_were_put_together_with_others_may_have_no_list_at_all(recordi
     batch = pa.RecordBatch.from_pydict(
         {"frame": [1, 2, 3, 4], "Scalars:scalars": pa.array([[0.5], None, [], [0.25]])}
     )
-    chunk = SimpleNamespace(to_record_batch=lambda: batch)
-    stream = SimpleNamespace(filter=lambda **given: [chunk])
     again = Recording(recording.path)
-    monkeypatch.setattr(RrdFile, "stream", lambda _: stream)
+    monkeypatch.setattr(rrd_file, "unpacked", lambda _: batch)
     assert again.scalars("/metrics/filtered/post/ERR").to_dict() == {1: 0.5, 4: 0.25}
     batch = batch.slice(0, 2)
     assert again.scalars("/metrics/filtered/post/ERR").to_dict() == {1: 0.5}

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
 
 from roadeval.cli import console
 from roadeval.cli.screens import tables
-from roadeval.data.words import counted, first_of, interval, percent, points
-from roadeval.evaluation.metrics import FULL
-from roadeval.evaluation.regions import ALL
-from roadeval.evaluation.score import TESTED
-from roadeval.report.blocks import Table
-from roadeval.results.facts import OverDrives
+from roadeval.data.words import counted, first_of
+from roadeval.jobs.results.report import collect_fleet
+from roadeval.report.blocks import Heading
+from roadeval.report.sections.drives import worst_table
+from roadeval.report.sections.summary import effects_table, fleet_rates_table
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 
@@ -22,15 +21,12 @@ if TYPE_CHECKING:
 
     from roadeval.jobs.run.fleet import FleetOutcome
 
-RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
 STATUSES: Final = {
     SCORED: "scored",
     DAMAGED: "scored but for what is lost",
     UNSCORED: "without truth",
     FAILED: "failed",
 }
-WORST: Final = 12
-"""Drives that the table of drives shows."""
 NAMED: Final = 5
 """Drives that failed for one reason, which are named."""
 
@@ -51,71 +47,13 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     out.print(facts.verdict)
     out.print()
     if facts.rates:
-        show_rates(facts.rates, out)
-        out.print()
-    if facts.effects:
-        show_effects(facts.effects, out)
-        out.print()
-    if facts.rates:
-        show_drives(FleetFolder(outcome.folder), list(facts.rates), out)
+        blocks = [fleet_rates_table(facts), *([effects_table(facts)] if facts.effects else [])]
+        found = collect_fleet(FleetFolder(outcome.folder), worst=0)
+        tables.show([*blocks, Heading("Drives with the highest ERR"), worst_table(found)], out)
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
     listed = [f"roadeval inspect {outcome.folder} --list"] if facts.rates else []
     console.show_next(out, *listed, f"roadeval report {outcome.folder}")
-
-
-def show_rates(rates: Sequence[Mapping[str, Any]], out: Console) -> None:
-    """Print the rates of the final masks: the drives' means."""
-    rows = [
-        [row["variant"], str(row["drives"]), *(percent(row[rate]) for rate in RATES)]
-        for row in rates
-    ]
-    caption = "Final masks: the mean of the drives' mean rates"
-    tables.show_table(Table(["variant", "drives", *RATES.values()], rows, caption=caption), out)
-
-
-def show_drives(folder: FleetFolder, rates: Sequence[Mapping[str, Any]], out: Console) -> None:
-    """Print the drives on which the first variant has the highest error rates."""
-    import pyarrow.compute as pc
-
-    variants = [row["variant"] for row in rates]
-    final = (pc.field("region") == ALL) & pc.field("final")
-    errors: dict[str, dict[str, float | None]] = {}
-    for row in folder.table("scores").filter(final).to_pylist():
-        errors.setdefault(row["drive"], {})[row["variant"]] = row[TESTED]
-    first = variants[0]
-    worst = sorted(errors, key=lambda name: (-(errors[name].get(first) or 0.0), name))
-    rows = [
-        [
-            folder.names[name],
-            str(folder.drives[name]["evaluated"]),
-            *(percent(errors[name].get(each)) for each in variants),
-        ]
-        for name in worst[:WORST]
-    ]
-    caption = f"Final masks, ERR %: the drives, {first}'s worst first"
-    if len(worst) > WORST:
-        caption += f" ({WORST} of {len(worst)}; all are in drives.parquet and scores.parquet)"
-    tables.show_table(Table(["drive", "frames", *variants], rows, (0,), caption=caption), out)
-
-
-def show_effects(effects: Sequence[OverDrives], out: Console) -> None:
-    """Print the differences of ERR over drives."""
-    tested = [each for each in effects if each.metric == TESTED]
-    (confidence,) = {each.confidence for each in tested}
-    rows = [
-        [
-            f"{each.variant} - {each.base}",
-            points(each.mean),
-            interval(each.low, each.high),
-            *("-" if count is None else str(count) for count in (each.worse, each.better)),
-            points(each.pooled),
-        ]
-        for each in tested
-    ]
-    titles = ["variants", "mean", "interval", "worse", "better", "pooled"]
-    caption = f"Change of ERR in percentage points, over drives ({confidence:.0%} interval)"
-    tables.show_table(Table(titles, rows, caption=caption), out)
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
@@ -126,7 +64,7 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     for condition in outcome.facts.conditions:
         if condition.judged and (missing := [*condition.not_judged.values()]):
             more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
-            yield f"{condition.condition}: {missing[0]}{more}"
+            yield f"{missing[0]}{more}"
     reasons: dict[str, list[str]] = {}
     names = FleetFolder(outcome.folder).names
     for drive, text in outcome.problems.items():

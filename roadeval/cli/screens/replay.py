@@ -8,15 +8,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from roadeval.cli import console
-from roadeval.cli.screens import seeds, tables, thresholds
+from roadeval.cli.screens import tables
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import percent, points
+from roadeval.data.words import interval, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.recording.viewer import has_screen
-from roadeval.report.blocks import Cell, Table
+from roadeval.report.blocks import Cell, Table, Text
 from roadeval.results.facts import Facts, FrameAccount, Totals
-from roadeval.results.sentences import account, correction, lowest, marked_interval
+from roadeval.results.sentences import (
+    account,
+    correction,
+    lowest,
+    marked_interval,
+    of_seeds,
+    seeds_in_words,
+    spread,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,6 +33,8 @@ if TYPE_CHECKING:
 
 RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
 """The rates of every stage, with the titles of their columns."""
+CURVES: Final = {n: f"{n} %" for n in ("AP", "AUC", "MaxF")} | {"threshold": "at %", "ECE": "ECE %"}
+"""What is quoted of curves over thresholds, with the titles of their columns."""
 OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 """The rates whose differences stand beside that of ERR."""
 
@@ -52,14 +62,18 @@ def _show_scores(facts: Facts, out: Console) -> None:
         tables.show_table(differences(pairs), out)
         if legend := correction(by_rate["ERR"] for by_rate in pairs.values()):
             out.print(legend)
-        for rate, told in seeds.differences(repeats).items():
-            out.print(f"{FILTERED} - {UNFILTERED}, {rate}, pp, {told}")
+        for rate, values in repeats.get("difference", {}).get(FINAL_STAGE, {}).items():
+            if found := spread(values):
+                ends = f"{seeds_in_words(repeats)}: {tables.ascii_of(interval(*found[1:]))}"
+                out.print(f"{FILTERED} - {UNFILTERED}, {rate}, pp, {ends}")
     if repeats:
         out.print()
-        seeds.show(repeats, RATES, out)
+        from roadeval.report.sections.summary import seeds_table
+
+        tables.show([seeds_table(repeats, [*facts.totals]), Text(of_seeds(repeats))], out)
     if curves := facts.curves:
         out.print()
-        thresholds.show(curves, out)
+        tables.show_table(over_thresholds(curves), out)
 
 
 def _why_nothing(frames: FrameAccount) -> str:
@@ -82,6 +96,19 @@ def scores(totals: Totals) -> Table:
             rows.append([Cell(text, bold=best) for text in texts])
     titles = ["variant", "stage", "frames", *RATES.values()]
     return Table(titles, rows, text_columns=(0, 1), breaks=breaks)
+
+
+def over_thresholds(curves: Totals) -> Table:
+    """Tabulate what is quoted of curves, of each variant and stage that says how probable road is.
+
+    In percent.
+    """
+    rows = [
+        [variant, stage, *(percent(own[name]) for name in CURVES)]
+        for variant, stages in curves.items()
+        for stage, own in stages.items()
+    ]
+    return Table(["over thresholds", "stage", *CURVES.values()], rows, text_columns=(0, 1))
 
 
 def _pairs(facts: Facts) -> Iterator[tuple[str, Mapping[str, Difference]]]:

@@ -44,7 +44,7 @@ def show_table(table: Table, out: Console) -> None:
     from rich.table import Table as Grid
 
     if table.caption:
-        out.print(table.caption, soft_wrap=True)
+        out.print(table.caption)
     columns = [_texts(table, place) for place in range(len(table.columns))]
     for number, part in enumerate(_parts(table, columns, out.width)):
         if number:

@@ -12,7 +12,13 @@ from roadeval.evaluation.comparison.compare import (
     compare,
     variants_as_sides,
 )
-from roadeval.evaluation.comparison.conditions import Condition, ConditionError, Judgement, judge
+from roadeval.evaluation.comparison.conditions import (
+    Condition,
+    ConditionError,
+    Judgement,
+    judge,
+    judge_mask,
+)
 from roadeval.evaluation.comparison.pairing import (
     Disagreement,
     Kind,

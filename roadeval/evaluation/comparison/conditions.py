@@ -159,6 +159,12 @@ class Judgement:
     why: str = ""
     """The reason then."""
 
+    @classmethod
+    def none(cls, condition: Condition, result: str, why: object) -> Judgement:
+        """Return that a condition could not be judged on a result, and why."""
+        unknown = math.nan, math.nan, math.nan
+        return cls(condition, result, 0, *unknown, None, None, None, str(why))
+
 
 def judge(
     comparison: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
@@ -171,10 +177,18 @@ def judge(
     judgements = []
     for condition in conditions:
         for mask in _named(condition, comparison):
-            if why := _unjudged(condition, mask, comparison.results, settings.least_frames):
-                raise ConditionError(f"{condition.text}: not judged, because {why}")
-            judgements.append(condition.judge(mask))
+            found = judge_mask(condition, mask, comparison.results, settings.least_frames)
+            judgements.append(found)
     return tuple(judgements)
+
+
+def judge_mask(
+    condition: Condition, mask: Change, results: Sequence[ComparedResult], least: int
+) -> Judgement:
+    """Judge a condition on a mask; of a level no ``results`` are asked. Errors are `judge`'s."""
+    if why := _unjudged(condition, mask, results, least):
+        raise ConditionError(f"{condition.text}: not judged, because {why}")
+    return condition.judge(mask)
 
 
 def _named(condition: Condition, comparison: Comparison) -> list[Change]:

@@ -143,8 +143,7 @@ def _judged(
             yield from judge(found, [condition], settings)
         except ConditionError as error:
             new = ", ".join(each.label for each in found.results[1:])
-            none = (np.nan, np.nan, np.nan, None, None, None)
-            yield Judgement(condition, new, 0, *none, why=str(error))
+            yield Judgement.none(condition, new, error)
 
 
 def _sides(

@@ -237,7 +237,7 @@ class FramePicker:
 
     def _outcome(self, recording: Recording, frame: int) -> LayerImage:
         variant = recording.variants[0]
-        if self._scored:
+        if frame in self._scored:
             spec = ERRORS
         else:
             spec = next(spec for spec in variant.layers if spec.name == variant.stages[-1])
@@ -249,7 +249,7 @@ class FramePicker:
             v.name: self._result.layer(v.name, v.stages[-1], frame) for v in recording.variants
         }
         there = {name: mask for name, mask in masks.items() if mask is not None}
-        truth = recording.truth(frame) if self._scored else None
+        truth = recording.truth(frame) if frame in self._scored else None
         return ExampleFrame(frame, recording.image(frame), truth, there)
 
 

@@ -93,7 +93,7 @@ class FleetOutcome:
     def unjudged(self) -> list[str]:
         """The conditions that could be judged on no drive, with the reason on the first."""
         return [
-            f"{each.condition}: {next(iter(each.not_judged.values()))}"
+            next(iter(each.not_judged.values()))
             for each in self.facts.conditions
             if each.not_judged and not each.judged
         ]

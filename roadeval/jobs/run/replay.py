@@ -11,16 +11,17 @@ from typing import Any, Final
 from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
-from roadeval.evaluation.comparison import Condition
+from roadeval.evaluation.comparison import Condition, Judgement
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
 from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
+from roadeval.results.comparison import judged
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
-from roadeval.results.over_drives import DriveJudgement, check_conditions, judge_drives
+from roadeval.results.over_drives import check_conditions, judge_drives
 from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
@@ -48,7 +49,7 @@ class Outcome:
     """Where in their code stages failed that are among the losses."""
     rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     """Those of the tables ``scores`` and ``effects``."""
-    judgements: tuple[DriveJudgement, ...] = ()
+    judgements: tuple[Judgement, ...] = ()
     """Of the conditions that were given."""
 
     @property
@@ -59,12 +60,12 @@ class Outcome:
     @property
     def held(self) -> list[str]:
         """The sentences of the conditions that hold."""
-        return [each.sentence for each in self.judgements if each.holds]
+        return [judged(each) for each in self.judgements if each.holds]
 
     @property
     def unjudged(self) -> list[str]:
-        """The conditions that could not be judged, with the reason."""
-        return [each.told for each in self.judgements if each.holds is None]
+        """Why conditions could not be judged."""
+        return [each.why for each in self.judgements if each.holds is None]
 
 
 def replay(
@@ -121,8 +122,8 @@ def replay(
                 removed = f"removed {left}, the partial recording of an earlier run"
                 warnings = (*warnings, f"{removed}: this one is whole")
     scores = [{"drive": log.name, **row} for row in outcome.rows["scores"]]
-    judged = judge_drives(scores, conditions, config.evaluation.least_frames)
-    return replace(outcome, warnings=warnings, judgements=tuple(judged))
+    judgements = judge_drives(scores, conditions, config.evaluation.least_frames)
+    return replace(outcome, warnings=warnings, judgements=tuple(judgements))
 
 
 def _written(

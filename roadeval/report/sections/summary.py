@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 
 from roadeval.data import BASELINE, FINAL_STAGE
 from roadeval.data.words import DASH, counted, defined, interval, listing, number, percent, points
@@ -65,12 +65,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if findings.totals:
         yield rates_table(findings)
         if seeds := findings.facts.seeds:
-            yield Table(
-                ["final mask", *FULL],
-                _seeds(findings),
-                caption=f"Percent, with {seeds_in_words(seeds)} of the training: the middle, and "
-                "from the least to the greatest.",
-            )
+            yield seeds_table(seeds, [*findings.finals])
             yield Text(of_seeds(seeds), "note")
     yield Text(account(findings.facts.frames, findings.facts.windows), "note")
     if findings.thumbnails:
@@ -224,16 +219,20 @@ def _effect_cells(each: OverDrives, *, first: bool) -> list[Cell | str]:
     ]
 
 
-def _seeds(findings: Findings) -> list[list[Cell | str]]:
-    """Return the spread of rates over seeds, a row for each variant that learns."""
-    names = [*findings.finals]
-    return [
+def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
+    """Tabulate the spread of rates over seeds, a row for each variant that learns."""
+    return Table(
+        ["final mask", *FULL],
         [
-            variant_cell(name, names),
-            *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in FULL),
-        ]
-        for name, stages in findings.facts.seeds.get("totals", {}).items()
-    ]
+            [
+                variant_cell(name, names),
+                *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in FULL),
+            ]
+            for name, stages in seeds["totals"].items()
+        ],
+        caption=f"Percent, with {seeds_in_words(seeds)} of the training: the middle, and from the "
+        "least to the greatest.",
+    )
 
 
 # --- Warnings and notes ---------------------------------------------------------------------------

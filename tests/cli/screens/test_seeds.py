@@ -26,7 +26,7 @@ def test_the_spread_of_the_effect_stands_beside_its_interval():
 
 def test_every_variant_s_final_mask_has_a_row_with_the_middle_and_both_ends():
     shown = screen(summary(seeds=SEEDS))
-    assert "Final masks with seeds 0 to 2 of the training: the middle (and from the" in shown
+    assert "Percent, with seeds 0 to 2 of the training: the middle" in shown
     (filtered,) = (line for line in lines(summary(seeds=SEEDS)) if "10.00 (9.12" in line)
     assert filtered.split()[:5] == ["filtered", "10.00", "(9.12", "to", "12.00)"]
     assert "unfiltered 8.30 (8.00 to 8.47)" in " ".join(shown.split())

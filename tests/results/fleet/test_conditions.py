@@ -33,7 +33,7 @@ def test_a_condition_holds_on_the_drives_that_are_above_it(fleet):
     limit = round(100 * sorted(rates.values())[4], 3)
     condition = Condition.parse(f"post.filtered.ERR > {limit}%")
     found = {
-        each.drive: each.holds for each in judge_drives(scores_of(fleet.paths[0]), [condition], 10)
+        each.result: each.holds for each in judge_drives(scores_of(fleet.paths[0]), [condition], 10)
     }
     assert found == {drive: 100 * rate > limit for drive, rate in rates.items()}
     assert {*found.values()} == {True, False}
@@ -43,7 +43,7 @@ def test_a_drive_of_few_frames_is_not_judged(fleet):
     condition = Condition.parse("post.filtered.ERR > 0%")
     found = [*judge_drives(scores_of(fleet.paths[0]), [condition], 1000)]
     assert [each.holds for each in found] == [None] * len(errors(fleet))
-    assert "1000 are needed" in found[0].sentence
+    assert "1000 are needed" in found[0].why
 
 
 def test_a_mask_that_is_not_there_is_named_with_those_that_are(fleet):
