@@ -33,10 +33,11 @@ def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
         outcomes = []
         for seed in range(SEEDS_OF_ROBUST):
             model = model_of(teacher, seed, sources, idd_lite)
-            training = {"seed": seed, "model": str(model)}
+            training: dict[str, Any] = {"seed": seed, "model": str(model)}
             if adapt is not None:
                 training |= {"adapt": True, "source": adapt}
-            outcomes.append(summary(DRIVES[pupil], {"training": training}, sources))
+            tables = {"training": training, "trees": {"reach_weight": 1.0}}
+            outcomes.append(summary(DRIVES[pupil], tables, sources))
         about = {"teacher": teacher, "pupil": pupil, "adapt": adapt}
         rows.append({**about, **of_others(outcomes)})
     return rows

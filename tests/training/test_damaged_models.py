@@ -200,7 +200,7 @@ def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
     twice = {n: np.tile(getattr(known.network, n), 2) for n in ("lowest", "scale", "planes")}
     network = replace(known.network, ranks=np.tile(known.network.ranks, (2, 1)), **twice)
     forest = replace(known.forest, feature=known.forest.feature + np.int32(3), inputs=6)
-    beyond = {"trees": Stack(Blend(forest, network))}
+    beyond = {"trees": Stack(Blend(forest, network), np.array([[24, 32]], np.int32))}
     save_model(replace(sound, parameters={"unfiltered": beyond}), Path("x.model"))
     words = ["replay", str(DEMO), "--config", str(small), "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1

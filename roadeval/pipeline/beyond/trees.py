@@ -60,6 +60,8 @@ from roadeval.pipeline.stage import (
 )
 from roadeval.runtime.imports import whole
 
+Sizes = npt.NDArray[np.int32]
+
 NODES: Final = LEAVES
 """Places for the nodes of a tree, which uses ``LEAVES - 1`` at most. Nothing exceeds the threshold
 of the others."""
@@ -226,6 +228,8 @@ RATE: Final = 0.1
 """Share of what is left to mend that a tree mends."""
 SHARE: Final = 0.33
 """Of the features, drawn anew for each node, among which it chooses."""
+OWN_CAMERA, OTHERS = 1.0, 4.0
+"""``reach_weight`` where the camera itself taught the trees, and where others did."""
 FARTHEST: Final = 3.0
 """Of the distances from the patch as they are shown."""
 
@@ -267,11 +271,11 @@ class TreesSettings:
     """Of the network's training through as many pixels as were sampled."""
     noise: Annotated[float, Field(ge=0, le=10)] = 0.1
     """Deviation of what is added in training to each input of the network, -1 to 1."""
-    reach_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
+    reach_weight: Annotated[float, Field(ge=0, le=100)] | None = None
     """``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
     the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
-    the shade. It changes little where the camera itself taught the trees; where others did, up
-    to 4 may mend much."""
+    the shade. By default it is 1 where images of the frame's size taught the trees, which are
+    taken for the camera's own, and 4 where other cameras did: there it may mend much."""
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
     """A pixel is road where it is more probable than this."""
 
@@ -320,9 +324,13 @@ class Stack:
 
     top: Blend
     """Its last feature is what the base gives, where there is one."""
+    sizes: Sizes
+    """``(n, 2)`` int32: height and width of the images that taught it, or the base, each once."""
     base: Blend | None = None
 
     def __post_init__(self) -> None:
+        check_arrays(self, np.int32, sizes=("n", 2))
+        check_range("sizes", self.sizes, 1, GREATEST)
         if self.base is not None and self.top.inputs != self.base.inputs + 1:
             raise ValueError(
                 f"what stands on top sees {self.top.inputs} features of a pixel, and the base "
@@ -333,6 +341,10 @@ class Stack:
     def inputs(self) -> int:
         """How many features of a pixel are given to it."""
         return (self.base or self.top).inputs
+
+    def knows(self, image: Rgb) -> bool:
+        """Return whether images of the size of one taught it."""
+        return bool((self.sizes == image.shape[:2]).all(axis=1).any())
 
     def log_odds(self, values: Values, weight: Values | float) -> Values:
         """Return what the blend on top gives for each pixel, ``(n,)`` float32.
@@ -370,7 +382,7 @@ def fit(sample: TrainingSet, settings: TreesSettings) -> Stack:
     the classes weigh as much as they have there.
     """
     values = at_samples(sample, partial(see, settings))
-    return Stack(_grown(np.concatenate(values), sample, settings))
+    return Stack(_grown(np.concatenate(values), sample, settings), _sizes(sample))
 
 
 def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
@@ -381,7 +393,12 @@ def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
     values = np.concatenate(at_samples(sample, partial(see, settings)))
     by_feature = np.ascontiguousarray(values.T)
     given = known.log_odds(by_feature, network_weight(by_feature, settings))
-    return Stack(_grown(np.column_stack([values, given]), sample, settings), known.top)
+    top = _grown(np.column_stack([values, given]), sample, settings)
+    return Stack(top, np.unique(np.vstack([known.sizes, _sizes(sample)]), axis=0), known.top)
+
+
+def _sizes(sample: TrainingSet) -> Sizes:
+    return np.unique(np.array([each.shape[:2] for each in sample.images], np.int32), axis=0)
 
 
 def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blend:
@@ -456,7 +473,10 @@ def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
         over, around, light = values[known] if len(known) == len(REACH) else reach_inputs(scene)
         far = combined(over, around)
         learnt_odds = log_odds(values, learnt, settings)
-        odds = learnt_odds - np.float32(settings.reach_weight) * beyond(far, light)
+        weight = settings.reach_weight
+        if weight is None:
+            weight = OWN_CAMERA if learnt.knows(view.original) else OTHERS
+        odds = learnt_odds - np.float32(weight) * beyond(far, light)
         share = np.clip(guided(probability(odds), scene.image, view.image), 0, 1)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))

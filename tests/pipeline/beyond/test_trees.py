@@ -181,7 +181,7 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
 def opinion_of(road):
     """What a method says that knows the left side alone, by its mask and by two planes."""
     codes = np.where(road, 60000, 3000).astype(np.uint16)
-    return Opinion(Packed.of(road), (codes, 65535 - codes))
+    return Opinion(Packed.of(road), by_class=(codes, 65535 - codes))
 
 
 def test_a_mirrored_image_has_the_mirrored_opinion():
@@ -270,6 +270,27 @@ def test_the_layers_are_those_that_are_announced(learnt):
 
 
 VIEW = View.of(picture(9)[0])
+WIDE = View.of(picture(9, height=36, width=48)[0])
+"""Of another camera than `VIEW`, by its size."""
+
+
+@pytest.mark.parametrize(("view", "weight"), [(VIEW, 1.0), (WIDE, 4.0)])
+def test_the_distance_weighs_more_where_another_camera_taught(learnt, view, weight):
+    found, expected = (
+        trees.bind(replace(SMALL, reach_weight=each), learnt)(view).probability
+        for each in (None, weight)
+    )
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_an_adapted_model_knows_the_cameras_of_both(sample, learnt):
+    own = picture(13, height=36, width=48)
+    frame, row, column = np.indices((1, *own[1].shape)).reshape(3, -1)
+    more = trees.adapt(
+        learnt, TrainingSet((own[0],), frame, row, column, own[1].ravel() == 1), SMALL
+    )
+    assert [more.knows(each.image) for each in (VIEW, WIDE)] == [True, True]
+    assert [learnt.knows(each.image) for each in (VIEW, WIDE)] == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -334,4 +355,4 @@ def test_parts_that_see_other_features_are_refused(sample, learnt):
     with pytest.raises(ValueError, match="the forest sees 3 features of a pixel, and the network"):
         Blend(other.forest, learnt.top.network)
     with pytest.raises(ValueError, match="on top sees 3 features of a pixel, and the base 3"):
-        Stack(other, other)
+        Stack(other, learnt.sizes, other)
