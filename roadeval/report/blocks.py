@@ -319,48 +319,6 @@ class Strip(Block):
 
 
 @dataclass(frozen=True, slots=True)
-class FrameRow(Block):
-    """A frame in the table."""
-
-    frame: int
-    seconds: str
-    """From the first frame."""
-    cells: Sequence[str]
-    """A number for each column of rates."""
-    conditions: Sequence[int] = ()
-    """Positions in `FrameBrowser.conditions`."""
-    note: str = ""
-    pictured: bool = False
-    """Whether its pictures can be had."""
-
-
-@dataclass(frozen=True, slots=True)
-class FrameBrowser(Block):
-    """The frames of a drive."""
-
-    rates: Sequence[str]
-    """Titles of groups of columns."""
-    variants: Sequence[str]
-    """Titles of the columns in each group."""
-    rows: Sequence[FrameRow]
-    """The frames, in the drive's order."""
-    conditions: Sequence[str]
-    """What a frame can be, in words."""
-    strips: Sequence[Strip]
-    """Frames with pictures, in the drive's order; none where they are asked for one by one."""
-    charts: Sequence[Chart]
-    """Rates along the drive."""
-    first: int | None
-    """The frame that is shown at first; None where there is no picture."""
-    compared: tuple[str, str]
-    """Names of two pictures that are laid over each other at first."""
-    command: str = ""
-    """Opens a frame in the viewer, with ``{}`` for its number; empty where nothing does."""
-    note: str = ""
-    """What to know of the table."""
-
-
-@dataclass(frozen=True, slots=True)
 class LongTable(Block):
     """A table of many rows, with a field that looks for words in them."""
 

@@ -10,7 +10,7 @@ from roadeval.data.words import number
 from roadeval.report.blocks import Block, Document
 from roadeval.report.findings import Findings, FleetFindings
 from roadeval.report.sections import drive, drives, frames, provenance, summary
-from roadeval.report.sections.frames import BrowsedFrames
+from roadeval.report.sections.frames import FrameBrowser
 
 ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
@@ -30,15 +30,14 @@ def document(findings: Findings | FleetFindings) -> Document:
     return _of(findings, *scored, provenance.section)
 
 
-def page_document(findings: Findings | FleetFindings, browsed: BrowsedFrames | None) -> Document:
+def page_document(findings: Findings | FleetFindings, browsed: FrameBrowser | None) -> Document:
     """Return the report as a page: with a browser of frames, or a table of all drives."""
     if isinstance(findings, FleetFindings):
         worst = partial(drives.worst, across=ACROSS)
         parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
         return _of(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     scored = SCORED if findings.totals else (drive.masks,)
-    frame_browser = frames.browser(browsed) if browsed else ()
-    return _of(findings, lambda _: frame_browser, *scored, provenance.section)
+    return _of(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
 
 
 def _of(findings: Findings | FleetFindings, *sections: Section) -> Document:

@@ -24,8 +24,8 @@ def page_of(base, new):
 def test_frames_that_both_results_have_stand_in_order_with_both_rates():
     found = page_of({("net", "svm"): [9] * 12, ("net", "post"): [1] * 12}, {("net", "post"): [3]})
     assert found.variants == ["base: net", "new: net"]
-    assert [frame.frame for frame in found.frames] == [0]
-    assert {name: rates["ERR"] for name, rates in found.frames[0].rates.items()} == {
+    assert [frame.frame for frame in found.rows] == [0]
+    assert {name: rates["ERR"] for name, rates in found.rows[0].rates.items()} == {
         "base: net": 0.01,
         "new: net": 0.03,
     }
@@ -34,8 +34,8 @@ def test_frames_that_both_results_have_stand_in_order_with_both_rates():
 def test_a_variant_with_few_masks_takes_no_frame_from_the_others():
     few, post = {("net", "post"): [1] * 2}, ("filtered", "post")
     found = page_of({post: [4] * 12, **few}, {post: [5] * 12, **few})
-    assert [len(frame.rates) for frame in found.frames] == [4] * 2 + [2] * 10
-    assert found.frames[-1].rates.keys() == {"base: filtered", "new: filtered"}
+    assert [len(frame.rates) for frame in found.rows] == [4] * 2 + [2] * 10
+    assert found.rows[-1].rates.keys() == {"base: filtered", "new: filtered"}
 
 
 def test_results_without_a_variant_in_common_have_no_frames_to_show():

@@ -10,7 +10,7 @@ from roadeval.jobs.results import frames as report_frames
 from roadeval.jobs.results.frames import FEWEST, bytes_of, strips_of
 from roadeval.jobs.results.report import page_of
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.report.blocks import FrameBrowser
+from roadeval.report.sections.frames import FrameBrowser
 from tests.jobs.making import settings, write_log
 
 OTHERS = {name: {"chain": ["similarity", "post"]} for name in ("third", "fourth")}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
-from roadeval.report.sections.frames import BrowsedFrames
+from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.facts import DriveFacts, FrameAccount
 from tests.report.making import VARIANTS, a_pair, some_findings
 from tests.report.sections.test_thresholds import findings as thresholded
@@ -54,7 +54,7 @@ def test_a_page_has_the_sections_of_the_report():
             variant: dict.fromkeys(stages, OVERLAP) for variant, stages in findings.totals.items()
         },
     )
-    frames = BrowsedFrames([], [], frozenset(), [], [], None)
+    frames = FrameBrowser([], [], [])
     paper, page = sections(findings), headings(page_document(findings, frames))
     assert "Over thresholds" in page
     assert {*paper} - {*page} == {"The worst frames"}

@@ -34,7 +34,7 @@ from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
-from roadeval.report.sections.frames import BrowsedFrames, FrameFacts, browser, strip
+from roadeval.report.sections.frames import FrameBrowser, FrameRow, browser, strip
 from roadeval.results.comparison import as_dict, comparison_cases, judged, junit_xml, warnings
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import as_arrays, window_rows
@@ -210,7 +210,7 @@ def as_page(compared: Compared, inspect: Inspect | None = None, home: str = "") 
     place = Place(home=home)
     made = _document(compared, inspect)
 
-    def rendered(frames: BrowsedFrames) -> bytes:
+    def rendered(frames: FrameBrowser) -> bytes:
         return page(replace(made, blocks=[*made.blocks, *browser(frames)]), place)
 
     frames = browsed(compared, inspect, lambda frames: len(rendered(frames)))
@@ -317,8 +317,8 @@ def over_drive(compared: Compared) -> list[Chart]:
 
 
 def browsed(
-    compared: Compared, inspect: Inspect | None, taken: Callable[[BrowsedFrames], int]
-) -> BrowsedFrames | None:
+    compared: Compared, inspect: Inspect | None, taken: Callable[[FrameBrowser], int]
+) -> FrameBrowser | None:
     """Collect the frames that all results have of a variant, all their masks side by side.
 
     None where no variant is in all of them, or several drives are compared. ``inspect`` returns the
@@ -333,11 +333,9 @@ def browsed(
     opened = compared.recordings
     newest = opened.get(masks[-1].result)
     command = (lambda frame: inspect(newest.path, frame)) if inspect and newest else None
-    without = BrowsedFrames(
-        frames=[*facts.values()],
+    without = FrameBrowser(
+        rows=[*facts.values()],
         variants=[mask.name for mask in masks],
-        pictured=frozenset(),
-        strips=[],
         charts=over_frames(rows, [*SHORT], _looks_of(masks)),
         inspect=command,
     )
@@ -351,10 +349,10 @@ def browsed(
     ]
     made = (_strip(each, masks, opened, command) for each in pictured[:PICTURED])
     strips = sorted(fitting(made, BYTES - taken(without)), key=lambda each: each.frame)
-    return replace(without, strips=strips, pictured=frozenset(each.frame for each in strips))
+    return replace(without, strips=strips)
 
 
-def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameFacts]:
+def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameRow]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
     for frame, stamp, rates in rates_by_frame(rows, [*SHORT]):
@@ -363,11 +361,11 @@ def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameFacts]:
             change = rates[new]["ERR"] - rates[base]["ERR"]
             if abs(change) >= NOTEWORTHY:
                 conditions = [f"{new} {'worse' if change > 0 else 'better'}"]
-        yield FrameFacts(frame, stamp, rates, conditions)
+        yield FrameRow(frame, stamp, rates, conditions)
 
 
 def _strip(
-    facts: FrameFacts,
+    facts: FrameRow,
     masks: Sequence[ComparedMask],
     opened: Mapping[str, DriveResult],
     command: Callable[[int], str] | None,

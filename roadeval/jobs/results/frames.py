@@ -27,7 +27,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
-from roadeval.report.sections.frames import SMALL, BrowsedFrames, FrameFacts, strip, wrong_cells
+from roadeval.report.sections.frames import SMALL, FrameBrowser, FrameRow, strip, wrong_cells
 from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
@@ -253,34 +253,33 @@ class FramePicker:
         return ExampleFrame(frame, recording.image(frame), truth, there)
 
 
-def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> BrowsedFrames:
+def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> FrameBrowser:
     """Collect the frames of a result for a page, without their pictures."""
     frames = result.rows
     variants = frames.distinct("variant")
     there = result.recording.variants if result.recording else ()
-    return BrowsedFrames(
-        frames=list(facts_of(result)),
+    return FrameBrowser(
+        rows=[*facts_of(result)],
         variants=variants,
-        pictured=frozenset(result.pictured),
-        strips=[],
+        served=frozenset(result.pictured),
         charts=over_frames(frames, [*SHORT]) if len(frames) else [],
         inspect=inspect if result.recording is not None else None,
         masks=[f"{each.name}: {each.stages[-1]}" for each in there],
     )
 
 
-def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
+def facts_of(result: DriveResult) -> Iterator[FrameRow]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames = result.rows
     if not len(frames):
         stamps = result.recording.stamps if result.recording else {}
-        yield from (FrameFacts(number, stamps[number], {}) for number in result.pictured)
+        yield from (FrameRow(number, stamps[number], {}) for number in result.pictured)
         return
     dark = _much_shadow(result)
     for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
-        yield FrameFacts(
+        yield FrameRow(
             frame,
             stamp,
             rates,

@@ -24,7 +24,6 @@ from roadeval.report.blocks import (
     Block,
     Cell,
     Document,
-    FrameBrowser,
     Heading,
     ImageFile,
     KeepTogether,
@@ -35,6 +34,7 @@ from roadeval.report.blocks import (
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import drawn, span_of_frames, values
 from roadeval.report.pdf.typeset import ReportError
+from roadeval.report.sections.frames import FrameBrowser
 from roadeval.runtime.files import companion_name, put_with, writing
 from roadeval.runtime.text import visible
 

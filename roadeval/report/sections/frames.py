@@ -18,8 +18,6 @@ from roadeval.report.blocks import (
     CELLS,
     Block,
     Command,
-    FrameBrowser,
-    FrameRow,
     Heading,
     ImageGrid,
     KeepTogether,
@@ -130,7 +128,7 @@ ROWS: Final = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class FrameFacts:
+class FrameRow:
     """A frame in the table."""
 
     frame: int
@@ -143,114 +141,106 @@ class FrameFacts:
     notes: Sequence[str] = ()
     """Sentences about it."""
 
+    @property
+    def error(self) -> float:
+        """The ERR of the first variant; below 0 where it is undefined."""
+        error = next(iter(self.rates.values()), {}).get("ERR")
+        return error if defined(error) else -1.0
+
 
 @dataclass(frozen=True, slots=True)
-class BrowsedFrames:
-    """The parts of the browser of frames."""
+class FrameBrowser(Block):
+    """The frames of a drive on a page: one with its pictures, and a table of all."""
 
-    frames: Sequence[FrameFacts]
+    rows: Sequence[FrameRow]
     """The frames of the drive, in order."""
     variants: Sequence[str]
     """Those that were scored."""
-    pictured: frozenset[int]
-    """Frames that a server has the pictures of."""
-    strips: Sequence[Strip]
-    """Frames with their pictures."""
     charts: Sequence[Chart]
     """Rates along the drive."""
-    inspect: Callable[[int], str] | None
+    inspect: Callable[[int], str] | None = None
     """Return the command that opens a frame; None without one."""
+    served: frozenset[int] = frozenset()
+    """Frames that a server has the pictures of."""
+    strips: Sequence[Strip] = ()
+    """Frames with their pictures, in order; none where they are asked for one by one."""
     masks: Sequence[str] = ()
     """Names of the pictures of final masks, which are compared where there is no truth."""
     left_out: Sequence[str] = ()
     """Variants whose layers had no room."""
 
+    @property
+    def pictured(self) -> frozenset[int]:
+        """The frames whose pictures can be had."""
+        return frozenset(strip.frame for strip in self.strips) or self.served
 
-def browser(browsed: BrowsedFrames) -> Iterator[Block]:
-    """Yield the browser of frames; nothing where there is no frame to show."""
-    if not browsed.frames:
-        return
-    shown = _shown(browsed)
-    pictured = frozenset(strip.frame for strip in browsed.strips) or browsed.pictured
-    conditions = list(dict.fromkeys(each for facts in shown for each in facts.conditions))
-    order = {each: place for place, each in enumerate(conditions)}
-    yield Heading("Frames")
-    yield FrameBrowser(
-        rates=[*SHORT] if browsed.variants else [],
-        variants=browsed.variants,
-        rows=[_row(facts, browsed, order, pictured) for facts in shown],
-        conditions=conditions,
-        strips=browsed.strips,
-        charts=browsed.charts,
-        first=_first(browsed, pictured),
-        compared=_compared(browsed),
-        command=browsed.inspect(0).replace(" --frame 0", " --frame {}") if browsed.inspect else "",
-        note=_note(browsed, len(shown)),
-    )
+    @property
+    def shown(self) -> list[FrameRow]:
+        """The frames of the table: all, or of a long drive the worst and the pictured."""
+        if len(self.rows) <= ROWS:
+            return [*self.rows]
+        ranked = sorted(self.rows, key=lambda row: -row.error)
+        wanted = {strip.frame for strip in self.strips} | {row.frame for row in ranked[:ROWS]}
+        return [row for row in self.rows if row.frame in wanted]
 
+    @property
+    def rates(self) -> list[str]:
+        """Titles of groups of columns, each of which has a column a variant."""
+        return [*SHORT] if self.variants else []
 
-def _shown(browsed: BrowsedFrames) -> list[FrameFacts]:
-    """Return the frames of the table: all, or of a long drive the worst and the pictured."""
-    if len(browsed.frames) <= ROWS:
-        return [*browsed.frames]
-    wanted = {strip.frame for strip in browsed.strips}
-    ranked = sorted(browsed.frames, key=lambda facts: -_error(facts))
-    wanted |= {facts.frame for facts in ranked[:ROWS]}
-    return [facts for facts in browsed.frames if facts.frame in wanted]
+    def cells(self, row: FrameRow) -> Iterator[str]:
+        """Yield a frame's seconds from the first one, and a number for each column of rates."""
+        yield f"{(row.stamp_ns - self.rows[0].stamp_ns) / 1e9:.2f}"
+        for rate in self.rates:
+            for variant in self.variants:
+                yield percent(row.rates.get(variant, {}).get(rate))
 
+    @property
+    def conditions(self) -> dict[str, int]:
+        """What a frame can be, in words, with a number for each."""
+        words = dict.fromkeys(each for row in self.shown for each in row.conditions)
+        return {each: place for place, each in enumerate(words)}
 
-def _error(facts: FrameFacts) -> float:
-    first = next(iter(facts.rates.values()), {})
-    error = first.get("ERR", -1.0)
-    return error if defined(error) else -1.0
+    @property
+    def first(self) -> int | None:
+        """The frame that is shown at first: the worst one with a picture; None without any."""
+        there = [row for row in self.rows if row.frame in self.pictured]
+        return max(there, key=lambda row: row.error).frame if there else None
 
+    @property
+    def compared(self) -> tuple[str, str]:
+        """The pictures that are laid over each other: errors of two variants, or their masks."""
+        errors = [f"{name}: errors" for name in self.variants if name != BASELINE]
+        first, *others = errors or [*self.masks] or ["camera"]
+        return first, next(iter(others), "camera")
 
-def _row(
-    facts: FrameFacts, browsed: BrowsedFrames, order: Mapping[str, int], pictured: frozenset[int]
-) -> FrameRow:
-    return FrameRow(
-        facts.frame,
-        f"{(facts.stamp_ns - browsed.frames[0].stamp_ns) / 1e9:.2f}",
-        [
-            percent(facts.rates.get(variant, {}).get(rate))
-            for rate in (SHORT if browsed.variants else ())
-            for variant in browsed.variants
-        ],
-        [order[each] for each in facts.conditions],
-        " ".join(facts.notes),
-        facts.frame in pictured,
-    )
+    @property
+    def command(self) -> str:
+        """What opens a frame in the viewer, with ``{}`` for its number; empty without one."""
+        return self.inspect(0).replace(" --frame 0", " --frame {}") if self.inspect else ""
 
-
-def _first(browsed: BrowsedFrames, pictured: frozenset[int]) -> int | None:
-    there = [facts for facts in browsed.frames if facts.frame in pictured]
-    return max(there, key=_error).frame if there else None
-
-
-def _compared(browsed: BrowsedFrames) -> tuple[str, str]:
-    """Return the two pictures to compare first: the errors of two variants, or else their masks."""
-    errors = [f"{name}: errors" for name in browsed.variants if name != BASELINE]
-    first, *others = errors or [*browsed.masks] or ["camera"]
-    return first, next(iter(others), "camera")
+    @property
+    def note(self) -> str:
+        """What to know of the table."""
+        told, of = [], number(len(self.rows))
+        if (shown := len(self.shown)) < len(self.rows):
+            told.append(
+                f"The {number(shown)} of {of} frames with the highest ERR; frames.csv has them all."
+            )
+        if self.variants:
+            told.append("Percent.")
+        if 0 < len(self.strips) < len(self.rows):
+            told.append(f"{len(self.strips)} of {of} frames have their pictures on this page.")
+        if self.left_out:
+            told.append(f"To keep it small, the layers of {listing(self.left_out)} are left out.")
+        return " ".join(told)
 
 
-def _note(browsed: BrowsedFrames, shown: int) -> str:
-    told = []
-    if shown < len(browsed.frames):
-        told.append(
-            f"The {number(shown)} of {number(len(browsed.frames))} frames with the highest ERR; "
-            "frames.csv has them all."
-        )
-    if browsed.variants:
-        told.append("Percent.")
-    if len(browsed.strips) < len(browsed.frames) and browsed.strips:
-        told.append(
-            f"{len(browsed.strips)} of {number(len(browsed.frames))} frames have their pictures on "
-            "this page."
-        )
-    if browsed.left_out:
-        told.append(f"To keep it small, the layers of {listing(browsed.left_out)} are left out.")
-    return " ".join(told)
+def browser(frames: FrameBrowser | None) -> Iterator[Block]:
+    """Yield the section of a page that browses the frames; nothing where there are none."""
+    if frames and frames.rows:
+        yield Heading("Frames")
+        yield frames
 
 
 # --- Strips ---------------------------------------------------------------------------------------

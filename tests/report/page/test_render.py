@@ -14,8 +14,6 @@ from roadeval.report.blocks import (
     Command,
     Details,
     Figure,
-    FrameBrowser,
-    FrameRow,
     Heading,
     ImageFile,
     ImageGrid,
@@ -32,6 +30,7 @@ from roadeval.report.blocks import (
 )
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 from roadeval.report.page.render import Beside, page, write_page
+from roadeval.report.sections.frames import FrameBrowser, FrameRow
 from tests.report.making import a_document
 
 JPEG = ImageFile(b"\xff\xd8\xff\xe0 not much of a picture")
@@ -44,7 +43,7 @@ def every_block(text):
     """One of each kind of block, with a text wherever one has room."""
     table = Table([text, "n"], [[Cell(text, dot="#0072B2"), text], ["", "1"]], caption=text)
     strip = Strip(7, [text], table, [PictureRow(text, [Picture(text, text, JPEG)])], text)
-    row = FrameRow(7, "0.00", ["1.00"], [0], text, pictured=True)
+    row = FrameRow(7, 0, {text: {"ERR": 0.01}}, [text], [text])
     return [
         Heading(text),
         Heading(text, 2),
@@ -61,7 +60,7 @@ def every_block(text):
         TwoColumns([Text(text)], [Text(text)]),
         LinkList([(text, "0/")]),
         TableOfContents(),
-        FrameBrowser([text], [text], [row], [text], [strip], [CHART], 7, (text, text), text, text),
+        FrameBrowser([row], [text], [CHART], text.format, strips=[strip], left_out=[text]),
     ]
 
 
@@ -93,7 +92,7 @@ def test_every_kind_of_block_is_drawn():
     known = {
         each.__name__ for each in Block.__subclasses__() if each.__module__.startswith("roadeval")
     }
-    parts = {"Document", "Cell", "Strip", "Picture", "PictureRow", "FrameRow"}
+    parts = {"Document", "Cell", "Strip", "Picture", "PictureRow"}
     assert known - kinds == parts
     assert rendered(*every_block("word"))
 
@@ -119,7 +118,7 @@ def test_what_looks_like_markup_is_text_wherever_it_stands():
 
 def test_what_belongs_to_a_variant_says_so():
     table = Table(["mask"], [[text] for text in ("a", "b", "a \N{MINUS SIGN} b", "ab")])
-    frames = FrameBrowser([], ["a", "b"], [], [], [], [], None, ("", ""))
+    frames = FrameBrowser([], ["a", "b"], [])
     rows = Reader(rendered(table, frames)).all("tr")
     assert [each.get("data-of") for each in rows if "data-of" in each] == ["a", "b", "a"]
 
