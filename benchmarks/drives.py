@@ -61,7 +61,7 @@ def resized(frame: Frame, width: int, height: int) -> tuple[np.ndarray, np.ndarr
 
 def write(path: Path, frames: list[Frame], size: tuple[int, int], count: int | None = None) -> Path:
     """Write a log of these frames at a size, again and again until there are ``count``."""
-    pictures = [(jpeg(image), truth) for image, truth in (resized(f, *size) for f in frames)]
+    pictures = [(jpeg_of(image), truth) for image, truth in (resized(f, *size) for f in frames)]
     with LogWriter(path) as log:
         for stamp, (jpeg, truth) in _stamped(pictures, count):
             log.image("/camera", stamp, jpeg, "jpeg")
@@ -77,7 +77,7 @@ def write_form(path: Path, frames: list[Frame], size: tuple[int, int], form: str
         with LogWriter(path) as log:
             for stamp, image in _stamped(images):
                 if encoding == "jpeg":
-                    log.image("/camera", stamp, jpeg(image), "jpeg")
+                    log.image("/camera", stamp, jpeg_of(image), "jpeg")
                 else:
                     log.mask("/camera", stamp, image)
     else:
@@ -92,7 +92,7 @@ def _write_ros2(path: Path, images: list[np.ndarray], encoding: str) -> None:
         name, text = ("Image", _RAW) if raw else ("CompressedImage", COMPRESSED)
         schema = writer.register_msgdef(f"sensor_msgs/msg/{name}", text)
         for stamp, image in _stamped(images):
-            message = _ros2_raw(image) if raw else {"format": "jpeg", "data": jpeg(image)}
+            message = _ros2_raw(image) if raw else {"format": "jpeg", "data": jpeg_of(image)}
             seconds, rest = divmod(stamp, 1_000_000_000)
             header = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": "camera"}
             writer.write_message("/camera", schema, {"header": header, **message}, stamp, stamp)
@@ -116,6 +116,6 @@ def _stamped(pictures: list[Any], count: int | None = None) -> Iterator[tuple[in
     return ((PERIOD_NS * number, picture) for number, picture in enumerate(many, 1))
 
 
-def jpeg(image: np.ndarray) -> bytes:
+def jpeg_of(image: np.ndarray) -> bytes:
     bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()

@@ -25,7 +25,7 @@ import numpy as np
 from mcap.writer import CompressionType
 from mcap_ros2.writer import Writer
 
-from benchmarks.drives import COMPRESSED, NESTED, Source, jpeg, resized
+from benchmarks.drives import COMPRESSED, NESTED, Source, jpeg_of, resized
 from benchmarks.timing import table
 
 SIZE: Final = (1920, 1200)
@@ -169,7 +169,7 @@ def _noisy(image: np.ndarray, truth: np.ndarray) -> tuple[bytes, bytes]:
     """Return an image as JPEG, with the noise that enlarging took away, and its truth as PNG."""
     noise = np.random.default_rng(len(image)).normal(0, 2.5, image.shape)
     image = np.clip(image + noise, 0, 255).astype(np.uint8)
-    return jpeg(image), cv2.imencode(".png", truth)[1].tobytes()
+    return jpeg_of(image), cv2.imencode(".png", truth)[1].tobytes()
 
 
 def _commented(image: bytes, tick: int) -> bytes:

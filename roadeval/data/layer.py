@@ -52,9 +52,10 @@ class LayerSpec:
     value_range: tuple[float, float] = (0.0, 1.0)
     """For `SCALAR`: the closed range of meaning; values outside are clipped for display."""
     exact: bool = True
-    """Whether the recording must give back the same array (masks, labels), or, for a scalar map,
-    the nearest of 255 levels over ``value_range``. A layer that is not exact may be recorded
-    lossily and at half resolution.
+    """Whether the recording must give back the same array (masks, labels, colours), or, for a
+    scalar map, the nearest of 256 levels over ``value_range``; from an image of more than 800
+    columns the means of blocks of pixels, of 400 columns at most, to 1/127 of half the range. A
+    layer that is not exact is recorded with some loss, at half the resolution or as small as that.
     """
 
 

@@ -6,10 +6,14 @@ kind       in the file                 what is read back
 mask       PNG with a palette          the same array
 labels     raw class ids, LZ4          the same array (the viewer names the class under the mouse;
                                        a byte a pixel in its memory and in ours)
-scalar     grey PNG, coloured by the   the nearest of 256 levels over the range; if not exact, 52
-           viewer                      levels at half resolution
-rgb        PNG                         the same image; if not exact, a JPEG at half resolution
+scalar     grey PNG, coloured by the   the nearest of 256 levels over the range, of large images
+           viewer                      reduced; if not exact, 52 levels, reduced
+rgb        PNG                         the same image; if not exact, a JPEG, reduced
 =========  ==========================  ============================================================
+
+What is reduced has the means of blocks of pixels, of two by two and so many that at most `COLUMNS`
+columns are left: it is there to be looked at, and a map of 1920x1200 pixels takes twice what the
+camera's JPEG does. An image is large if it has more than twice as many columns.
 
 What is the same on all frames (colours, class names, ranges) is a codec's ``style``, logged once.
 Rerun is imported by ``style`` and ``columns`` alone: decoding does not need it.
@@ -48,7 +52,10 @@ from roadeval.recording.layout import CAMERA, Layout
 Array = npt.NDArray[Any]
 JPEG_QUALITY: Final = 90
 """Of camera images that the log does not hold as JPEG or PNG, and of layers that need not be exact,
-which are also halved in size."""
+which are also reduced."""
+
+COLUMNS: Final = 400
+"""Columns of what is reduced, at most."""
 
 _FIFTHS: Final = (np.rint(np.arange(256) / 5) * 5).astype(np.uint8)
 """Every level rounded to a multiple of five: fewer levels take fewer bytes."""
@@ -118,7 +125,7 @@ class ImageCodec(_LayerCodec):
 
     def encode(self, array: Array) -> bytes:
         """Return ``(H, W, 3)`` uint8 RGB as a file."""
-        return encode_levels(array) if self.spec.exact else _jpeg(_halve(array))
+        return encode_levels(array) if self.spec.exact else _jpeg(_reduce(array))
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
@@ -207,8 +214,8 @@ class ScalarCodec(_LayerCodec):
 
     def encode(self, array: Array) -> bytes:
         """Return a PNG file of ``(H, W)`` float32, or of uint8 codes that span the range."""
-        if not self.spec.exact:
-            array = _halve(array)
+        if not self.spec.exact or self.width > 2 * COLUMNS:
+            array = _reduce(array)
         if array.dtype != np.uint8:
             low, high = self.spec.value_range
             scaled = (array - np.float32(low)) * np.float32(255 / (high - low))
@@ -225,10 +232,11 @@ class ScalarCodec(_LayerCodec):
         return _restore(values, self.width, self.height)
 
 
-def _halve(array: Array) -> Array:
+def _reduce(array: Array) -> Array:
     height, width = array.shape[:2]
-    half = ((width + 1) // 2, (height + 1) // 2)
-    small: Array = cv2.resize(array, half, interpolation=cv2.INTER_AREA)
+    block = max(2, -(-width // COLUMNS))
+    size = -(-width // block), -(-height // block)
+    small: Array = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
     return small
 
 

@@ -200,6 +200,9 @@ LEAST_FREE: Final = 64 << 20
 """Bytes that must stay free on the disk beside what waits. Checked before each chunk but the last,
 for which it is meant: the partial recording then ends whole."""
 
+WORTH_SAYING: Final = 100_000_000
+"""Bytes of a recording whose expected size is said."""
+
 PATIENCE_S: Final = 10.0
 PATIENCE: Final = 30
 """How often, and for how long each time, a slow disk is waited for."""
@@ -222,7 +225,7 @@ class Recorder:
         self._rule = rule
         self._codecs = codecs_of(layout)
         self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
-        self._begun = self._finished = self._failed = False
+        self._begun = self._finished = self._failed = self._foretold = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._sums = MessageSums(self.partial)
@@ -306,6 +309,27 @@ class Recorder:
             self.check_disk_space()
             self._worst.offer(encoded)
 
+    def forecast(self, encoded: EncodedFrame, frames: int) -> str:
+        """Say how large the recording of so many frames becomes, by its first one with images.
+
+        Empty for any further one, and where it is small and fits.
+        """
+        if self._foretold or not encoded.payloads:
+            return ""
+        self._foretold = True
+        shown = {
+            RuleKind.WORST: min(self._rule.number, frames),
+            RuleKind.EVERY: math.ceil(frames / max(self._rule.number, 1)),
+        }.get(self._rule.kind, frames)
+        size, disk = shown * sum(map(len, encoded.payloads.values())), self._disk()
+        said = f"the recording will take about {size / 1e6:.0f} MB"
+        if disk.total and size > disk.free - LEAST_FREE:
+            return (
+                f"{said}, and only {disk.free / 1e6:.0f} MB are free: `output.record` masks or "
+                "worst:50 takes less, or `output.save` names a place on another disk"
+            )
+        return said if size > WORTH_SAYING else ""
+
     def _write_worst(self) -> None:
         """Append the images put aside, in order; their frames' numbers are written already.
 
@@ -365,9 +389,12 @@ class Recorder:
             ) from _failure(errno.ENOSPC)
 
     def _is_disk_full(self) -> bool:
-        disk = shutil.disk_usage(self.partial.parent)
+        disk = self._disk()
         # A place that is no disk, as /proc, has no size.
         return bool(disk.total) and disk.free < LEAST_FREE + self._rows.size
+
+    def _disk(self) -> Any:
+        return shutil.disk_usage(self.partial.parent)
 
     def _add_images(self, encoded: EncodedFrame) -> None:
         when = encoded.number, encoded.stamp_ns
@@ -473,6 +500,10 @@ class NullRecorder:
 
     def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> None:
         """Encode nothing."""
+
+    def forecast(self, _encoded: None, _frames: int) -> str:
+        """Say nothing."""
+        return ""
 
     def write(self, encoded: None) -> None:
         """Write nothing."""

@@ -31,8 +31,8 @@ NOTHING: Final = None
 `rerun.Clear` has no effect on encoded images: https://github.com/rerun-io/rerun/issues/12793.
 """
 
-CHUNK_BYTES: Final = 2 << 20
-"""Bytes of images and text at which a chunk is full: the viewer reads chunks whole, and a chunk is
+CHUNK_BYTES: Final = 1 << 19
+"""Bytes of images and text at which a chunk is full: it is read whole, for one picture, too, and is
 held in memory several times while it is packed and written."""
 
 SHARE: Final = 8

@@ -9,6 +9,7 @@ import rerun as rr
 from PIL import Image
 
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
+from roadeval.images import Limits, to_labels
 from roadeval.recording.codecs import codec, codecs_of
 from roadeval.recording.layout import CAMERA, SHADOW_TRUTH
 from tests.recording.making import NDI, POST, RINGS, layout
@@ -147,3 +148,25 @@ def test_a_number_map_that_need_not_be_exact_has_each_fifth_level_alone():
     with Image.open(BytesIO(codec(spec, 512, 2).encode(codes))) as picture:
         levels = np.array(picture)
     np.testing.assert_array_equal(levels[0], np.rint(np.arange(256) / 5) * 5)
+
+
+def test_a_map_of_a_large_image_has_the_means_of_blocks_to_a_127th():
+    drawn = DRAW.uniform(-1, 1, (1200, 1920)).astype(np.float32)
+    found = codec(NDI, 1920, 1200)
+    with Image.open(BytesIO(payload := found.encode(drawn))) as picture:
+        assert picture.size == (384, 240)
+    means = drawn.reshape(240, 5, 384, 5).mean((1, 3))
+    levels = to_labels(payload, Limits())
+    np.testing.assert_allclose(levels / 127.5 - 1, means, atol=1 / 127)
+    assert found.decode(payload).shape == (1200, 1920)
+    exact = codec(NDI, 800, 600)
+    assert np.abs(exact.decode(exact.encode(drawn[:600, :800])) - drawn[:600, :800]).max() < 1 / 254
+
+
+def test_a_recordings_layers_fit_beside_the_cameras_picture_of_any_size():
+    """Of maps and colours: noise, which nothing packs, at sizes of real cameras."""
+    distance = LayerSpec("distance", LayerKind.SCALAR, "", value_range=(0.0, 6.0), exact=False)
+    for width, height in ((1280, 720), (1920, 1200), (3840, 2160)):
+        noise = DRAW.uniform(-1, 1, (height, width)).astype(np.float32)
+        for spec in (NDI, distance):
+            assert len(codec(spec, width, height).encode(noise)) < 100_000

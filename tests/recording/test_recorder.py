@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError, views
+from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError, RecordRule, views
 from roadeval.recording.recorder import LEAST_FREE, UNWRITTEN
 from roadeval.recording.rows import CHUNK_BYTES, PendingRows
 from roadeval.recording.rrd_file import RrdFile
@@ -241,6 +241,27 @@ def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
             recorder.write(replace(large, number=number))
     assert len(first.payloads) > 4
     assert max(sent) < UNWRITTEN + 2 * CHUNK_BYTES
+
+
+@pytest.mark.parametrize(("rule", "shown"), [("all", 1000), ("every:4", 250), ("worst:50", 50)])
+def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
+    tmp_path, monkeypatch, rule, shown
+):
+    for free, said in ((10**12, ""), (10**9, ", and only 1000 MB are free: `output.record` masks")):
+        with Recorder(tmp_path / "out.rrd", layout(), RecordRule.parse(rule)) as recorder:
+            leave_free(monkeypatch, free)
+            first = recorder.encode(result(0), 0, {})
+            assert recorder.forecast(replace(first, payloads={}), 1000) == ""
+            large = replace(first, payloads={"/camera": bytes(24_000_000)})
+            expected = f"the recording will take about {24 * shown} MB{said}"
+            assert recorder.forecast(large, 1000).startswith(expected)
+            assert recorder.forecast(large, 1000) == ""
+            leave_free(monkeypatch, 10**12)
+
+
+def test_a_small_recording_that_fits_is_not_worth_a_word(tmp_path):
+    with _recorder(tmp_path / "out.rrd") as recorder:
+        assert recorder.forecast(recorder.encode(result(0), 0, {}), 10) == ""
 
 
 def leave_free(monkeypatch, size):

@@ -182,6 +182,8 @@ def _record(
     """Run over the frames; return those for the figure of masks."""
     examples = ExampleFrames(len(run.frames))
     for done in process(run, recorder, on_progress):
+        if forecast := recorder.forecast(done.encoded, len(run.frames)):
+            on_progress(Progress(done.position, len(run.frames), "replaying", forecast))
         recorder.write(done.encoded)
         results.append(done.lines)
         sidecar.write(done.result)
