@@ -37,15 +37,6 @@ def write(tmp_path):
     return write
 
 
-def test_it_tells_what_replay_would_pick_and_why(write, capsys):
-    assert main(["info", write({"/camera": None, "/road_mask": [0, 255]})]) == 0
-    shown = capsys.readouterr().out
-    assert "drive.mcap: 3.0 s from 2023-11-14 22:13:20.000 UTC" in shown
-    assert "/camera     jpeg (protobuf)   8x6         4  1 Hz" in shown
-    assert "image: /camera (the only camera image)" in shown
-    assert "truth: /road_mask (" in shown
-
-
 def test_it_tells_what_replay_would_ask_for(write, capsys):
     drive = write({"/camera": None, "/labels": [0, 1, 2, 3]})
     assert main(["info", drive]) == 0

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from tests.e2e.commands import DEMO, here, replay, roadeval
+from tests.e2e.commands import here, replay, roadeval
 from tests.fixtures.make import make
 
 
@@ -87,10 +87,3 @@ def test_a_model_is_never_evaluated_on_the_frames_that_trained_it(tmp_path):
     assert run.returncode == 0, run.stderr
     assert re.search(r"6 of \d+ frames were evaluated, .*, 4 to train on\.", flowing(run.stdout))
     assert not list(tmp_path.rglob("*.rrd"))
-
-
-def test_info_tells_what_replay_would_pick():
-    run = roadeval("info", DEMO)
-    assert run.returncode == 0, run.stderr
-    assert "image: /camera/image" in run.stdout
-    assert "640x480" in run.stdout

@@ -140,13 +140,6 @@ def test_a_killed_run_of_sparse_truth_shows_no_scored_frame_whose_truth_is_missi
         opened.recording.layer("unfiltered", "errors", frame)
 
 
-def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):
-    run = here("report", unlabelled.recording, "-o", tmp_path / "report.pdf")
-    assert run.returncode == 0, run.stderr
-    words = text((tmp_path / "report.pdf").read_bytes())
-    assert "Without truth nothing can be said about errors" in words
-
-
 @pytest.mark.parametrize("of", ["recording", "reports"])
 def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, tmp_path):
     run = here("report", getattr(ignored, of), "-o", tmp_path / "report.pdf")

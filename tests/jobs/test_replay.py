@@ -123,12 +123,6 @@ def test_no_partial_file_is_left(once):
     assert not [p for p in (folder / "reports").iterdir() if p.name.startswith(".")]
 
 
-def test_figures_are_written(once):
-    names = {p.name for p in (once[0] / "reports").iterdir()}
-    for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate"):
-        assert {f"{figure}.png", f"{figure}.pdf"} <= names
-
-
 def test_the_number_of_workers_changes_no_number_and_no_identity(drive, once, tmp_path):
     outcome = run(drive, tmp_path, jobs=1)
     for table in TABLES:

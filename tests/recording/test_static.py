@@ -1,18 +1,11 @@
 """The words in a recording."""
 
-import json
 from dataclasses import replace
 
 from roadeval.recording import views
-from roadeval.recording.layout import guide_path
 from tests.recording.making import VARIANT, layout
 
 TOTALS = {"filtered": {"post": {"ERR": 0.25, "FPR": None, "FNR": 0.5, "pooled_ERR": 0.2}}}
-
-
-def test_the_overview_is_explained_with_the_verdict_first():
-    text = views.guide(layout(), "It helps.")
-    assert text.index("street") < text.index("It helps.") < text.index("Errors")
 
 
 def test_the_guide_names_the_variants_that_have_a_row_and_those_that_have_a_tab():
@@ -21,18 +14,6 @@ def test_the_guide_names_the_variants_that_have_a_row_and_those_that_have_a_tab(
     assert "the phases of first and second from" in text
     assert "Those of third and fourth have tabs of their own." in text
     assert "tabs of their own" not in views.guide(layout(variants=many[:2]))
-
-
-def test_a_row_s_header_has_the_rates_of_its_final_mask():
-    texts = {"summary": json.dumps({"totals": TOTALS})}
-    ((_, (header,)),) = [
-        each
-        for each in views.after_the_last_frame(layout(), texts)
-        if each[0] == guide_path("filtered")
-    ]
-    words = header.text.as_arrow_array().to_pylist()[0]
-    assert "ERR 25.00 %" in words
-    assert "FNR 50.00 %" in words
 
 
 def test_without_truth_the_words_say_that_nothing_is_scored():

@@ -6,7 +6,7 @@ from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.facts import DriveFacts, FrameAccount
-from tests.report.making import VARIANTS, a_pair, some_findings
+from tests.report.making import VARIANTS, some_findings
 from tests.report.sections.test_thresholds import findings as thresholded
 
 OVERLAP = {"F1": 0.81, "precision": 0.82, "IoU": 0.7}
@@ -18,29 +18,6 @@ def sections(findings):
 
 def headings(made):
     return [block.text for block in made.blocks if isinstance(block, Heading) and block.level == 1]
-
-
-def test_without_truth_there_are_masks_in_place_of_rates():
-    assert sections(some_findings(totals={}, overlap={})) == [
-        *("Summary", "Masks", "How to reproduce this")
-    ]
-
-
-def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
-    row = {"variant": "filtered", "region": "lit", "pixels": 1.0, "ERR": 0.1, "errors": 1.0}
-    findings = some_findings(
-        regions={("interior", name): row for name in VARIANTS},
-        error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
-        paired=[a_pair([-0.1], [-1])],
-    )
-    assert sections(findings) == [
-        "Summary",
-        "What the filter and the variants change",
-        "Where the errors are",
-        "Which stage broke it",
-        "The worst frames",
-        "How to reproduce this",
-    ]
 
 
 def test_a_page_has_the_sections_of_the_report():

@@ -145,14 +145,6 @@ def test_the_axes_of_two_rates_are_close_and_do_not_touch() -> None:
     assert 0.05 < gap < 0.2
 
 
-def test_the_title_names_the_drive() -> None:
-    for figure in (
-        error_rate("my_drive", rows_of(a_table(2))),
-        road_masks("my_drive", [an_example()]),
-    ):
-        assert "my_drive" in texts(figure)
-
-
 def test_the_masks_stand_below_the_title_and_within_the_figure() -> None:
     figure = drawn(masks_of([an_example()]))
     title = min(text.get_window_extent().y0 for text in figure.texts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -88,21 +88,10 @@ def inspect(
     if listed:
         _list(opened, worst, variant, as_json=json)
     else:
-        _show(opened, _Asked(drive, frame, worst, variant, screenshot))
+        _show(opened, drive, frame, worst, variant, file=screenshot)
     for warning in opened.warnings:
         messages.warning(warning)
     return ExitCode.DONE
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What is to be opened, and the file to draw it into."""
-
-    drive: str | None
-    frame: int | None
-    worst: int | None
-    variant: str | None
-    file: Path | None
 
 
 def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bool) -> None:
@@ -118,36 +107,43 @@ def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bo
         screen.show(opened.name, found, console.results())
 
 
-def _show(opened: Result, asked: _Asked) -> None:
-    """Open the viewer at a frame, or draw the frame into a file."""
+def _show(
+    opened: Result,
+    name: str | None,
+    frame: int | None,
+    rank: int | None,
+    variant: str | None,
+    *,
+    file: Path | None,
+) -> None:
+    """Open the viewer at a frame of a drive, by its number or rank, or draw it into a file."""
     from roadeval.jobs.results import inspect as job
     from roadeval.jobs.results.result import DriveResult
 
-    frame, drive, of, why = asked.frame, opened.drive, "", ""
+    drive, of, why = opened.drive, "", ""
     warnings: tuple[str, ...] = ()
     if opened.fleet:
         from roadeval.jobs.serve.replayed import recording_of
 
-        name = asked.drive
         if name is None:
-            worst = job.of_rank(opened, asked.worst or 1)
+            worst = job.of_rank(opened, rank or 1)
             name, frame = worst.drive, worst.frame
         with progress.watched() as watch:
             path, warnings = recording_of(opened.fleet, name, watch, messages.note)
         drive, of = DriveResult(path), f"{name}, "
         warnings = (*drive.warnings, *warnings)
-    elif asked.worst is not None:
-        frame = job.of_rank(opened, asked.worst, asked.variant).frame
+    elif rank is not None:
+        frame = job.of_rank(opened, rank, variant).frame
     assert drive is not None
-    if asked.file and frame is None and not of and (bad := job.worst(drive, asked.variant)):
-        is_worst = bad.frame == job.of_rank(opened, 1, asked.variant).frame
+    if file and frame is None and not of and (bad := job.worst(drive, variant)):
+        is_worst = bad.frame == job.of_rank(opened, 1, variant).frame
         which = "the worst" if is_worst else "the worst that has pictures"
         frame, why = bad.frame, f", {which} (--frame N or --worst K takes another)"
     if frame is not None and (sentence := job.without_pictures(drive, frame)):
         messages.warning(sentence)
-    shown = job.view(drive, frame, asked.file)
-    if asked.file:
-        console.emit(f"{asked.file}: {of}frame {shown}{why}")
+    shown = job.view(drive, frame, file)
+    if file:
+        console.emit(f"{file}: {of}frame {shown}{why}")
     for warning in warnings:
         messages.warning(warning)
 

@@ -1,8 +1,7 @@
 """Settings and versions: what all variants share is told once."""
 
-from roadeval.report.blocks import Command, Details, Table, Text
+from roadeval.report.blocks import Details, Table
 from roadeval.report.sections.provenance import flattened, section, settings_rows
-from roadeval.results.facts import LogFacts
 from tests.report.making import plain_rows, some_findings, the
 
 
@@ -29,13 +28,6 @@ def test_a_list_of_tables_is_told_setting_by_setting():
         flattened({"nets": [{"name": "a", "size": [4, 3]}, {"name": "b"}], "seeds": [1, 2]})
     )
     assert told == {"nets.0.name": "a", "nets.0.size": "4, 3", "nets.1.name": "b", "seeds": "1, 2"}
-
-
-def test_the_log_and_the_command_that_makes_the_results_again_are_given():
-    blocks = list(section(some_findings(log=LogFacts("street.mcap", "abc"))))
-    texts = [block.text for block in blocks if isinstance(block, Text)]
-    assert texts[:2] == ["Log: street.mcap", "Digest of its index and checksums: abc"]
-    assert the(Command, blocks).text == "repeat street.mcap"
 
 
 def test_seconds_are_told_in_milliseconds_beside_the_versions():

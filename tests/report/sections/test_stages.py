@@ -1,7 +1,7 @@
 """Which stage broke it: the numbers of each stage, and the parts of the error."""
 
 from roadeval.data.words import DASH, MINUS
-from roadeval.report.blocks import Table, Text
+from roadeval.report.blocks import Table
 from roadeval.report.sections.drive import stages, stages_table
 from tests.report.making import column, opened, plain_rows, some_findings, the
 
@@ -31,15 +31,6 @@ def test_the_parts_of_the_error_add_up_to_it():
         ["filtered", "30.00", f"{MINUS}10.00", f"{MINUS}10.00", "10.00"],
         ["unfiltered", "30.00", DASH, f"{MINUS}15.00", "15.00"],
     ]
-
-
-def test_the_parts_are_explained():
-    (note,) = (b.text for b in stages(some_findings(error_parts=PARTS)) if isinstance(b, Text))
-    assert note == (
-        "How ERR comes about, in percent of the pixels. svm: the mask that the last stage is "
-        "given, without the filter; filter: what filtered has more or less than unfiltered in "
-        "that mask; post: what post made of it."
-    )
 
 
 def test_an_oracle_shows_what_would_change():
