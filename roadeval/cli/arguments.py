@@ -18,10 +18,8 @@ if TYPE_CHECKING:
     from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
-    Path,
-    typer.Argument(
-        metavar="DRIVE", show_default=False, help="A camera log (MCAP).", readable=False
-    ),
+    str,
+    typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP), or its URL."),
 ]
 Result = Annotated[
     Path,

@@ -21,10 +21,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from http import HTTPStatus
+from os import PathLike
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from threading import Thread
-from typing import Any, Final, TypeVar
+from typing import IO, Any, Final, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 
 from roadeval.fleet.entry import (
@@ -41,7 +42,7 @@ from roadeval.fleet.entry import (
     scheme_of,
     shown,
 )
-from roadeval.logs import METADATA
+from roadeval.logs import METADATA, RemoteLog
 
 Answer = TypeVar("Answer")
 
@@ -55,18 +56,21 @@ _OPTIONS: Final = (
 )
 """Options of connections in the environment, as AWS_PROXY_URL. obstore itself ignores them where
 any option is given."""
+_PART: Final = 64 << 10
+"""Least bytes of a part that is read: a chunk's message indexes, and the next one's head."""
 _PATIENCE_S: Final = 0.2
 """Between two looks whether an answer has come."""
 _BLOCK: Final = 4 << 20
 """Bytes that are in memory at once."""
 _NAME: Final = 100
 """Letters of a name that a copy keeps."""
+NO_PARTS: Final = "ended early, and the server cannot continue it"
 _REASONS: Final = (
     (r"dns error", "no host of this name is known"),
     (r"ConnectionRefused|kind: Connect\b", "the host cannot be reached"),
     (r"BadScheme", "the endpoint is without TLS, which only AWS_ALLOW_HTTP=true allows"),
     (r"TimedOut|kind: Timeout|timed out", "the server stopped answering"),
-    (r"RangeNotSupported", "ended early, and the server cannot continue it"),
+    (r"RangeNotSupported", NO_PARTS),
     (r"Content-Length", "the server does not state its length"),
     (r"Precondition", "it changed while it was read"),
     (r"kind: (Body|Decode|Interrupted)|IncompleteMessage|UnexpectedEof", "ended early"),
@@ -103,6 +107,71 @@ def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
         except OSError as error:
             raise FleetError(_no_copy(source, error)) from error
         yield copy
+
+
+def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
+    """Return what `roadeval.logs.open_log` opens of a drive: a path, or the files behind a URL.
+
+    Of these only the parts that are needed are read. A `FleetError` if the URL cannot be one, or
+    nothing can be read there.
+    """
+    source = os.fspath(drive)
+    if not is_url(source):
+        return Path(source)
+    if scheme_of(source) == "file":
+        return file_of(source)
+    files = {Path(_file_name(each)): _opened(each) for each in _files(source)}
+    return RemoteLog(shown(source), Path(_file_name(source)), files)
+
+
+def _opened(url: str) -> IO[bytes]:
+    place = _place(url)
+    return cast("IO[bytes]", _Parts(place, *_facts(place)))
+
+
+class _Parts:
+    """A file elsewhere of which parts are read; a `FleetError` if it changes meanwhile."""
+
+    def __init__(self, place: _Place, size: int, tag: str | None) -> None:
+        self._place, self._size, self._at = place, size, 0
+        self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
+        self._begin, self._part = 0, b""
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        self._at = offset + (self._size if whence == os.SEEK_END else 0)
+        return self._at
+
+    def read(self, size: int) -> bytes:
+        begin, end = self._at, min(self._at + size, self._size)
+        if not self._begin <= begin <= end <= self._begin + len(self._part):
+            self._part = self._fetch(begin, min(max(end, begin + _PART), self._size))
+            self._begin = begin
+        self._at = max(begin, end)
+        return self._part[begin - self._begin : self._at - self._begin]
+
+    def _fetch(self, begin: int, end: int) -> bytes:
+        import obstore
+
+        if begin >= end:
+            return b""
+        options = {"range": (begin, end), **self._options}
+
+        def part() -> bytes:
+            return bytes(obstore.get(self._place.store, self._place.key, options=options).bytes())
+
+        try:
+            content = self._place.ask(part)
+        except FleetError as error:
+            if not str(error).endswith(NO_PARTS):
+                raise
+            place = shown(self._place.url)
+            raise FleetError(f"{place}: the server gives no parts of files: copy it here") from None
+        if len(content) != end - begin:
+            raise FleetError(f"{shown(self._place.url)}: ended early")
+        return content
+
+    def close(self) -> None:
+        self._part = b""
 
 
 def stamp(url: str) -> Mapping[str, tuple[int, str | None]]:

@@ -8,6 +8,7 @@ from typing import Final
 
 from roadeval import logs
 from roadeval.errors import RoadevalError
+from roadeval.fleet import readable
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.runtime.files import AnyPath, put, writing
@@ -45,7 +46,7 @@ def info(
     def step(done: int, total: int) -> None:
         on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
 
-    return logs.describe(drive, config, verify=verify, on_bytes=step)
+    return logs.describe(readable(drive), config, verify=verify, on_bytes=step)
 
 
 def pack(

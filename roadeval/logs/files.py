@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from roadeval.logs.container.file import Damage
 from roadeval.logs.container.records import MAGIC
@@ -142,11 +142,18 @@ def _check(path: Path) -> None:
     try:
         check_input(path)
         with path.open("rb") as file:
-            head = file.read(_HEAD)
-            file.seek(max(path.stat().st_size - len(MAGIC), 0))
-            tail = file.read(len(MAGIC))
+            check_content(path, file)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
+
+
+def check_content(path: Path, file: IO[bytes]) -> None:
+    """Raise a `LogError` for an open file that is no MCAP file, which says what it is instead."""
+    size = file.seek(0, 2)
+    file.seek(0)
+    head = file.read(_HEAD)
+    file.seek(max(size - len(MAGIC), 0))
+    tail = file.read(len(MAGIC))
     if not head:
         raise LogError(f"{path}: the file is empty")
     wrong = sum(ours != theirs for ours, theirs in zip(MAGIC, head, strict=False))

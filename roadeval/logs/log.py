@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import numpy as np
 
 from roadeval.images import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
 from roadeval.logs.errors import BadRecord, LogError
-from roadeval.logs.files import files_of
+from roadeval.logs.files import check_content, files_of
 from roadeval.logs.frames import TRUTH, FrameStream, Selection, settle
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
@@ -30,15 +30,32 @@ SMALL: Final = 50_000_000
 """Bytes of a log that is read whole where its checksums are of use: that takes a moment."""
 
 
-def open_log(path: str | Path, config: LogConfig | None = None) -> Log:
+@dataclass(frozen=True, slots=True, eq=False)
+class RemoteLog:
+    """A log that lies elsewhere, with its open files by their names."""
+
+    source: str
+    """Where it lies, as it may be shown."""
+    path: Path
+    """Its name."""
+    files: Mapping[Path, IO[bytes]]
+
+
+def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
     A `LogError` if it is missing, unreadable, or no MCAP log.
     """
-    path = Path(path)
-    files, damage = files_of(path)
+    if isinstance(path, RemoteLog):
+        opened, source, path = path.files, path.source, path.path
+        for name, file in opened.items():
+            check_content(name, file)
+        files, damage = list(opened), list[Damage]()
+    else:
+        opened, source, path = {}, str(path), Path(path)
+        files, damage = files_of(path)
     try:
-        return Log(path, files, damage, config or LogConfig())
+        return Log(path, files, damage, config or LogConfig(), opened=opened, source=source)
     except (BadRecord, OSError) as error:
         raise LogError(f"{path}: {error}") from error
 
@@ -48,8 +65,9 @@ class Log:
 
     Attributes
     ----------
-    path, name
-        Where it lies, and its name without folder and suffix, fit to be shown.
+    path, name, source
+        Where it lies, its name without folder and suffix, and where it lies as a URL if it lies
+        elsewhere; the latter two fit to be shown.
     config
         All that is asked of it.
     topics
@@ -59,10 +77,18 @@ class Log:
     """
 
     def __init__(
-        self, path: Path, files: Sequence[Path], damage: Sequence[Damage], config: LogConfig
+        self,
+        path: Path,
+        files: Sequence[Path],
+        damage: Sequence[Damage],
+        config: LogConfig,
+        *,
+        opened: Mapping[Path, IO[bytes]],
+        source: str,
     ) -> None:
-        self.path = path
-        self.name = visible(path.stem if path.is_file() else path.resolve().name)
+        self.path, self.source = path, source
+        is_file = path.is_file() or (bool(opened) and [*opened] == [path])
+        self.name = visible(path.stem if is_file else path.resolve().name)
         self.config = config
         self._limits = Limits(config.frames.max_pixels, config.frames.keep_corrupt)
         self._lost_files = damage
@@ -76,6 +102,7 @@ class Log:
                 lambda *channel: kind_of(*channel) is not TopicKind.OTHER,
                 message_stamp,
                 keep_corrupt=config.frames.keep_corrupt,
+                opened=opened.get(file),
             )
         ]
         self._readers = topic_readers(self._containers, self._limits, lacks_files=bool(damage))
@@ -308,7 +335,7 @@ class LogDescription:
 
 
 def describe(
-    path: str | Path,
+    path: str | Path | RemoteLog,
     config: LogConfig | None = None,
     *,
     verify: bool = False,
@@ -334,7 +361,7 @@ def describe(
         verified = verify or log.size <= SMALL
         sha256 = log.verify(on_bytes) if verified else None
         return LogDescription(
-            path=str(path),
+            path=log.source,
             bytes=log.size,
             start_ns=log.start_ns,
             end_ns=log.end_ns,

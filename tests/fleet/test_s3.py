@@ -7,7 +7,8 @@ from urllib.request import Request, urlopen
 import pytest
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet import find_drives, staged, stamp
+from roadeval.fleet import find_drives, readable, staged, stamp
+from roadeval.logs import open_log
 from tests.fixtures.elsewhere import split_bag, talker
 
 if not all(map(find_spec, ("moto", "flask"))):
@@ -147,3 +148,16 @@ def test_a_bucket_that_denies_access_is_an_error(filled, tmp_path, monkeypatch):
     url = "s3://bucket/top.mcap"
     with pytest.raises(RoadevalError, match="the server denies access"), staged(url, tmp_path):
         pytest.fail("the drive is there")
+
+
+def test_a_log_in_a_bucket_is_read_by_its_parts(filled, tmp_path):
+    (tmp_path / "top.mcap").write_bytes(LOG)
+    with (
+        open_log(tmp_path / "top.mcap") as disk,
+        open_log(readable("s3://bucket/top.mcap")) as log,
+        open_log(readable("s3://bucket/d/run/")) as bag,
+    ):
+        assert log.digest == disk.digest
+        assert log.topics == disk.topics
+        assert (log.name, bag.name) == ("top", "run")
+        assert sum(topic.count for topic in bag.topics) > 0

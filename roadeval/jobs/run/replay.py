@@ -12,6 +12,7 @@ from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.evaluation.comparison import Condition, Judgement
+from roadeval.fleet import readable
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
@@ -84,7 +85,8 @@ def replay(
     Parameters
     ----------
     drive
-        An MCAP file, or a rosbag2 folder of split files.
+        An MCAP file, or a rosbag2 folder of split files; or the URL of one, of which only the parts
+        that are needed are read.
     config
         Every option; the defaults of ``roadeval replay`` otherwise. See `roadeval.configure` and
         `roadeval.load_config`.
@@ -111,7 +113,7 @@ def replay(
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
-    with logs.open_log(drive, config) as log:
+    with logs.open_log(readable(drive), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)) as left:
             outcome = _written(log, config, to, on_progress, on_frame)

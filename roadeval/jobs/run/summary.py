@@ -66,7 +66,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         settings={each.name: each.pipeline.as_dict() for each in run.variants},
         methods=run.methods,
         versions=versions(),
-        log=LogFacts(str(run.log.path), run.log.digest),
+        log=LogFacts(run.log.source, run.log.digest),
         masks=_masks(run),
         tables=tables,
     )

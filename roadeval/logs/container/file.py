@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import numpy as np
 from mcap.records import Channel, Schema
@@ -73,13 +73,19 @@ class ChannelLog:
 
 
 def containers_in(
-    path: Path, wanted: Wanted, stamp_of: StampOf, *, keep_corrupt: bool = False
+    path: Path,
+    wanted: Wanted,
+    stamp_of: StampOf,
+    *,
+    keep_corrupt: bool = False,
+    opened: IO[bytes] | None = None,
 ) -> Iterator[Container]:
     """Open the log in a file, and those that follow it in the same file.
 
-    ``stamp_of`` is called only next to damage; ``keep_corrupt`` reads data whose checksum is wrong.
+    ``opened`` is the file where it lies elsewhere. ``stamp_of`` is called only next to damage;
+    ``keep_corrupt`` reads data whose checksum is wrong.
     """
-    rest = FileBytes(path.open("rb", buffering=BUFFER))
+    rest = FileBytes(opened or path.open("rb", buffering=BUFFER))
     while True:
         container = Container(path, rest, wanted, stamp_of, keep_corrupt=keep_corrupt)
         yield container
