@@ -34,7 +34,7 @@ from roadeval.report.blocks import (
 from roadeval.report.blocks import markdown as written
 from roadeval.report.chart import Chart
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import MEAN, ForestRow
+from roadeval.report.charts.standard import ForestRow
 from roadeval.report.sections.drives import Part, strata_table
 from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
@@ -381,9 +381,7 @@ def _plot(comparison: Comparison) -> Iterator[Block]:
         for each in comparison.changes
         if (each.result, each.variant, each.stage) == key
     )
-    mean = ForestRow(MEAN, None, over.mean, over.low, over.high)
-    drawn = charts.forest(rows, mean, f"change of {TESTED} of {own[0].variant}")
-    yield Figure(drawn, charts.caption(rows, mean))
+    yield charts.forest(rows, over, f"change of {TESTED} of {own[0].variant}")
 
 
 # --- Regions and frames ---------------------------------------------------------------------------

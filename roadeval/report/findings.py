@@ -35,15 +35,6 @@ class PairedComparison:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ErrorHeatmap:
-    """How often a pixel was a false positive and a false negative; NaN if never labelled."""
-
-    variant: str
-    fp: npt.NDArray[np.float64]
-    fn: npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class NotableFrame:
     """A frame worth looking at."""
 
@@ -108,8 +99,8 @@ class Findings:
     """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
     error_parts: Mapping[str, Mapping[str, float]]
     """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.score.causes`."""
-    heatmaps: Sequence[ErrorHeatmap]
-    """One a variant."""
+    heatmaps: Mapping[str, npt.NDArray[np.float64]]
+    """By variant ``(2, rows, columns)``, how often FP and FN are there; NaN if never labelled."""
     oracles: Sequence[Mapping[str, Any]]
     """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
     levels: Rows

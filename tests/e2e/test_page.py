@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 
 from roadeval import Recording
+from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import Chart, ChartKind, Look, Series
-from roadeval.report.charts.standard import ForestRow, caption, forest
+from roadeval.report.charts.standard import ForestRow, forest
 from roadeval.report.page.render import write_page
 from roadeval.results.fleet import FleetFolder
 from tests.e2e.commands import here
@@ -596,11 +597,10 @@ def test_of_many_drives_each_is_a_point_with_its_interval(many, watched):
 
 
 def test_of_many_drives_an_interval_beyond_the_chart_ends_in_an_arrow(tmp_path, watched):
-    mean = ForestRow("mean", None, 0.0, -0.01, 0.01)
+    mean = Difference(0.0, -0.01, 0.01, 1.0, 0.95, "drives", 71)
     rows = [ForestRow(f"d{n}", None, n / 1000, n / 1000 - 0.01, n / 1000 + 0.01) for n in range(69)]
     rows += [ForestRow("wide", None, 0.01, -0.5, 0.5), ForestRow("high", None, 0.02, 0.0, 0.6)]
-    (chart,) = forest(rows, mean, "change")
-    page = write_page(tmp_path / "page.html", a_document(Figure([chart], caption(rows, mean))))
+    page = write_page(tmp_path / "page.html", a_document(forest(rows, mean, "change")))
     tab = watched(page.as_uri()).tab
     beyond = int(re.search(r"(\d+) intervals reach beyond", tab.inner_text("figcaption"))[1])
     box = tab.locator(".area").bounding_box()

@@ -104,7 +104,7 @@ def some_findings(**changes):
         },
         "changes": {},
         "error_parts": {},
-        "heatmaps": [],
+        "heatmaps": {},
         "oracles": [],
         "levels": NO_LEVELS,
         "examples": [],

@@ -15,7 +15,6 @@ from roadeval.report import charts as folder
 from roadeval.report.chart import ChartKind, Look, legend, looks, looks_of_results
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import MEAN, NAMED, ForestRow, figures_over_drive
-from roadeval.report.findings import ErrorHeatmap
 from tests.evaluation.making import a_table, rows_of
 
 FILTERED, UNFILTERED = (colours.hex_of(c) for c in (colours.FILTERED, colours.UNFILTERED))
@@ -99,7 +98,7 @@ def test_a_region_has_its_error_rate_and_its_share_of_the_errors():
 
 
 def test_equal_shades_are_equal_shares_in_every_map():
-    maps = [ErrorHeatmap(n, np.array([[e]]), np.array([[e]])) for n, e in (("a", 0.1), ("b", 0.4))]
+    maps = {name: np.full((2, 1, 1), share) for name, share in (("a", 0.1), ("b", 0.4))}
     made = [*charts.heat(maps)]
     assert [each.title for each in made] == ["FP of a", "FN of a", "FP of b", "FN of b"]
     assert [each.top for each in made] == pytest.approx([40] * 4)
@@ -161,7 +160,7 @@ def test_each_result_of_another_drive_has_a_row():
 
 # --- Drive by drive -------------------------------------------------------------------------------
 
-OVER = ForestRow(MEAN, None, 0.01, -0.01, 0.03)
+OVER = Difference(0.01, -0.01, 0.03, 0.2, 0.95, "drives", 3)
 
 
 def drives(count, group=None):
@@ -169,7 +168,7 @@ def drives(count, group=None):
 
 
 def test_few_drives_have_a_row_each_and_below_them_the_mean():
-    (chart,) = charts.forest(drives(3), OVER, "change")
+    (chart,) = charts.forest(drives(3), OVER, "change").charts
     assert chart.kind is ChartKind.MARKS
     assert chart.names == ["drive_2", "drive_1", "drive_0", MEAN]
     assert chart.sums == 1
@@ -179,37 +178,37 @@ def test_few_drives_have_a_row_each_and_below_them_the_mean():
 
 def test_it_is_told_that_the_mean_has_no_interval():
     over = replace(OVER, low=None, high=None)
-    (chart,) = charts.forest(drives(3), over, "change")
-    assert np.isnan(chart.series[-1].low).all()
-    assert "The mean has no interval" in charts.caption(drives(3), over)
+    figure = charts.forest(drives(3), over, "change")
+    assert np.isnan(figure.charts[0].series[-1].low).all()
+    assert "The mean has no interval" in figure.caption
 
 
 def test_many_drives_are_points_from_the_worst_on_and_the_mean_lies_across():
     many = drives(NAMED + 1)
-    (chart,) = charts.forest(many, OVER, "change")
+    figure = charts.forest(many, OVER, "change")
+    (chart,) = figure.charts
     assert chart.kind is ChartKind.POINTS
     assert chart.names[0] == f"drive_{NAMED}"
     assert (chart.level.value, chart.level.low, chart.level.high) == (1.0, -1.0, 3.0)
     worse, better = chart.series
     assert (worse.x[0], worse.y[0], better.x) == (0, NAMED / 10, [NAMED])
-    told = charts.caption(many, OVER)
-    assert f"The worst: drive_{NAMED} (+6.00), drive_{NAMED - 1} (+5.90)" in told
-    assert "The best: drive_0 (0.00)" in told
+    assert f"The worst: drive_{NAMED} (+6.00), drive_{NAMED - 1} (+5.90)" in figure.caption
+    assert "The best: drive_0 (0.00)" in figure.caption
 
 
 def test_the_group_of_a_drive_stands_beside_its_name():
-    (chart,) = charts.forest(drives(1, "monday"), OVER, "change")
+    (chart,) = charts.forest(drives(1, "monday"), OVER, "change").charts
     assert chart.names[0] == "drive_0 (monday)"
 
 
 def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
     some = [ForestRow(str(n), None, 0.0, -0.01, 0.015) for n in range(20)]
     many = [*some, ForestRow("huge", None, 0.0, -0.9, 0.9)]
-    (chart,) = charts.forest(many, OVER, "change")
-    low, high = chart.y_range
+    figure = charts.forest(many, OVER, "change")
+    low, high = figure.charts[0].y_range
     assert -2 < low < -1
     assert 3 < high < 4
-    assert "1 interval reaches beyond the edge" in charts.caption(many, OVER)
+    assert "1 interval reaches beyond the edge" in figure.caption
 
 
 # --- Legends --------------------------------------------------------------------------------------

@@ -8,25 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 from roadeval.cli import console
 from roadeval.cli.screens import tables
-from roadeval.data.words import counted, first_of
+from roadeval.data.words import first_of
 from roadeval.jobs.results.report import collect_fleet
 from roadeval.report.blocks import Heading
-from roadeval.report.sections.drives import worst_table
-from roadeval.report.sections.summary import effects_table, fleet_rates_table
+from roadeval.report.sections.drives import drives_table
+from roadeval.report.sections.summary import drives_account, effects_table, fleet_rates_table
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from roadeval.jobs.run.fleet import FleetOutcome
 
-STATUSES: Final = {
-    SCORED: "scored",
-    DAMAGED: "scored but for what is lost",
-    UNSCORED: "without truth",
-    FAILED: "failed",
-}
+WORST: Final = 12
+"""Drives that the table of drives shows."""
 NAMED: Final = 5
 """Drives that failed for one reason, which are named."""
 
@@ -34,11 +29,8 @@ NAMED: Final = 5
 def show(outcome: FleetOutcome, out: Console) -> None:
     """Print how many drives there are, the verdict, the rates, and the effects over drives."""
     facts = outcome.facts
-    states = (
-        f"{outcome.counts[s]} {text}" for s, text in STATUSES.items() if outcome.counts.get(s)
-    )
     total = sum(outcome.counts.values())
-    out.print(f"{counted(total, 'drive')}: {', '.join(states)}; {facts.frames} frames evaluated")
+    out.print(drives_account(outcome.counts, facts.frames))
     if 0 < outcome.replayed < total:
         out.print(f"{total - outcome.replayed} of them were done before.")
     elif not outcome.replayed:
@@ -49,7 +41,9 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     if facts.rates:
         blocks = [fleet_rates_table(facts), *([effects_table(facts)] if facts.effects else [])]
         found = collect_fleet(FleetFolder(outcome.folder), worst=0)
-        tables.show([*blocks, Heading("Drives with the highest ERR"), worst_table(found)], out)
+        tables.show(
+            [*blocks, Heading("Drives with the highest ERR"), drives_table(found, WORST)], out
+        )
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
     listed = [f"roadeval inspect {outcome.folder} --list"] if facts.rates else []

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import Rows
 from roadeval.data.result import Cells
@@ -25,7 +26,6 @@ from roadeval.report.charts.standard import BEHIND, WRONG
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import (
     Commands,
-    ErrorHeatmap,
     Findings,
     FleetFindings,
     PairedComparison,
@@ -167,7 +167,7 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         },
         changes=_stage_changes(changes),
         error_parts=picker.error_parts(),
-        heatmaps=[_heatmap(name, heat.of_variant(name)) for name in heat.distinct("variant")],
+        heatmaps={name: _heatmap(heat.of_variant(name)) for name in heat.distinct("variant")},
         oracles=[*score.perfect_stages(result.table("oracles"), rows)],
         levels=result.table("probabilities"),
         examples=picker.examples(
@@ -233,13 +233,13 @@ def _stage_changes(changes: Rows) -> dict[tuple[str, str], tuple[float, float]]:
     return dict(zip(masks, zip(*shares, strict=True), strict=True))
 
 
-def _heatmap(variant: str, cells: Rows) -> ErrorHeatmap:
+def _heatmap(cells: Rows) -> npt.NDArray[np.float64]:
     """Spread the cells of a variant's heat map; NaN where none was labelled."""
     rows, columns = (cells[edge] // cells["side"][0] for edge in ("top", "left"))
     shares = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
     for share, outcome in zip(shares, ("FP", "FN"), strict=True):
         share[rows, columns] = cells[outcome] / cells["labelled"]
-    return ErrorHeatmap(variant, shares[0], shares[1])
+    return shares
 
 
 def _coverage(result: DriveResult, numbers: Sequence[int]) -> dict[str, dict[int, float]]:

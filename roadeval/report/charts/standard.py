@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import BASELINE, Rows, colours
 from roadeval.data.result import Cells
@@ -17,6 +18,7 @@ from roadeval.evaluation import score
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import LEVELS, Thresholds, merged
 from roadeval.evaluation.stats import Difference
+from roadeval.report.blocks import Figure
 from roadeval.report.chart import (
     BETTER,
     FAINT,
@@ -34,7 +36,6 @@ from roadeval.runtime.discovery import found_in
 
 if TYPE_CHECKING:
     from roadeval.evaluation.comparison import Change
-    from roadeval.report.findings import ErrorHeatmap
     from roadeval.results.facts import Totals
 
 
@@ -237,19 +238,19 @@ def regions(
     ]
 
 
-def heat(maps: Sequence[ErrorHeatmap]) -> Iterator[HeatMap]:
-    """Yield where each variant has false positives and negatives; equal shades are equal shares."""
-    fp, fn = (
-        100 * max([float(np.nan_to_num(share).max()) for share in shares] or [0.0])
-        for shares in ([each.fp for each in maps], [each.fn for each in maps])
-    )
-    for each in maps:
-        for outcome, shares, top, colour in (
-            ("FP", each.fp, fp, colours.FP),
-            ("FN", each.fn, fn, colours.FN),
-        ):
-            title = f"{outcome} of {each.variant}"
-            yield HeatMap(title, 100 * shares, max(top, LEAST_SHARE), colour, each.variant)
+def heat(maps: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[HeatMap]:
+    """Yield where each variant has false positives and negatives; equal shades are equal shares.
+
+    ``maps`` are those of `roadeval.report.findings.Findings.heatmaps`.
+    """
+    tops = [
+        max(LEAST_SHARE, 100 * max(float(np.nan_to_num(own[place]).max()) for own in maps.values()))
+        for place in (0, 1)
+    ]
+    for variant, own in maps.items():
+        outcomes = ("FP", "FN"), own, tops, (colours.FP, colours.FN)
+        for outcome, shares, top, colour in zip(*outcomes, strict=True):
+            yield HeatMap(f"{outcome} of {variant}", 100 * shares, top, colour, variant)
 
 
 def series(name: str, look: Look, x: Any, y: Any) -> Series:
@@ -340,7 +341,7 @@ def levels(finals: Sequence[Change]) -> list[Chart]:
 
 @dataclass(frozen=True, slots=True)
 class ForestRow:
-    """A drive's difference, or the mean over drives, as a fraction; lower is better."""
+    """A drive's difference as a fraction; lower is better."""
 
     name: str
     group: str | None
@@ -350,12 +351,12 @@ class ForestRow:
     """Ends of its interval, or None."""
 
 
-def forest(rows: Sequence[ForestRow], mean: ForestRow, label: str) -> list[Chart]:
-    """Return every drive's difference with its interval, the worst first, and their mean.
+def forest(rows: Sequence[ForestRow], over: Difference, label: str) -> Figure:
+    """Return every drive's difference with its interval, the worst first, and that over drives.
 
     Rows with names, as long as they are few; of more drives points side by side.
     """
-    ranked = _ranked(rows)
+    ranked = sorted(rows, key=lambda row: (-row.mean, row.name))
     names = [row.name if row.group is None else f"{row.name} ({row.group})" for row in ranked]
     drives = [
         _intervals(word, look, own, [(r.mean, r.low, r.high) for r in (ranked[p] for p in own)])
@@ -364,53 +365,35 @@ def forest(rows: Sequence[ForestRow], mean: ForestRow, label: str) -> list[Chart
             ("better", Look(BETTER), [p for p, row in enumerate(ranked) if row.mean <= 0]),
         )
     ]
-    ends = _limits(rows, mean)
+    mean, ends = (over.mean, over.low, over.high), _limits(rows, over)
     if len(rows) > NAMED:
-        level = Level(MEAN, *map(in_percent, (mean.mean, mean.low, mean.high)))
-        made = Chart(label, ChartKind.POINTS, drives, names, "pp", level=level)
-        return [replace(made, y_range=ends)]
-    look, told = Look(FAINT, mark="diamond"), [(mean.mean, mean.low, mean.high)]
-    drives.append(_intervals(MEAN, look, [len(ranked)], told))
-    made = Chart(label, ChartKind.MARKS, drives, [*names, MEAN], "pp", sums=1)
-    return [replace(made, y_range=ends)]
-
-
-def caption(rows: Sequence[ForestRow], mean: ForestRow) -> str:
-    """Return what a chart of drives shows."""
-    ranked = _ranked(rows)
-    if len(rows) <= NAMED:
-        told = ["A row a drive, with its own interval, the worst above."]
-        if any(row.group for row in rows):
-            told.append("In brackets the group that it belongs to.")
-    else:
+        level = Level(MEAN, *map(in_percent, mean))
+        chart = Chart(label, ChartKind.POINTS, drives, names, "pp", level=level, y_range=ends)
         told = ["A point a drive, with its own interval, the worst on the left."]
         for word, some in (("worst", ranked[:EXTREMES]), ("best", ranked[: -EXTREMES - 1 : -1])):
             named = (f"{row.name} ({points(row.mean)})" for row in some)
             told.append(f"The {word}: {', '.join(named)}.")
+    else:
+        drives.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [mean]))
+        marks = ChartKind.MARKS
+        chart = Chart(label, marks, drives, [*names, MEAN], "pp", sums=1, y_range=ends)
+        told = ["A row a drive, with its own interval, the worst above."]
+        if any(row.group for row in rows):
+            told.append("In brackets the group that it belongs to.")
     if missing := sum(row.low is None for row in rows):
         told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
-    if beyond := cut(rows, mean):
+    known = ((row.low, row.high) for row in rows if row.low is not None and row.high is not None)
+    if beyond := sum(100 * low < ends[0] or 100 * high > ends[1] for low, high in known):
         told.append(f"{beyond} interval{' reaches' if beyond == 1 else 's reach'} beyond the edge.")
-    if mean.low is None:
+    if over.low is None:
         told.append("The mean has no interval: too few drives or groups of drives.")
-    return " ".join(told)
+    return Figure([chart], " ".join(told))
 
 
-def cut(rows: Sequence[ForestRow], mean: ForestRow) -> int:
-    """Count the drives whose interval reaches beyond the chart."""
-    low, high = _limits(rows, mean)
-    ends = [(row.low, row.high) for row in rows if row.low is not None and row.high is not None]
-    return sum(100 * a < low or 100 * b > high for a, b in ends)
-
-
-def _ranked(rows: Sequence[ForestRow]) -> list[ForestRow]:
-    return sorted(rows, key=lambda row: (-row.mean, row.name))
-
-
-def _limits(rows: Sequence[ForestRow], mean: ForestRow) -> tuple[float, float]:
+def _limits(rows: Sequence[ForestRow], over: Difference) -> tuple[float, float]:
     """Return the ends of the axis in percentage points: every mean is seen, and most intervals."""
     wanted = [row.mean for row in rows] + [0.0, LEAST, -LEAST]
-    wanted += [end for end in (mean.low, mean.high) if end is not None]
+    wanted += [end for end in (over.low, over.high) if end is not None]
     for ends, share in (
         ([row.low for row in rows if row.low is not None], 1 - WIDEST),
         ([row.high for row in rows if row.high is not None], WIDEST),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
@@ -15,14 +16,13 @@ from roadeval.report.blocks import (
     Block,
     Cell,
     Details,
-    Figure,
     Heading,
     ImageGrid,
     LongTable,
     Table,
     Text,
 )
-from roadeval.report.charts.standard import MEAN, ForestRow, caption, forest
+from roadeval.report.charts.standard import ForestRow, forest
 from roadeval.report.findings import FleetFindings, Row, WorstPicture
 from roadeval.results.facts import OverDrives, StratumFacts
 from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
@@ -35,7 +35,8 @@ OF_ONE_REASON: Final = 4
 """Drives named for one reason."""
 TAGS: Final = 48
 """Letters of a drive's tags, at most."""
-_WORDS: Final = ("drive", "state", "tags", "group")
+_LIGHT: Final = {column.name for column in LIGHT}
+_WORDS: Final = ("drive", "state", "group", "tags")
 _SHOWN: Final = ("ERR", "FPR", "FNR")
 
 
@@ -48,9 +49,8 @@ def plots(findings: FleetFindings) -> Iterator[Block]:
     for place, (effect, title) in enumerate(chosen):
         plot = [*_plot(findings, effect)]
         yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
-    units = "Percent; the differences in percentage points. Tags as they were given."
-    worst_drives = [worst_table(findings), Text(units, "note")]
-    yield Details("Drives with the highest error rate", worst_drives)
+    units = Text("Percent; the differences in percentage points.", "note")
+    yield Details("Drives with the highest error rate", [drives_table(findings, NAMED), units])
 
 
 def plotted(findings: FleetFindings) -> Iterator[tuple[OverDrives, str]]:
@@ -78,33 +78,7 @@ def _plot(findings: FleetFindings, effect: OverDrives) -> Iterator[Block]:
         for row in findings.effects.get((effect.base, effect.variant), ())
     ]
     if rows:
-        mean = ForestRow(MEAN, None, effect.mean, effect.low, effect.high)
-        label = f"ERR of {effect.variant} minus that of {effect.base}"
-        yield Figure(forest(rows, mean, label), caption(rows, mean))
-
-
-def worst_table(findings: FleetFindings) -> Table:
-    """Tabulate the drives on which the first variant has the highest ERR."""
-    known = [row for row in findings.scores if row["ERR"] is not None]
-    rows = sorted(known, key=lambda row: (-row["ERR"], row["drive"]))[:NAMED]
-    differences, tags = _differences(findings), _tags(findings)
-    tagged = any(tags.values())
-    titles = ["drive", "frames", *_SHOWN, *(f"against {base}" for base in differences)]
-    return Table(
-        [*titles, *(["tags"] if tagged else [])],
-        [
-            [
-                findings.names[row["drive"]],
-                number(row["frames"]),
-                *_rates(row),
-                *(points(values.get(row["drive"])) for values in differences.values()),
-                *([tags[row["drive"]]] if tagged else []),
-            ]
-            for row in rows
-        ],
-        text_columns=(0, len(titles)) if tagged else (0,),
-        small=True,
-    )
+        yield forest(rows, effect, f"ERR of {effect.variant} minus that of {effect.base}")
 
 
 def _differences(findings: FleetFindings) -> dict[str, dict[str, float]]:
@@ -131,12 +105,6 @@ def _tags(findings: FleetFindings) -> dict[str, str]:
     }
 
 
-def _rates(score: Row | Mapping[str, float]) -> Iterator[Cell | str]:
-    for name in _SHOWN:
-        text = percent(score.get(name))
-        yield Cell(text, bold=True) if name == TESTED else text
-
-
 # --- All drives, on a page ------------------------------------------------------------------------
 
 
@@ -145,36 +113,56 @@ def table(findings: FleetFindings) -> Iterator[Block]:
     yield Heading("All drives")
     yield LongTable(drives_table(findings), "Find drives, tags, states:")
     yield Text(
-        "Rates of the first variant's final mask in percent; light as it was measured, from 0 to "
-        "1. A click on a title sorts.",
+        "Rates of the first variant's final mask in percent, differences in percentage points; "
+        "light as it was measured, from 0 to 1. A click on a title sorts.",
         "note",
     )
 
 
-def drives_table(findings: FleetFindings) -> Table:
-    """Tabulate every drive with its state, its rates, its light and its tags."""
+def drives_table(findings: FleetFindings, worst: int | None = None) -> Table:
+    """Tabulate every drive with its state, its rates, its light and its tags.
+
+    Or the ``worst`` ones, those with the highest ERR, without state, group and light.
+    """
     scores = {row["drive"]: row for row in findings.scores}
     differences = _differences(findings) if scores else {}
     tags, pages = _tags(findings), findings.pages()
-    light = [column.name for column in LIGHT]
+    columns: dict[str, Callable[[str], Cell | str]] = {
+        "drive": lambda drive: Cell(findings.names[drive], leads=pages.get(drive, "")),
+        "state": lambda drive: str(findings.drives[drive]["status"]),
+        "group": lambda drive: str(findings.drives[drive]["group"] or ""),
+        "tags": lambda drive: tags.get(drive, ""),
+        "frames": lambda drive: number(findings.drives[drive]["evaluated"] or 0),
+        **{rate: partial(_rate, scores, rate) for rate in _SHOWN},
+        **{f"against {base}": partial(_point, own) for base, own in differences.items()},
+        **{column.name: partial(_light, findings, column.name) for column in LIGHT},
+    }
+    shown = [*findings.drives]
+    if worst is not None:
+        known = (row for row in findings.scores if row[TESTED] is not None)
+        ranked = sorted(known, key=lambda row: (-row[TESTED], row["drive"]))
+        shown = [row["drive"] for row in ranked[:worst]]
+        unused = ["state", "group", *_LIGHT, *([] if any(tags.values()) else ["tags"])]
+        columns = {title: cell for title, cell in columns.items() if title not in unused}
     return Table(
-        [*_WORDS, "frames", *_SHOWN, *(f"against {base}, pp" for base in differences), *light],
-        [
-            [
-                Cell(findings.names[drive], leads=pages.get(drive, "")),
-                str(row["status"]),
-                tags.get(drive, ""),
-                str(row["group"] or ""),
-                number(row["evaluated"] or 0),
-                *_rates(scores.get(drive, {})),
-                *(points(values.get(drive)) for values in differences.values()),
-                *(DASH if row[name] is None else f"{row[name]:.2f}" for name in light),
-            ]
-            for drive, row in findings.drives.items()
-        ],
-        text_columns=range(len(_WORDS)),
+        [*columns],
+        [[cell(drive) for cell in columns.values()] for drive in shown],
+        text_columns=[place for place, title in enumerate(columns) if title in _WORDS],
         small=True,
     )
+
+
+def _rate(scores: Mapping[str, Row], rate: str, drive: str) -> Cell:
+    return Cell(percent(scores.get(drive, {}).get(rate)), bold=rate == TESTED)
+
+
+def _point(values: Mapping[str, float], drive: str) -> str:
+    return points(values.get(drive))
+
+
+def _light(findings: FleetFindings, name: str, drive: str) -> str:
+    value = findings.drives[drive][name]
+    return DASH if value is None else f"{value:.2f}"
 
 
 # --- What is missing ------------------------------------------------------------------------------
@@ -237,7 +225,6 @@ def _losses(findings: FleetFindings, rows: list[Row]) -> Table:
 
 STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""
-_LIGHT: Final = {column.name for column in LIGHT}
 
 
 def strata(findings: FleetFindings) -> Iterator[Block]:

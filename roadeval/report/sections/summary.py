@@ -19,7 +19,6 @@ from roadeval.report.blocks import (
     Table,
     TableOfContents,
     Text,
-    TwoColumns,
 )
 from roadeval.report.findings import Findings, FleetFindings, worse_than_baseline
 from roadeval.report.images import jpeg
@@ -38,7 +37,7 @@ PARTIAL: Final = (
 
 STATUSES: Final = {
     SCORED: "scored",
-    DAMAGED: "scored, but for what is lost of the log",
+    DAMAGED: "scored but for what is lost",
     UNSCORED: "without truth",
     FAILED: "failed",
 }
@@ -105,7 +104,8 @@ def _of_drives(findings: FleetFindings) -> Iterator[Block]:
             "count as one. Pooled: of all pixels together.",
             "note",
         )
-    yield TwoColumns([_statuses(facts)], [_beware(list(fleet_warnings(findings)))])
+    yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
+    yield _beware(list(fleet_warnings(findings)))
     yield TableOfContents()
 
 
@@ -344,7 +344,8 @@ def _legend(findings: Findings) -> str:
 # --- Accounts -------------------------------------------------------------------------------------
 
 
-def _statuses(facts: FleetFacts) -> Table:
-    rows = [[text, number(facts.counts.get(name, 0))] for name, text in STATUSES.items()]
-    rows.append(["all", number(len(facts.drives))])
-    return Table(["drives", "count"], rows, breaks=[len(STATUSES)], small=True)
+def drives_account(counts: Mapping[str, int], frames: int) -> str:
+    """Return how many drives there are, by their states, and how many frames were evaluated."""
+    states = (f"{number(counts[s])} {text}" for s, text in STATUSES.items() if counts.get(s))
+    drives = counted(sum(counts.values()), "drive")
+    return f"{drives}: {', '.join(states)}; {number(frames)} frames evaluated"
