@@ -6,8 +6,8 @@ python -m benchmarks.tables --measure   replays the drives and writes the number
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
 measures one drive, ``idd``, ``idd_features``, ``idd_filters``, ``synthetic_shadow``,
-``stage_times``, ``elsewhere``, ``taught`` or ``reach_weights``, and leaves the other numbers as
-they are.
+``stage_times``, ``elsewhere``, ``taught``, ``reach_weights`` or ``tuned``, and leaves the other
+numbers as they are.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from benchmarks.tables import (
     stage_times,
     synthetic_shadow,
     taught,
+    tuned,
 )
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
 from benchmarks.tables.measure import (
@@ -41,18 +42,21 @@ from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 
 ELSEWHERE = "elsewhere"
-ON_IDD: Mapping[str, Callable[[Sources, Path], Any]] = {
+TUNED = "tuned"
+WITH_A_PATH: Mapping[str, Callable[[Sources, Path], Any]] = {
     "idd": lambda _, folder: idd.measured(folder, SEEDS),
     "idd_features": lambda _, folder: idd.without_each_group(folder),
     "idd_filters": lambda _, folder: idd_filters.measured(folder),
     "taught": taught.measured,
     "reach_weights": reach_weights.measured,
+    TUNED: tuned.measured,
 }
+"""Of the folder of IDD Lite, or of a network."""
 WITHOUT_FILES = {
     "synthetic_shadow": synthetic_shadow.measured,
     "stage_times": stage_times.measured,
 }
-OTHERS = (*ON_IDD, *WITHOUT_FILES, ELSEWHERE)
+OTHERS = (*WITH_A_PATH, *WITHOUT_FILES, ELSEWHERE)
 
 
 def main() -> int:
@@ -84,10 +88,12 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
         if name in WITHOUT_FILES:
             _keep(rounded(WITHOUT_FILES[name]()), name)
             continue
-        if name in ON_IDD:
-            if options.idd is None:
-                sys.exit(f"{name}: name the folder idd20k_lite of {idd.SOURCE} (--idd)")
-            _keep(rounded(ON_IDD[name](sources, options.idd)), name)
+        if name in WITH_A_PATH:
+            flag = "net" if name == TUNED else "idd"
+            path = getattr(options, flag)
+            if path is None:
+                sys.exit(f"{name}: name what it is measured on by --{flag}, see --help")
+            _keep(rounded(WITH_A_PATH[name](sources, path)), name)
             continue
         if name == ELSEWHERE:
             for stranger in STRANGERS.values():
@@ -135,6 +141,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--camvid", type=Path, help=f"the folder CamVid of {SEGNET}")
     parser.add_argument("--comma10k", type=Path, help="a folder with its imgs and masks")
     parser.add_argument("--idd", type=Path, help=f"the folder idd20k_lite of {idd.SOURCE}")
+    parser.add_argument("--net", type=Path, help="an ONNX file with a road network")
     return parser.parse_args()
 
 

@@ -581,6 +581,29 @@ def weights(numbers: Numbers) -> str:
     )
 
 
+def tuned_network(numbers: Numbers) -> str:
+    """Return ERR of a network as it comes, with a trained threshold, and tuned."""
+    columns = {
+        "`robust`": "robust",
+        "network": "network",
+        "with the threshold of ten frames": "threshold",
+        "tuned on them": "tuned",
+    }
+    rows = (
+        [
+            DRIVES[name].title,
+            _percent(found["blind"]),
+            *(
+                _spread(found[key]) if len({*found[key]}) > 1 else _percent(found[key][0])
+                for key in columns.values()
+            ),
+            _interval(found["change"]),
+        ]
+        for name, found in numbers["tuned"]["drives"].items()
+    )
+    return _table(["ERR, %", "`blind`", *columns, "tuned minus `robust`, points"], rows)
+
+
 def flicker(numbers: Numbers) -> str:
     """Return how much of each mask changes from frame to frame."""
     drive = "camvid_0016E5_15hz"
@@ -619,6 +642,7 @@ BLOCKS: Final = {
     "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
     "taught": Block(taught_by, (f"{MEASURE} taught",)),
     "reach_weights": Block(weights, (f"{MEASURE} reach_weights",)),
+    "tuned": Block(tuned_network, (f"{MEASURE} tuned --net NETWORK.onnx",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }
 """By the names in the marks."""

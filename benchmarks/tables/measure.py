@@ -101,7 +101,7 @@ def of_others(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "ERR": [rounded(each["totals"][variant][FINAL_STAGE]["ERR"]) for each in found],
         "blind": rounded(first["totals"]["blind"][FINAL_STAGE]["ERR"]),
-        "against_blind": _change(first["against_blind"][variant]["ERR"]),
+        "against_blind": change_of(first["against_blind"][variant]["ERR"]),
     }
 
 
@@ -121,7 +121,7 @@ def kept(summary: Mapping[str, Any]) -> dict[str, Any]:
         "variants": variants,
         "blind": {rate: rounded(summary["totals"]["blind"][FINAL_STAGE][rate]) for rate in RATES},
         "against_blind": {
-            variant: _change(rates["ERR"]) for variant, rates in summary["against_blind"].items()
+            variant: change_of(rates["ERR"]) for variant, rates in summary["against_blind"].items()
         },
         "claims": summary["claims"],
         "truth_flicker": rounded(summary["beyond"][next(iter(variants))]["truth_flicker"]),
@@ -137,13 +137,14 @@ def kept(summary: Mapping[str, Any]) -> dict[str, Any]:
         }
     if own := summary["difference"].get(FINAL_STAGE):
         found["filter"] = {
-            rate: {**_change(own[rate]), "seeds": rounded(seeds["difference"][FINAL_STAGE][rate])}
+            rate: {**change_of(own[rate]), "seeds": rounded(seeds["difference"][FINAL_STAGE][rate])}
             for rate in RATES
         }
     return found
 
 
-def _change(change: Mapping[str, Any]) -> dict[str, Any]:
+def change_of(change: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is kept of a paired difference."""
     return {name: rounded(change[name]) for name in KEPT}
 
 
