@@ -1,5 +1,7 @@
 """A method that errs in the shade, and what ten frames of the drive make of it."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import cv2
 import numpy as np
 import pandas as pd
@@ -38,11 +40,11 @@ def picture(number):
     return np.clip(image + noise, 0, 255).astype(np.uint8), road.astype(np.uint8)
 
 
-def write(path, *, mirrored_truth_from=FRAMES, without=(), confidence=False):
+def write(path, *, mirrored_truth_from=FRAMES, without=(), first=0):
     """A drive with masks that are blind to shade; some frames may have another truth, or none."""
     with LogWriter(path) as writer:
         for number in range(FRAMES):
-            image, road = picture(number)
+            image, road = picture(first + number)
             truth = road if number < mirrored_truth_from else np.ascontiguousarray(road[::-1])
             stamp = (number + 1) * NS
             _, png = cv2.imencode(".png", image[..., ::-1])
@@ -250,6 +252,35 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
         told = "on other drives" if not adapt else "on other drives and this drive's first"
         assert any(told in each for each in outcome.warnings)
         assert err(rows, "mine_tuned") < err(rows, "mine") / 3
+
+
+@pytest.mark.parametrize("by", ["network", "masks"])
+def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path, by):
+    drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(4)]
+    fleet = {"folds": 2, "workers": 1}
+    if by == "network":
+        config = with_network(folder, fleet=fleet)
+    else:
+        masks = {"topics": {"masks": {"mine": "/net/mask"}}}
+        config = small(configure({**SMALL, **masks, "fleet": fleet}).with_tuned(["mine"]))
+    with ThreadPoolExecutor(1) as executor:
+        roadeval.replay_fleet(drives, tmp_path / "out", config, executor=executor)
+    scores = roadeval.Result(tmp_path / "out").scores.query("stage == 'post'")
+    errs = scores.pivot_table(index="drive", columns="variant", values="ERR")
+    assert len(errs) == 4
+    assert (errs.mine_tuned < errs.mine / 3).all()
+
+
+def test_a_function_of_ones_own_is_tuned(folder, tmp_path, monkeypatch):
+    (tmp_path / "redness.py").write_text(
+        "def road(image):\n    return image[..., 0].astype(float) / 255 > 0.41\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    chain = {"chain": ["redness:road", "post"], "post": {"operations": [], "region": "all"}}
+    config = small(configure({**SMALL, "variants": {"mine": chain}}).with_tuned(["mine"]))
+    _, rows = replay(folder / "drive.mcap", config, tmp_path / "r")
+    assert err(rows, "mine_tuned") < err(rows, "mine") / 5
+    assert err(rows, "mine_tuned", "road") > 0.2
 
 
 def test_a_model_is_refused_with_another_network(folder, tmp_path):
