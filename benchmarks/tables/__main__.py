@@ -52,6 +52,7 @@ WITH_A_PATH: Mapping[str, Callable[[Sources, Path], Any]] = {
     TUNED: tuned.measured,
 }
 """Of the folder of IDD Lite, or of a network."""
+WHAT = {"idd": f"folder idd20k_lite of {idd.SOURCE}", "net": "ONNX file of a road network"}
 WITHOUT_FILES = {
     "synthetic_shadow": synthetic_shadow.measured,
     "stage_times": stage_times.measured,
@@ -92,7 +93,7 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
             flag = "net" if name == TUNED else "idd"
             path = getattr(options, flag)
             if path is None:
-                sys.exit(f"{name}: name what it is measured on by --{flag}, see --help")
+                sys.exit(f"{name}: name the {WHAT[flag]} (--{flag})")
             _keep(rounded(WITH_A_PATH[name](sources, path)), name)
             continue
         if name == ELSEWHERE:
