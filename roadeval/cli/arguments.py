@@ -90,13 +90,8 @@ Conditions = Annotated[
 def configuration(given: Given) -> RunConfig:
     """Return the configuration of a preset, a file, and options on top of both.
 
-    Raises
-    ------
-    typer.BadParameter
-        For a value that can be seen to be wrong without opening a file, or options that do not go
-        together.
-    RoadevalError
-        For a file that cannot be used.
+    A `typer.BadParameter` for a value that can be seen to be wrong without opening a file, or
+    options that do not go together; a `RoadevalError` for a file that cannot be used.
     """
     from roadeval.config import ConfigError, DriveSettings, configure, network_variant, read_tables
 

@@ -58,12 +58,7 @@ def to_labels(data: File, limits: Limits) -> Array:
     """Decode a label image to ``(H, W)`` uint8 or uint16, or to ``(H, W, 3)`` if it has colours.
 
     Of a file with a palette these are the palette's indices, or its greys if it has only greys.
-    An image of three equal channels is a label image of one.
-
-    Raises
-    ------
-    DamagedImageError, ImageError
-        As `to_rgb`.
+    An image of three equal channels is a label image of one. Errors as of `to_rgb`.
     """
     format_ = _known_format(data)
     if format_.plugin is None:
@@ -84,10 +79,7 @@ def to_labels(data: File, limits: Limits) -> Array:
 def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
     """Return the ``(H, W)`` uint8 indices of a PNG file with a palette.
 
-    Raises
-    ------
-    DamagedImageError, ImageError
-        As `to_rgb`, and if it has no palette.
+    Errors as of `to_rgb`, and if it has no palette.
     """
     format_ = _known_format(data)
     image = None if format_.plugin is None else _loaded(data, format_, limits)
@@ -99,10 +91,7 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
 def to_png(data: File, limits: Limits) -> bytes:
     """Return an image file as a PNG file of the same pixels.
 
-    Raises
-    ------
-    DamagedImageError, ImageError
-        As `to_rgb`, and if PNG has no such pixels.
+    Errors as of `to_rgb`, and if PNG has no such pixels.
     """
     from PIL import Image
 

@@ -119,10 +119,7 @@ def settle(
 ) -> Selection:
     """Settle what to replay of a log's own topics.
 
-    Raises
-    ------
-    LogError
-        As `roadeval.logs.Log.select` says.
+    A `LogError` as `roadeval.logs.Log.select` says.
     """
     asked = config.topics
     image, why = choose_image(topics, asked.image)

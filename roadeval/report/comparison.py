@@ -79,16 +79,9 @@ def document(
 ) -> Document:
     """Return a comparison as a document.
 
-    Parameters
-    ----------
-    comparison
-        The comparison.
-    judgements
-        Of the limits that were set.
-    over_drive
-        The rates of the masks over the drive; may be none.
-    inspect
-        Returns the command that opens a frame of a result, by its label; None: no commands.
+    ``judgements`` are of the limits that were set, ``over_drive`` has the rates of the masks over
+    the drive, if any, and ``inspect`` returns the command that opens a frame of a result, by its
+    label; None: no commands.
     """
     labels = [each.label for each in comparison.results]
     return Document(
@@ -166,14 +159,7 @@ def overview(
 ) -> Iterator[Block]:
     """Yield what changed: limits, the verdict, settings, all rates, and where masks differ.
 
-    Parameters
-    ----------
-    comparison
-        The comparison.
-    judgements
-        Of the limits that were set.
-    most
-        Changed settings that are named, at most.
+    ``judgements`` are of the limits that were set; at most ``most`` changed settings are named.
     """
     yield from _limits(judgements)
     yield Text(told.verdict(comparison), "verdict")

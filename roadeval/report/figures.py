@@ -96,23 +96,10 @@ def write_figures(
 ) -> list[Path]:
     """Write every figure that has something to draw as PNG and PDF; return the files.
 
-    Parameters
-    ----------
-    folder
-        Where; made if it is not there.
-    drive
-        Its name, for titles.
-    windows
-        As ``windows.csv``, any number of variants; no row without truth.
-    examples
-        A few frames, for figure 2.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written to.
-    ReportError
-        If the system's folder for temporary files cannot be.
+    The folder is made if it is not there. ``windows`` are as in ``windows.csv``, of any number of
+    variants, without a row where there is no truth; ``examples`` are a few frames, for figure 2. An
+    OSError if the folder cannot be written to; a `ReportError` if the system's folder for temporary
+    files cannot be.
     """
     folder.mkdir(parents=True, exist_ok=True)
 

@@ -52,10 +52,7 @@ class ResultsWriter:
     After `finish` it takes its name at the end of the context. Left by an exception, or without
     `finish`, it removes what was begun; earlier results stay.
 
-    Raises
-    ------
-    ResultsError
-        From every method, if the folder cannot be written to.
+    Every method raises a `ResultsError` if the folder cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -222,12 +222,9 @@ def compare(
 ) -> Comparison:
     """Compare results with the first of them.
 
-    A `ComparisonError` if a result has nothing to compare, or two have no frame in common.
-
-    Parameters
-    ----------
-    across_variants
-        Whether each side is one variant of the same result, to be matched with another one.
+    ``across_variants`` says that each side is one variant of the same result, to be matched with
+    another one. A `ComparisonError` if a result has nothing to compare, or two have no frame in
+    common.
     """
     for side in sides:
         if not side.scored:

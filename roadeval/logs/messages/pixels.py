@@ -123,10 +123,7 @@ def check_size(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Non
 def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
     """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own.
 
-    Raises
-    ------
-    BadMessage, ImageError
-        If its encoding is unknown, or as `rows_of`.
+    A `BadMessage` or an `ImageError` if its encoding is unknown, or as of `rows_of`.
     """
     import cv2
 
@@ -166,10 +163,7 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
     Of an image with a palette these are the palette's indices, or its greys if it has only
     greys. An image of three equal channels is a label image of one.
 
-    Raises
-    ------
-    BadMessage
-        As `to_rgb`.
+    A `BadMessage` as `to_rgb`.
     """
     if isinstance(picture, RawPicture):
         layout = format_of(picture)

@@ -205,16 +205,9 @@ def regions(
 ) -> list[Chart]:
     """Return the error rate in each region, and its share of the errors beside that of pixels.
 
-    Parameters
-    ----------
-    found
-        See `roadeval.evaluation.score.by_region`.
-    variants
-        Those to draw, in order.
-    titles
-        The regions to draw, from top to bottom, with their titles.
-    behind
-        The frames with most wrong pixels, by variant, region and ``wrong``.
+    ``found`` is as `roadeval.evaluation.score.by_region` returns it. Drawn are the ``variants`` and
+    the regions of ``titles``, from top to bottom; ``behind`` has the frames with most wrong pixels,
+    by variant, region and ``wrong``.
     """
 
     def column(name: str, variant: str) -> list[float]:
@@ -439,14 +432,9 @@ def curves(levels: Rows, quoted: Masks, totals: Masks, behind: Behind = UNKNOWN)
     A mask has frames behind it, those with its highest ERR. A point of a curve has none: it adds up
     the pixels of all frames, and results hold no counts by level of each.
 
-    Parameters
-    ----------
-    levels
-        As ``probabilities.csv``.
-    quoted, totals
-        As ``curves`` and ``totals`` in ``summary.json``: of every variant.
-    behind
-        The frames with the highest rate, by variant, stage and rate.
+    ``levels`` are as in ``probabilities.csv``, ``quoted`` and ``totals`` as ``curves`` and
+    ``totals`` in ``summary.json``; ``behind`` has the frames with the highest rate, by variant,
+    stage and rate.
     """
     if not len(levels):
         return []

@@ -87,12 +87,7 @@ INSIDE: Final = Place()
 def page(document: Document, place: Place = INSIDE) -> bytes:
     """Return a document as a page in UTF-8; equal documents give equal bytes.
 
-    Parameters
-    ----------
-    document
-        What is shown.
-    place
-        Where it finds its parts; the caller writes those that are beside it.
+    ``place`` says where it finds its parts; the caller writes those that are beside it.
     """
     found = sections(document.blocks)
     return _rendered(
@@ -310,10 +305,7 @@ class Beside(StrEnum):
 def write_page(path: Path, document: Document, beside: Beside = Beside.NOTHING) -> Path:
     """Write a document as a page; what it needs is replaced with it, as one.
 
-    Raises
-    ------
-    ReportError
-        If it cannot be written.
+    A `ReportError` if it cannot be written.
     """
     files = dict(document.files() if beside is not Beside.NOTHING else {})
     files |= code() if beside is Beside.ALL else {}

@@ -72,10 +72,7 @@ def figure_as(kind: Literal["pdf", "png"], svg: bytes, dots_per_inch: int | None
 def write_file(path: Path, content: bytes) -> Path:
     """Write a report; an incomplete file never has its name.
 
-    Raises
-    ------
-    ReportError
-        If it cannot be written.
+    A `ReportError` if it cannot be written.
     """
     with writing(path, ReportError, "; choose another place"):
         put(path, content)
@@ -90,10 +87,7 @@ def _compiled(
 ) -> bytes:
     """Return what Typst makes of a template and the files that it reads, as a PDF or PNG.
 
-    Raises
-    ------
-    ReportError
-        If these files cannot be written into the system's folder for temporary ones.
+    A `ReportError` if these files cannot be written into the system's folder for temporary ones.
     """
     import typst
 

@@ -249,18 +249,10 @@ def browser(frames: FrameBrowser | None) -> Iterator[Block]:
 def strip(
     frame: NotableFrame, variants: Sequence[str], command: str = "", layers: int = SMALL_ON_PAGE
 ) -> Strip:
-    """Return a frame with its pictures.
+    """Return a frame with its pictures, which are encoded here.
 
-    Parameters
-    ----------
-    frame
-        The frame; its pictures are encoded here.
-    variants
-        All that were scored, for their colours.
-    command
-        Opens it in the viewer.
-    layers
-        Pixels across the pictures of layers, at most.
+    ``variants`` are all that were scored, for their colours; ``command`` opens the frame in the
+    viewer; the pictures of layers are at most ``layers`` pixels across.
     """
     return Strip(
         frame.frame,

@@ -111,10 +111,7 @@ def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
 def settings_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
     """Return name and value of the settings: one value where the variants agree, else each one's.
 
-    Parameters
-    ----------
-    settings
-        By variant, nested as in a TOML file.
+    The settings are by variant, nested as in a TOML file.
     """
     own = {variant: dict(flattened(each)) for variant, each in settings.items()}
     names = dict.fromkeys(name for each in own.values() for name in each)
