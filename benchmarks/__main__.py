@@ -170,7 +170,9 @@ def _plain(
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
         results = [
-            done.encoded for i, done in enumerate(process(run, Whole(), ignore)) if i in chosen
+            done.encoded
+            for i, (_, done) in enumerate(process([run], Whole(), ignore))
+            if i in chosen
         ]
     plain = PlainWay(frames, config)
     for name, parameters in run.model.parameters.items():

@@ -72,7 +72,7 @@ def hold(drive: Path, config: RunConfig) -> Held:
         run = prepare(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, done in enumerate(process(run, Whole(), ignore)):
+        for position, (_, done) in enumerate(process([run], Whole(), ignore)):
             result = done.encoded
             if position % max(1, -(-len(run.frames) * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
@@ -152,7 +152,7 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
-            for done in process(run, recorder, ignore):
+            for _, done in process([run], recorder, ignore):
                 recorder.write(done.encoded)
                 results.append(done.lines)
             recorder.finish({})

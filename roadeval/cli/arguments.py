@@ -14,6 +14,7 @@ from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
     from roadeval.config import RunConfig, Variant
+    from roadeval.jobs.results.result import Result as Result_
     from roadeval.logs import LogConfig
     from roadeval.report.pdf.typeset import Paper
 
@@ -110,7 +111,9 @@ def configuration(given: Given) -> RunConfig:
     variants += [network_variant(*each) for each in given.get("nets", ())]
     masks = {name: _masks(name, path) for name, path in given.get("masks", ())}
     with usage():
-        config = config.override({**_tables(given), "masks": masks}).with_variants(variants)
+        config = config.override(
+            {**_tables(given), **_cameras(given), "masks": masks}
+        ).with_variants(variants)
         config = config.with_tuned(given.get("tunes", ()))
         if "only" in given:
             config = config.override({"only": given["only"]})
@@ -133,7 +136,7 @@ def of_a_log(given: Given) -> LogConfig:
 
     with usage():
         _check_names(given, "topics.masks")
-        return log_config(_tables(given))
+        return log_config({**_tables(given), **_cameras(given)})
 
 
 def _variant(name: str, path: str | None) -> Variant:
@@ -157,6 +160,44 @@ def _masks(name: str, path: str) -> dict[str, Any]:
     with in_file(path):
         with_masks({}, {name: tables})
     return tables
+
+
+def _cameras(given: Given) -> dict[str, Any]:
+    """Return the topics of images as settings: of one camera, or of several."""
+    topics = given.get("cameras", ())
+    if len(topics) > 1:
+        return {"cameras": [{"image": topic} for topic in topics]}
+    own = _tables(given).get("topics", {})
+    return {"cameras": [], "topics": {**own, "image": topics[0]}} if topics else {}
+
+
+Camera = Annotated[
+    str | None,
+    typer.Option("--camera", metavar="NAME", help="Of several cameras: this one alone."),
+]
+
+
+def of_camera(result: Result_, name: str | None) -> Result_:
+    """Return the result of a camera of a rig, by its name or the part of it that differs.
+
+    The result itself where no camera is named. Wrong usage if there is none of that name.
+    """
+    if name is None:
+        return result
+    from roadeval.data.words import short_names
+
+    short = {own: camera for camera, own in short_names([*result.cameras]).items()}
+    camera = short.get(name, name)
+    if camera not in result.cameras:
+        known = ", ".join(short) or "only one"
+        raise typer.BadParameter(f"--camera {name}: the result has {known}")
+    return result.cameras[camera]
+
+
+def one_camera(given: Given) -> None:
+    """Refuse, as wrong usage, several cameras where a command looks at one."""
+    if len(given.get("cameras", ())) > 1:
+        raise typer.BadParameter("--image-topic: this command takes one camera at a time")
 
 
 def _check_names(given: Given, *options: str) -> None:

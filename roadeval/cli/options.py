@@ -63,6 +63,9 @@ class MethodSettings:
     only: Annotated[tuple[str, ...], Flag("--only", "NAME")] = ()
     """Run these variants alone, masks included. Where none of them learns anything, no frame is
     taken for training."""
+    cameras: Annotated[tuple[str, ...], Flag("--image-topic", "T", "Input")] = ()
+    """The camera's topic, where the log has several. Given again, each camera is replayed, scored
+    apart, and recorded beside the others."""
     drives: Annotated[Mapping[str, str], Flag("--drive", "DRIVE=FILE.toml", "Input")] = (
         dataclasses.field(default_factory=dict)
     )
@@ -223,7 +226,8 @@ def _maybe_named(names: str, text: str) -> tuple[str, str | None]:
 OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option.group)))
 """In the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
-    "trust_sources": "--trust-sources"
+    "topics.image": "--image-topic",
+    "trust_sources": "--trust-sources",
 }
 _MARKED: Final = re.compile(r"`([\w-]+(?:\.[\w-]+)*)`")
 

@@ -16,6 +16,10 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
     [frames]                # and [topics], [labels], [training], [evaluation], [output], [run]
     every = 2               # and [fleet]
 
+    [[cameras]]             # several cameras of a log: the topics of each
+    name = "front"
+    image = "/front/image"
+
     [[drives]]              # what differs in some drives: [topics], [labels], [frames], [masks.*]
     path = "monday/*.mcap"
     labels = { road = [3], ignore = [11] }
@@ -49,10 +53,10 @@ from roadeval.config.variants import (
     variants_of,
     with_masks,
 )
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.logs.settings import LabelSettings, LogConfig
+from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
@@ -118,6 +122,8 @@ class RunConfig(LogConfig):
     """Further variants."""
     only: tuple[str, ...] = ()
     """The variants that run, masks of other methods included; all of them by default."""
+    cameras: tuple[CameraSettings, ...] = ()
+    """The cameras of a rig; none where one camera is replayed."""
     drives: tuple[DriveSettings, ...] = ()
     """Settings of some drives alone; later ones override earlier ones."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
@@ -141,6 +147,7 @@ class RunConfig(LogConfig):
                 raise ConfigError(
                     f"`only` {name}: there is no such variant; choose {either(names)}"
                 )
+        self._check_cameras()
         try:
             RecordRule.parse(self.output.record)
         except RoadevalError as error:
@@ -157,11 +164,44 @@ class RunConfig(LogConfig):
                 "over the log's images"
             )
 
+    def _check_cameras(self) -> None:
+        names = [each.name or each.image for each in self.cameras]
+        for name in names:
+            if names.count(name) > 1:
+                raise ConfigError(f"camera {name}: given twice")
+            if name.strip("/").partition("/")[0] in RESERVED:
+                raise ConfigError(
+                    f"camera {name}: the name is reserved; give it another under [[cameras]]"
+                )
+        own = [name for name in ("image", "truth", "shadow", "masks") if getattr(self.topics, name)]
+        if names and own:
+            raise ConfigError(
+                f"`topics.{own[0]}`: which camera's? Name it under [[cameras]], beside its image"
+            )
+        if names and (self.truth.path or self.masks):
+            raise ConfigError(
+                "labels that do not lie in the log belong to one camera: replay that one alone"
+            )
+
     def variants(self) -> tuple[Variant, ...]:
         """Return the variants that are computed: the two by default, then the extra ones."""
         trained = (thresholded(name) for name, own in self.masks.items() if own.decide == TRAINED)
         every = (*variants_of(self.pipeline, self.extra), *trained)
         return tuple(each for each in every if not self.only or each.name in self.only)
+
+    def by_camera(self) -> dict[str, RunConfig]:
+        """Return the configuration of each camera by its name; of one camera alone by ``""``."""
+        if not self.cameras:
+            return {"": self}
+        fields = ("image", "truth", "shadow", "masks")
+        return {
+            each.name or each.image: replace(
+                self,
+                cameras=(),
+                topics=replace(self.topics, **{name: getattr(each, name) for name in fields}),
+            )
+            for each in self.cameras
+        }
 
     def pipelines(self) -> dict[str, Pipeline]:
         """Return the pipeline of every variant, by name."""
@@ -207,7 +247,11 @@ class RunConfig(LogConfig):
         """
         pipeline = pipeline_of(self.pipeline, tables)
         check_tables(
-            tables, ("chain", "only", *pipeline.settings, "variants", "masks", "drives", *SECTIONS)
+            tables,
+            (
+                *("chain", "only", *pipeline.settings, "variants", "masks", "cameras", "drives"),
+                *SECTIONS,
+            ),
         )
         only = tables.get("only", self.only)
         if not isinstance(only, list | tuple) or not all(isinstance(name, str) for name in only):
@@ -222,6 +266,8 @@ class RunConfig(LogConfig):
                 name: override(getattr(self, name), tables.get(name, {}), name) for name in SECTIONS
             },
         )
+        if "cameras" in tables:
+            config = replace(config, cameras=_cameras(tables["cameras"]))
         drives = tables.get("drives", ())
         if not isinstance(drives, list | tuple) or not all(isinstance(e, Mapping) for e in drives):
             raise ConfigError("drives must be tables, each under [[drives]]")
@@ -325,6 +371,7 @@ class RunConfig(LogConfig):
             },
             **({"masks": masks} if masks else {}),
             **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
+            **({"cameras": [*map(dataclasses.asdict, self.cameras)]} if self.cameras else {}),
             **({"drives": [drive.as_dict() for drive in self.drives]} if self.drives else {}),
         }
 
@@ -336,6 +383,15 @@ class RunConfig(LogConfig):
                 raise ConfigError(f"[variants.{name}] must be a table")
         made = [Variant.of(name, own, f"[variants.{name}]") for name, own in tables.items()]
         return self.with_variants(made).extra
+
+
+def _cameras(entries: Any) -> tuple[CameraSettings, ...]:
+    """Read ``[[cameras]]``, the topics of each; a `ConfigError` if one cannot be used."""
+    if not isinstance(entries, list | tuple) or not all(isinstance(e, Mapping) for e in entries):
+        raise ConfigError("cameras must be tables, each under [[cameras]]")
+    if missing := [each for each in entries if not each.get("image")]:
+        raise ConfigError(f"[[cameras]] {missing[0].get('name', '')}: image must name its topic")
+    return tuple(override(CameraSettings(each["image"]), each, "cameras") for each in entries)
 
 
 def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> RunConfig:
@@ -451,6 +507,8 @@ def config_toml(config: RunConfig | None = None) -> str:
         parts += _stages(variant.pipeline, f"variants.{variant.name}.")
     parts += [_table(f"masks.{name}", own) for name, own in config.masks.items()]
     parts += [_table(name, getattr(config, name)) for name in SECTIONS]
+    cameras = [_without_none(dataclasses.asdict(each)) for each in config.cameras]
+    parts += [tomlkit.dumps({"cameras": [each]}).strip() for each in cameras]
     parts += [tomlkit.dumps({"drives": [drive.as_dict()]}).strip() for drive in config.drives]
     return "\n\n".join(parts) + "\n"
 

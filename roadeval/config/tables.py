@@ -102,9 +102,9 @@ def _text(path: Path) -> str:
     check_input(path)
     if path.suffix != ".rrd":
         return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
-    from roadeval.recording import Recording
+    from roadeval.recording import run_toml_in
 
-    text = Recording(path).result("run")
+    text = run_toml_in(path)
     if text is None:
         raise ConfigError(
             f"{path}: holds no configuration, for the run was cut: replay the drive once with its "

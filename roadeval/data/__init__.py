@@ -6,6 +6,7 @@ log uses.
 """
 
 from roadeval.data.arrays import Packed, TruthBits, everywhere, ones, pack, unpack
+from roadeval.data.calibration import Calibration, Mounting
 from roadeval.data.frame import (
     IGNORE,
     NON_ROAD,
@@ -67,6 +68,7 @@ __all__ = [
     "ROAD_CLASSES",
     "TRUTH",
     "UNFILTERED",
+    "Calibration",
     "Change",
     "Counts",
     "Frame",
@@ -79,6 +81,7 @@ __all__ = [
     "LayerSpec",
     "Mask",
     "Moment",
+    "Mounting",
     "Output",
     "Packed",
     "Probability",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from itertools import takewhile
 from typing import Final, TypeGuard
 
 DASH: Final = "\N{EN DASH}"
@@ -102,6 +103,25 @@ def timestamp(stamp_ns: int) -> str:
         return f"{stamp_ns / 1e9:.3f} s"
     at = datetime.fromtimestamp(stamp_ns // 1_000_000_000, UTC)
     return f"{at:%Y-%m-%d %H:%M:%S}.{stamp_ns % 1_000_000_000 // 1_000_000:03d} UTC"
+
+
+def short_names(names: Sequence[str]) -> dict[str, str]:
+    """Return each of several paths without the parts at its ends that all of them share.
+
+    >>> short_names(["/front/image_raw", "/rear/image_raw"])
+    {'/front/image_raw': 'front', '/rear/image_raw': 'rear'}
+    """
+    parts = {name: name.strip("/").split("/") for name in names}
+
+    def shared(paths: Sequence[Sequence[str]]) -> int:
+        same = (len({*each}) == 1 for each in zip(*paths, strict=False))
+        return sum(1 for _ in takewhile(bool, same)) if len(paths) > 1 else 0
+
+    begin = shared([*parts.values()])
+    end = shared([own[:begin:-1] for own in parts.values()])
+    short = {name: "/".join(own[begin : len(own) - end]) for name, own in parts.items()}
+    clear = len({*short.values()}) == len(short) and ("" not in short.values() or len(short) == 1)
+    return short if clear else {name: name for name in names}
 
 
 def listing(words: Sequence[str]) -> str:

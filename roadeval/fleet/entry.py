@@ -7,7 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -15,8 +15,9 @@ from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
 from roadeval.config import DriveSettings
+from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
-from roadeval.logs import METADATA, files_of, natural
+from roadeval.logs import METADATA, CameraSettings, files_of, natural
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import public_url, visible, without_secrets
 
@@ -136,6 +137,12 @@ class DriveEntry:
         return shown(self.source)
 
     @property
+    def camera(self) -> str:
+        """The topic of its images, where that is given for it alone."""
+        topics = self.settings.tables.get("topics", {}) if self.settings else {}
+        return str(topics.get("image", ""))
+
+    @property
     def known(self) -> tuple[str | None, Mapping[str, str], Mapping[str, Any]]:
         """Group, tags and tables of settings that were given for it."""
         return self.group, self.tags, self.settings.tables if self.settings else {}
@@ -186,6 +193,38 @@ def is_log(name: str) -> bool:
 def is_heading(head: bytes) -> bool:
     """Return whether a file begins as rosbag2's `METADATA` does."""
     return BAG in head
+
+
+def cameras_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
+    """Name each of several cameras of a log: a drive's identity and name hold its camera's."""
+    cameras = defaultdict[str, list[str]](list)
+    for entry in entries:
+        cameras[entry.source].append(entry.camera)
+    found = []
+    for entry in entries:
+        if len(own := cameras[entry.source]) > 1:
+            short = short_names(own)[entry.camera] or "camera"
+            word = re.sub(r"[^A-Za-z0-9_-]+", "_", short).strip("_")
+            name = f"{entry.name} {visible(short)}"
+            entry = replace(entry, id=f"{entry.id}-{word}", name=name)  # noqa: PLW2901
+        found.append(entry)
+    return found
+
+
+def with_cameras(
+    entries: Iterable[DriveEntry], cameras: Sequence[CameraSettings]
+) -> list[DriveEntry]:
+    """Return an entry for each camera of each drive, with its topics as settings of it alone."""
+    found = []
+    for entry in entries:
+        tables = entry.settings.tables if entry.settings else {}
+        for camera in cameras:
+            given = {**vars(camera), "name": None}
+            known = {name: value for name, value in given.items() if value}
+            own = {**tables, "topics": {**tables.get("topics", {}), **known}}
+            settings = DriveSettings(entry.source, own, "[[cameras]]")
+            found.append(replace(entry, settings=settings))
+    return cameras_apart(found)
 
 
 def is_bag(folder: Path) -> bool:

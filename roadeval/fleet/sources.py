@@ -31,6 +31,7 @@ from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import (
     DriveEntry,
     FleetError,
+    cameras_apart,
     counts,
     entry_of,
     file_of,
@@ -60,18 +61,20 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     logs and rosbag2 folders, a glob, a URL, or a manifest (``.toml``, ``.csv``). A folder's drives
     come in natural order, without hidden and incomplete files. All files of a rosbag2 folder
     together mean the folder. A drive that is named twice counts once, with what a manifest says of
-    it. A `RoadevalError` if a word leads to no drive, a manifest cannot be used, or a drive is
-    described in two ways.
+    it, unless that names two of its cameras. A `RoadevalError` if a word leads to no drive, a
+    manifest cannot be used, or a drive is described in two ways.
     """
     found = [entry for word in words for entry in _named(word)]
     if not found:
         raise FleetError("no drive found: name logs, folders of logs, URLs or a manifest")
     entries = _once(_whole_bags(found))
-    times = Counter(entry.id for entry in entries)
-    return [
-        replace(entry, id=identity(entry.source, _LONGER)) if times[entry.id] > 1 else entry
-        for entry in entries
-    ]
+    times = Counter(each.id for each in {entry.source: entry for entry in entries}.values())
+    return cameras_apart(
+        [
+            replace(entry, id=identity(entry.source, _LONGER)) if times[entry.id] > 1 else entry
+            for entry in entries
+        ]
+    )
 
 
 def _named(word: str) -> Iterator[DriveEntry]:
@@ -189,9 +192,9 @@ def _in_bag(entry: DriveEntry, bags: set[Path]) -> DriveEntry:
 
 
 def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
-    kept: dict[str, DriveEntry] = {}
+    kept: dict[tuple[str, str], DriveEntry] = {}
     for entry in entries:
-        key = entry.source if entry.path is None else os.path.realpath(entry.path)
+        key = entry.source if entry.path is None else os.path.realpath(entry.path), entry.camera
         first = kept.get(key)
         if first is None or first.known == (None, {}, {}):
             kept[key] = entry if first is None or entry.known != first.known else first

@@ -16,10 +16,11 @@ if TYPE_CHECKING:
     from roadeval.logs.container.file import Damage
     from roadeval.logs.errors import FrameError, LogError
     from roadeval.logs.files import METADATA, files_of, natural
-    from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame, Selection
+    from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame, Selection, in_step
     from roadeval.logs.log import Log, LogDescription, RemoteLog, describe, open_log
     from roadeval.logs.messages.encoding import TopicKind
     from roadeval.logs.settings import (
+        CameraSettings,
         FrameSettings,
         LabelPlace,
         LabelSettings,

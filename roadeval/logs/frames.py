@@ -13,13 +13,14 @@ from typing import Final, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import ROAD, Frame, Rgb
+from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.images import Limits, format_of
 from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError, LogError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
 from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
+from roadeval.logs.topics.calibration import calibration_of
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, oddities
 from roadeval.logs.truth.meaning import Labels
@@ -53,6 +54,10 @@ class Selection:
     """Scale of the frames that are read, relative to the camera's; at most 1."""
     no_truth: str = ""
     """Why there is no road truth; empty if there is."""
+    calibration: Calibration | None = None
+    """The camera's, of the size in which it was logged."""
+    no_calibration: str = ""
+    """Why there is none although the log has some; else empty."""
 
     @property
     def image(self) -> TopicInfo:
@@ -97,6 +102,11 @@ class Selection:
             if name == SHADOW:
                 words = words.replace("road is", "shadow is")
             lines.append(f"{what}: {source.where} ({source.why}; {words})")
+        if known := self.calibration:
+            place = f", mounted in {known.mounting.parent}" if known.mounting else ""
+            lines.append(f"calibration: {known.topic} ({known.model or 'no distortion'}{place})")
+        elif self.no_calibration:
+            lines.append(f"no calibration: {self.no_calibration}")
         if self.no_truth:
             lines.append(f"no truth: {self.no_truth}")
         if (clock := self.camera.clock) is not Clock.STAMP:
@@ -148,7 +158,8 @@ def settle(
             reader = readers[chosen.name]
             labels[name] = in_log(reader, own, camera, reason, several=several)
     no_truth = "" if truth.topic else truth.why
-    return Selection(camera, why, labels, config.frames.scale, no_truth)
+    known = calibration_of(image, topics, readers)
+    return Selection(camera, why, labels, config.frames.scale, no_truth, *known)
 
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
@@ -342,6 +353,11 @@ class FrameStream:
     def __len__(self) -> int:
         return len(self._numbers)
 
+    @property
+    def log_times(self) -> npt.NDArray[np.int64]:
+        """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
+        return self._selection.camera.images.log_times[np.asarray(self._numbers, np.intp)]
+
     @cached_property
     def oddities(self) -> tuple[str, ...]:
         """What a user should know of the frames that were read; complete after the last decode."""
@@ -391,6 +407,17 @@ def at_scale(frame: Frame, scale: float) -> Frame:
         external={name: _nearest(mask, size) for name, mask in frame.external.items()},
         probabilities={name: _nearest(each, size) for name, each in frame.probabilities.items()},
     )
+
+
+def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
+    """Yield the frames of several cameras of a log by log time, each with its camera's place.
+
+    So the log is read once for all of them.
+    """
+    times = np.concatenate([each.log_times for each in streams])
+    whose = np.repeat(np.arange(len(streams)), [len(each) for each in streams])
+    for place in whose[np.argsort(times, kind="stable")].tolist():
+        yield place, next(streams[place])
 
 
 def _nearest(labels: Pixels, size: tuple[int, int]) -> Pixels:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -253,6 +254,12 @@ class Log:
         same = other.path.resolve() == self.path.resolve()
         name = "" if same else other.name
         return beside_log(reader, settings, camera, lambda: other.digest, name, several=several)
+
+    def for_camera(self, config: LogConfig) -> Log:
+        """Return the same open log with something else asked of it, as of another camera."""
+        other = copy(self)
+        other.config, other._with_truth = config, None
+        return other
 
     def frames(self, selection: Selection) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.

@@ -78,7 +78,7 @@ Color = tuple[Level, Level, Level]
 class TopicSettings:
     """Topics, where the log leaves a choice, and how label images are paired with images."""
 
-    image: Annotated[str | None, Flag("--image-topic", "T", "Input")] = None
+    image: str | None = None
     """The camera's topic, where the log has several."""
     truth: Annotated[str | None, Flag("--truth-topic", "T")] = None
     """The topic of label images that show where road is; an empty name takes none."""
@@ -95,6 +95,22 @@ class TopicSettings:
     period."""
     resize_truth: Annotated[bool, Flag("--resize-truth")] = False
     """Scale label images of another size to the image's (nearest pixel)."""
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """One of several cameras of a log: its topics, in place of those of ``[topics]``."""
+
+    image: Annotated[str, Len(min_length=1)]
+    """The topic of its images."""
+    name: str = ""
+    """What it is called in tables and in the recording. Default: its topic."""
+    truth: str | None = None
+    """The topic of its road truth."""
+    shadow: str | None = None
+    """The topic of its true shadow."""
+    masks: Mapping[str, str] = field(default_factory=dict)
+    """Topics of masks to score as one more variant, by the variant's name."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Final
@@ -18,6 +18,7 @@ from roadeval.data import (
     OUTCOMES,
     RESERVED,
     TRUTH,
+    Calibration,
     LabelClass,
     LayerKind,
     LayerSpec,
@@ -37,6 +38,9 @@ FORMAT: Final = 3
 FRAME: Final = "frame"
 STAMP: Final = "stamp"
 """Names of the timelines: the frame's number, and its header stamp in nanoseconds."""
+LOADER: Final = ("ros2_timestamp", "message_log_time")
+"""The names of two timelines in recordings that Rerun itself makes of MCAP files: the header stamp
+and the log time. With them both recordings are in step in one viewer."""
 
 CAMERA: Final = "/camera"
 TRUTH_PATH: Final = "/truth"
@@ -46,6 +50,8 @@ GUIDE: Final = "/results/guide"
 LAYOUT: Final = "/results/layout"
 SHOWN: Final = "/results/images"
 """The frames that have images, each with its header stamp."""
+CAMERAS: Final = "/results/cameras"
+"""Of a rig: where the entities of each camera begin, by its name, as JSON."""
 SUMMARY: Final = "summary"
 OVERVIEW: Final = "overview"
 """Names of two results: the content of ``summary.json``, and the same in Markdown."""
@@ -98,6 +104,8 @@ class Layout:
     """The first frame that can be evaluated, if known."""
     rate_hz: float | None = None
     """Frames a second, if known: the speed at which the viewer plays."""
+    calibration: Calibration | None = None
+    """Of images of this size, where it is known."""
     tables: Mapping[str, str] = field(default_factory=dict)
     """Header line of each table that grows with the frames, by the table's name."""
     properties: Mapping[str, str | int | float] = field(default_factory=dict)
@@ -150,6 +158,24 @@ SHADOW_TRUTH: Final = LayerSpec(
         IGNORED_CLASS,
     ),
 )
+
+
+def prefixes(cameras: Iterable[str]) -> dict[str, str]:
+    """Return the path below which all entities of each camera lie, by the cameras' names.
+
+    It is empty for a camera without a name, the only one of its drive.
+
+    >>> prefixes(["/left/image raw", "front", ""])
+    {'/left/image raw': '/left/image_raw', 'front': '/front', '': ''}
+    """
+    found: dict[str, str] = {}
+    for name in cameras:
+        path = re.sub(r"[^A-Za-z0-9_/-]", "_", name.strip("/"))
+        path = re.sub("/+", "/", f"/{path}") if path else ""
+        while path and path in found.values():
+            path += "_"
+        found[name] = path
+    return found
 
 
 def layer_path(variant: str, layer: str) -> str:

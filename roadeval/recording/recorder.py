@@ -21,12 +21,13 @@ from typing import Any, Final, Self
 import rerun as rr
 
 from roadeval.data import BASELINE, ERRORS, FINAL_STAGE, FrameResult, Health, LayerKind
+from roadeval.data.words import short_names
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
 from roadeval.recording import views
 from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
-from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
+from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import MessageSums, indexed_chunks
 from roadeval.runtime.files import NewFile, writing
 
@@ -35,9 +36,10 @@ from roadeval.runtime.files import NewFile, writing
 class EncodedFrame:
     """A frame ready to be written. Mappings are by entity path, ``tables`` by name."""
 
-    number: int
-    stamp_ns: int
+    when: When
     payloads: Mapping[str, bytes]
+    camera: str = ""
+    """Below which path all its entities lie, see `roadeval.recording.layout.prefixes`."""
     scalars: Mapping[str, float] = field(default_factory=dict)
     counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     states: Mapping[str, str] = field(default_factory=dict)
@@ -49,30 +51,43 @@ class EncodedFrame:
     worst_error: float = -1.0
 
 
+@dataclass(frozen=True, slots=True)
+class _Camera:
+    """A camera of the recording, perhaps its only one."""
+
+    prefix: str
+    """Begins the paths of its entities."""
+    layout: Layout
+    codecs: Mapping[str, Codec]
+    """By paths without the prefix."""
+
+
 def encode_frame(
     result: FrameResult,
     lines: Mapping[str, str],
-    layout: Layout,
-    codecs: Mapping[str, Codec],
+    camera: _Camera,
     kinds: Collection[LayerKind],
 ) -> EncodedFrame:
     """Encode a frame, with its lines of the tables by name.
 
     Of its images only layers of some ``kinds`` are encoded, and without any kind no image at all.
     """
+    layout, below, frame = camera.layout, camera.prefix, result.frame
     level = "WARN" if set(result.health.values()) - {Health.OK} else "INFO"
     lanes = {at.state_path(v.name): result.health.get(v.name, "") for v in layout.variants}
+    lanes = {at.ROLE: result.role.value, **lanes}
     counts = {
         at.scalar_path("counts", tally.variant, tally.stage): tally.counts
         for tally in result.tallies
     }
+    payloads = _payloads(result, camera.codecs, kinds) if kinds else ()
     return EncodedFrame(
-        number=result.frame.number,
-        stamp_ns=result.frame.stamp_ns,
-        payloads=dict(_payloads(result, codecs, kinds)) if kinds else {},
-        scalars=dict(_scalars(result, layout.rates)),
-        counts={path: (c.tp, c.tn, c.fp, c.fn, c.n) for path, c in counts.items()},
-        states={at.ROLE: result.role.value, **lanes},
+        (frame.number, frame.stamp_ns, frame.log_time_ns),
+        {below + path: payload for path, payload in payloads},
+        below,
+        scalars={below + path: number for path, number in _scalars(result, layout.rates)},
+        counts={below + path: (c.tp, c.tn, c.fp, c.fn, c.n) for path, c in counts.items()},
+        states={below + path: lane for path, lane in lanes.items()},
         notes=tuple((note, level) for note in result.notes),
         tables=lines,
         worst_error=worst_error(result),
@@ -128,10 +143,11 @@ class WorstFrames:
     def __init__(self, folder: Path, most: int) -> None:
         self._folder: Final = folder
         self._most: Final = most
-        self._heap: list[tuple[float, int]] = []
-        """ERR and minus the number of each frame, the least first."""
-        self._sizes: Final[dict[int, tuple[EncodedFrame, dict[str, int]]]] = {}
-        """By frame number: the frame without images, texts and numbers, and its images' sizes."""
+        self._heap: list[tuple[float, int, str]] = []
+        """ERR, minus the number and the camera of each frame, the least first."""
+        self._sizes: Final[dict[tuple[int, str], tuple[EncodedFrame, dict[str, int]]]] = {}
+        """By number and camera: the frame without images, texts and numbers, and its images'
+        sizes."""
 
     @property
     def least(self) -> float:
@@ -144,18 +160,18 @@ class WorstFrames:
 
         A `RecordingError` if they cannot be written.
         """
-        number = encoded.number
+        number, camera = encoded.when[0], encoded.camera
         with self._explained():
             self._folder.mkdir(exist_ok=True)
-            self._file(number).write_bytes(b"".join(encoded.payloads.values()))
+            self._file(number, camera).write_bytes(b"".join(encoded.payloads.values()))
         sizes = {path: len(payload) for path, payload in encoded.payloads.items()}
-        self._sizes[number] = EncodedFrame(number, encoded.stamp_ns, {}), sizes
-        heapq.heappush(self._heap, (encoded.worst_error, -number))
+        self._sizes[number, camera] = EncodedFrame(encoded.when, {}, camera), sizes
+        heapq.heappush(self._heap, (encoded.worst_error, -number, camera))
         if len(self._heap) > self._most:
-            dropped = -heapq.heappop(self._heap)[1]
-            del self._sizes[dropped]
+            _, minus, camera = heapq.heappop(self._heap)
+            del self._sizes[-minus, camera]
             with self._explained():
-                self._file(dropped).unlink()
+                self._file(-minus, camera).unlink()
 
     def take(self) -> Iterator[EncodedFrame]:
         """Yield the frames in order, with their images alone, and forget each.
@@ -165,21 +181,22 @@ class WorstFrames:
         # Not in place: a worker thread may look at the heap.
         self._heap = sorted(self._heap, key=itemgetter(1))
         while self._heap:
-            encoded = self._read(-self._heap[-1][1])
+            _, minus, camera = self._heap[-1]
+            encoded = self._read(-minus, camera)
             self._heap.pop()
             yield encoded
 
-    def _read(self, number: int) -> EncodedFrame:
-        bare, sizes = self._sizes[number]
-        with self._explained(), self._file(number).open("rb") as file:
+    def _read(self, number: int, camera: str) -> EncodedFrame:
+        bare, sizes = self._sizes[number, camera]
+        with self._explained(), self._file(number, camera).open("rb") as file:
             return replace(bare, payloads={path: file.read(size) for path, size in sizes.items()})
 
     def clear(self) -> None:
         """Remove the folder, as far as that is possible."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _file(self, number: int) -> Path:
-        return self._folder / str(number)
+    def _file(self, number: int, camera: str) -> Path:
+        return self._folder / f"{number}{camera.replace('/', '-')}"
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
@@ -193,6 +210,9 @@ class WorstFrames:
 
 
 ALL: Final = RecordRule()
+Texts = Mapping[str, Mapping[str, str]]
+"""Results by their name, of each camera by its name."""
+NO_TEXTS: Final[Texts] = {}
 UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them, which has no limit itself."""
 
@@ -214,24 +234,37 @@ class Recorder:
     A context manager: after `finish` the recording takes its name at the end. Left by an exception
     it closes the partial recording, which stays readable. ``path`` is the name of the complete
     recording: a file of that name is replaced at the end only. ``rule`` says which images are kept,
-    any but ``none``; those of ``worst:K`` wait on disk until the end.
+    any but ``none``; those of ``worst:K`` wait on disk until the end. Of a rig there is a layout
+    for each camera, by its name.
     """
 
-    def __init__(self, path: Path, layout: Layout, rule: RecordRule = ALL) -> None:
+    def __init__(
+        self, path: Path, layout: Layout | Mapping[str, Layout], rule: RecordRule = ALL
+    ) -> None:
         self.path = path
         self._file = NewFile(path, hidden=False)
         self.partial = self._file.partial
-        self._layout = layout
+        layouts = {"": layout} if isinstance(layout, Layout) else dict(layout)
+        self._cameras = {
+            name: _Camera(prefix, layouts[name], codecs_of(layouts[name]))
+            for name, prefix in at.prefixes(layouts).items()
+        }
+        self._layouts = {each.prefix: each.layout for each in self._cameras.values()}
         self._rule = rule
-        self._codecs = codecs_of(layout)
+        self._columns = {
+            each.prefix + path: codec.columns
+            for each in self._cameras.values()
+            for path, codec in each.codecs.items()
+        }
         self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
-        self._begun = self._finished = self._failed = self._foretold = False
+        self._begun: set[str] = set()
+        self._finished = self._failed = self._foretold = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._sums = MessageSums(self.partial)
-        self._shown: set[str] = set()
-        self._pictured: list[tuple[int, int]] = []
-        self._blank: EncodedFrame | None = None
+        self._shown: dict[str, set[str]] = {}
+        self._pictured: dict[str, list[tuple[int, int]]] = {}
+        self._blank: dict[str, EncodedFrame] = {}
         self._stream: rr.RecordingStream | None = None
         images = self.partial.with_name(f"{self.partial.name}-images")
         self._worst = WorstFrames(images, rule.number)
@@ -243,14 +276,23 @@ class Recorder:
                 self._file.begin()
                 self.check_disk_space()
                 self.partial.touch()
-            identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
+            layouts = self._layouts
+            texts = "".join(prefix + layout.to_json() for prefix, layout in layouts.items())
+            identity = hashlib.blake2b(texts.encode(), digest_size=16).hexdigest()
             stream = rr.RecordingStream(
                 at.APPLICATION, recording_id=identity, send_properties=False
             )
-            stream.save(self.partial, default_blueprint=views.arrange(self._layout))
-            stream.send_recording_name(self._layout.drive)
+            stream.save(self.partial, default_blueprint=views.arrange(layouts))
+            first, *_ = layouts.values()
+            stream.send_recording_name(first.drive)
             self._stream = stream
-            self._log_static(views.before_the_first_frame(self._layout, self._codecs))
+            if "" not in layouts:
+                self._log_static(views.of_a_rig(at.prefixes(self._cameras), first))
+            names = short_names([*self._cameras])
+            for name, each in self._cameras.items():
+                static = views.before_the_first_frame(each.layout, each.codecs, names[name])
+                kept = ((p, a) for p, a in static if not each.prefix or p != at.PROPERTIES)
+                self._log_static(kept, each.prefix)
         except BaseException:  # an interrupt, too; it holds no frame
             self._file.discard()
             raise
@@ -285,24 +327,26 @@ class Recorder:
                 kinds = ()
             case RuleKind.WORST if worst_error(result) < self._worst.least:
                 kinds = ()
-        return encode_frame(result, lines, self._layout, self._codecs, kinds)
+        own = self._cameras.get(result.frame.camera) or self._cameras[""]
+        return encode_frame(result, lines, own, kinds)
 
     def write(self, encoded: EncodedFrame) -> None:
         """Append a frame. Frames come in order, from one thread.
 
         A `RecordingError` if the disk is full.
         """
-        if not self._begun:
-            self._begun = True
-            self._log_static(views.timing_lines(encoded.scalars))
+        below = encoded.camera
+        if below not in self._begun:
+            self._begun.add(below)
+            paths = (path.removeprefix(below) for path in encoded.scalars)
+            self._log_static(views.timing_lines(paths), below)
         put_aside = encoded.payloads and self._rule.kind is RuleKind.WORST
         self._add_images(replace(encoded, payloads={}) if put_aside else encoded)
         self._add_texts(encoded)
-        when = encoded.number, encoded.stamp_ns
         for path, number in encoded.scalars.items():
-            self._numbers.add(path, columns.scalars, *when, number)
+            self._numbers.add(path, columns.scalars, encoded.when, number)
         for path, numbers in encoded.counts.items():
-            self._numbers.add(path, columns.counts, *when, numbers)
+            self._numbers.add(path, columns.counts, encoded.when, numbers)
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
         if put_aside:
@@ -337,15 +381,16 @@ class Recorder:
         interrupt it may be called again.
         """
         for encoded in self._worst.take():
-            if self._blank is not None and self._blank.number != encoded.number:
-                self._add_images(self._blank)
+            before = self._blank.get(encoded.camera)
+            if before is not None and before.when[0] != encoded.when[0]:
+                self._add_images(before)
             self._add_images(encoded)
-            number, stamp_ns = encoded.number + 1, encoded.stamp_ns + 1
-            self._blank = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
+            number, stamp_ns, log_time_ns = encoded.when
+            after = number + 1, stamp_ns + 1, log_time_ns + 1
+            self._blank[encoded.camera] = replace(encoded, when=after, payloads={})
             self._end_frame(self._rows)
-        if self._blank is not None:
-            self._add_images(self._blank)
-            self._blank = None
+        while self._blank:
+            self._add_images(self._blank.popitem()[1])
 
     def flush(self) -> None:
         """Write everything that waits, after the last frame, to free its memory.
@@ -361,16 +406,22 @@ class Recorder:
                 self._send(batcher, key)
         self._flush_stream()
 
-    def finish(self, results: Mapping[str, str]) -> None:
+    def finish(self, results: Mapping[str, str], *, by_camera: Texts = NO_TEXTS) -> None:
         """Add the results and close the file, which takes its name when the context ends.
 
         ``results`` are the texts to keep under ``/results`` by name, as ``summary`` (JSON) and
-        ``windows`` (CSV). A `RecordingError` if the file lacks what was written to it, as on a full
-        disk.
+        ``windows`` (CSV); of a rig there are those of each camera, too, by its name. A
+        `RecordingError` if the file lacks what was written to it, as on a full disk.
         """
-        self._log_static(views.after_the_last_frame(self._layout, results))
+        for name, each in self._cameras.items():
+            texts = by_camera[name] if name else results
+            self._log_static(views.after_the_last_frame(each.layout, texts), each.prefix)
+        if by_camera:
+            self._log_static(views.after_a_rig(results))
         self.flush()
-        self._log_static([(at.SHOWN, [rr.TextDocument(json.dumps(self._pictured))])])
+        for each in self._cameras.values():
+            pictured = json.dumps(self._pictured.get(each.prefix, []))
+            self._log_static([(at.SHOWN, [rr.TextDocument(pictured)])], each.prefix)
         self._flush_stream()
         self._log_static([(at.SUMS, [rr.TextDocument(self._sums.document())])])
         self._flush_stream()
@@ -397,31 +448,31 @@ class Recorder:
         return shutil.disk_usage(self.partial.parent)
 
     def _add_images(self, encoded: EncodedFrame) -> None:
-        when = encoded.number, encoded.stamp_ns
-        if at.CAMERA in encoded.payloads:
-            self._pictured.append(when)
+        when, below = encoded.when, encoded.camera
+        if below + at.CAMERA in encoded.payloads:
+            self._pictured.setdefault(below, []).append(when[:2])
         for path, payload in encoded.payloads.items():
-            self._rows.add(path, self._codecs[path].columns, *when, payload)
+            self._rows.add(path, self._columns[path], when, payload)
         # The viewer goes on showing an image until another comes, so a missing one is cleared.
-        for path in sorted(self._shown - encoded.payloads.keys()):
-            self._rows.add(path, self._codecs[path].columns, *when, NOTHING)
-        self._shown = set(encoded.payloads)
+        for path in sorted(self._shown.get(below, set()) - encoded.payloads.keys()):
+            self._rows.add(path, self._columns[path], when, NOTHING)
+        self._shown[below] = set(encoded.payloads)
 
     def _add_texts(self, encoded: EncodedFrame) -> None:
-        when = encoded.number, encoded.stamp_ns
+        when, below = encoded.when, encoded.camera
         for path, state in encoded.states.items():
             if self._states.get(path, "") != state:
-                self._rows.add(path, columns.states, *when, state)
+                self._rows.add(path, columns.states, when, state)
                 self._states[path] = state
         for note in encoded.notes:
-            self._rows.add(at.NOTES, columns.notes, *when, note)
+            self._rows.add(below + at.NOTES, columns.notes, when, note)
         for name, lines in encoded.tables.items():
-            self._rows.add(at.result_path(name), columns.texts, *when, lines)
+            self._rows.add(below + at.result_path(name), columns.texts, when, lines)
 
-    def _log_static(self, data: Iterable[tuple[str, list[Any]]]) -> None:
+    def _log_static(self, data: Iterable[tuple[str, list[Any]]], below: str = "") -> None:
         stream = self._open_stream()
         for path, archetypes in data:
-            stream.log(path, *archetypes, static=True, strict=True)
+            stream.log(below + path, *archetypes, static=True, strict=True)
 
     def _end_frame(self, batcher: Batcher) -> None:
         """Write the rows that have waited long enough."""
@@ -511,10 +562,12 @@ class NullRecorder:
     def flush(self) -> None:
         """Flush nothing."""
 
-    def finish(self, results: Mapping[str, str]) -> None:
+    def finish(self, results: Mapping[str, str], *, by_camera: Texts = NO_TEXTS) -> None:
         """Keep nothing."""
 
 
-def recorder_for(path: Path | None, layout: Layout, rule: RecordRule) -> Recorder | NullRecorder:
+def recorder_for(
+    path: Path | None, layout: Layout | Mapping[str, Layout], rule: RecordRule
+) -> Recorder | NullRecorder:
     """Return a recorder that keeps images by a rule; without a path one that does nothing."""
     return NullRecorder() if path is None else Recorder(path, layout, rule)

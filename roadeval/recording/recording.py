@@ -32,12 +32,36 @@ if TYPE_CHECKING:
 _CAMERA: Final = "EncodedImage:blob"
 
 
+def cameras_of(path: Path) -> tuple[str, ...]:
+    """Return the names of a recording's cameras; none where it has only one."""
+    return tuple(_cameras(RrdFile(path)))
+
+
+def rig_facts(path: Path) -> Facts | None:
+    """Return the facts of all cameras together; None if the run did not get there."""
+    text = RrdFile(path).document(at.result_path(at.SUMMARY))
+    return None if text is None else Facts.parse(text, path)
+
+
+def run_toml_in(path: Path) -> str | None:
+    """Return the configuration of a recording's run as TOML; None if the run ended before it."""
+    return RrdFile(path).document(at.result_path("run"))
+
+
+def _cameras(file: RrdFile) -> dict[str, str]:
+    """Return the path below which each camera's entities lie, by its name."""
+    with whole(file.path, at.CAMERAS):
+        found = read_json(file.document(at.CAMERAS) or "{}")
+        return {str(name): str(prefix) for name, prefix in found.items()}
+
+
 class Recording:
     """A recording on disk, the ``.rrd`` file that a replay wrote.
 
     A partial one, of a run that was interrupted or killed, is read as far as it goes: then
     ``complete`` is False, and ``summary`` and ``windows`` may be empty. A `RecordingError` if it is
-    no recording by this program, or of another format.
+    no recording by this program, or of another format, or one of several cameras of which
+    ``camera`` names none.
 
     Examples
     --------
@@ -48,11 +72,17 @@ class Recording:
     (48, 64)
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(self, path: str | PathLike[str], camera: str = "") -> None:
         self.path = Path(path)
         self._file = RrdFile(self.path)
         with whole(self.path, at.PROPERTIES):
             form = int(self._file.static(at.PROPERTIES, "format") or 0)
+        cameras = _cameras(self._file)
+        if cameras and camera not in cameras:
+            raise RecordingError(
+                f"{self.path}: a recording of several cameras; name one of {', '.join(cameras)}"
+            )
+        self._file.below = cameras.get(camera, "")
         text = self._file.document(at.LAYOUT)
         if text is None:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")

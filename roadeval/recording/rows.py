@@ -18,8 +18,10 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
 
-from roadeval.recording.layout import COUNTS, FRAME, MOST_WAITING, STAMP
+from roadeval.recording.layout import COUNTS, FRAME, LOADER, MOST_WAITING, STAMP
 
+When = tuple[int, int, int]
+"""A frame's number, header stamp and log time, the times in nanoseconds."""
 Columns = Callable[[list[Any]], Any]
 """Makes the viewer's component columns of one value a row."""
 Key = tuple[str, Columns]
@@ -66,23 +68,23 @@ class PendingRows:
     def __init__(self, path: str, columns: Columns) -> None:
         self._path = path
         self._columns = columns
-        self._frames: list[int] = []
-        self._stamps: list[int] = []
+        self._times: list[When] = []
         self._values: list[Any] = []
         self.size = 0
 
-    def add(self, frame: int, stamp_ns: int, value: Any) -> None:
-        """Append a row, perhaps with `NOTHING`, at this frame number and header stamp."""
-        self._frames.append(frame)
-        self._stamps.append(stamp_ns)
+    def add(self, when: When, value: Any) -> None:
+        """Append a row of a frame, perhaps with `NOTHING`."""
+        self._times.append(when)
         self._values.append(value)
         self.size += _size(value)
 
     def chunk(self) -> Chunk:
         """Return all rows as one chunk."""
+        frames, stamps, logged = zip(*self._times, strict=True)
+        named = zip((STAMP, *LOADER), (stamps, stamps, logged), strict=True)
         times = [
-            rr.TimeColumn(FRAME, sequence=self._frames),
-            rr.TimeColumn(STAMP, timestamp=np.array(self._stamps, "datetime64[ns]")),
+            rr.TimeColumn(FRAME, sequence=frames),
+            *(rr.TimeColumn(n, timestamp=np.array(own, "datetime64[ns]")) for n, own in named),
         ]
         values = [value for value in self._values if value is not NOTHING]
         columns = self._columns(values)
@@ -99,12 +101,12 @@ class Batcher:
         self._pending: dict[Key, PendingRows] = {}
         self._frames = self._due = 0
 
-    def add(self, path: str, columns: Columns, frame: int, stamp_ns: int, value: Any) -> None:
+    def add(self, path: str, columns: Columns, when: When, value: Any) -> None:
         """Append a row of this kind to the entity at ``path``."""
         rows = self._pending.get((path, columns))
         if rows is None:
             rows = self._pending[path, columns] = PendingRows(path, columns)
-        rows.add(frame, stamp_ns, value)
+        rows.add(when, value)
 
     @property
     def size(self) -> int:

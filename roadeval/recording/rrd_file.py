@@ -96,6 +96,8 @@ class RrdFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.below = ""
+        """The path below which all entities are looked for."""
         self._reader, self._entry = _open(path)
         self._store = _store(self._reader, self._entry)
         with whole(path, "its index"):
@@ -118,6 +120,7 @@ class RrdFile:
 
         A `DamagedError` if they are not what was written.
         """
+        path = self.below + path
         if self._places:
             found = [each for each in self._places.get(path, ()) if each.static == static]
             yield from self._at(path, component, found)
@@ -138,6 +141,7 @@ class RrdFile:
         """
         if not self._places:
             return Span(), self.batches(path, component, static=False)
+        path = self.below + path
         places = [each for each in self._places.get(path, ()) if not each.static]
         here = [each for each in places if each.span.holds(frame)]
         if not here:

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import cycle
 from typing import Any, Final
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
@@ -22,6 +23,7 @@ from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
     UNFILTERED,
+    Calibration,
     Health,
     LayerKind,
     LayerSpec,
@@ -30,7 +32,7 @@ from roadeval.data import (
     colours,
 )
 from roadeval.data.colours import Colour
-from roadeval.data.words import percent
+from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
@@ -50,6 +52,8 @@ _LEAST_PICTURE: Final = 200
 
 _ROWS: Final = 2
 """Most variants that have a row: more would leave every picture too small to read."""
+_ABREAST: Final = 3
+"""Cameras side by side."""
 _OUTCOMES: Final = 4
 """Most variants whose errors are at the top."""
 
@@ -57,8 +61,75 @@ Cell = tuple[LayerSpec, ...]
 """Layers that share a picture."""
 
 
-def arrange(layout: Layout) -> rrb.Blueprint:
-    """Return the arrangement of a recording's views."""
+def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
+    """Return the arrangement of a recording's views.
+
+    ``layouts`` are those of its cameras by the path below which each one's entities lie; of a
+    drive with one camera, by an empty path.
+    """
+    if "" in layouts:
+        tabs = _tabs(layouts[""])
+    else:
+        tabs = [_all_cameras(layouts)]
+        names = short_names([*layouts])
+        for prefix, each in layouts.items():
+            tabs.append(rrb.Tabs(*_below(prefix, _tabs(each)), active_tab=0, name=names[prefix]))
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        # Opens at the last frame: the first ones may be training frames, whose error maps are
+        # empty, and a blueprint cannot name a frame to open at.
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=at.FRAME if "" in layouts else at.STAMP,
+            play_state="following",
+            fps=next(iter(layouts.values())).rate_hz,
+        ),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _below(prefix: str, parts: Iterable[BlueprintPart]) -> list[BlueprintPart]:
+    """Return views and containers that show the entities below a path, as if they lay at the top.
+
+    The parts are changed.
+    """
+    made = []
+    for part in parts:
+        if isinstance(part, rrb.View):
+            part.origin = prefix + (part.origin if part.origin != "/" else "")
+            part.contents = [prefix + path for path in part.contents]
+        else:
+            _below(prefix, part.contents)
+        made.append(part)
+    return made
+
+
+def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
+    """Return the first tab of a rig: each camera with its first variant's errors, and curves."""
+    names, pictures = short_names([*layouts]), []
+    for prefix, layout in layouts.items():
+        view = outcome(layout, layout.variants[0])
+        view.name = f"{names[prefix]}: {view.name}"
+        pictures += _below(prefix, [view])
+    columns = min(len(pictures), _ABREAST)
+    finals = [
+        (prefix, variant.name, variant.stages[-1])
+        for prefix, layout in layouts.items()
+        for variant in layout.variants[:_ROWS]
+        if layout.has_truth
+    ]
+    paths = [p + at.scalar_path("metrics", v, stage, "ERR") for p, v, stage in finals]
+    curves = [plot("ERR as a fraction, by camera", paths)] if paths else []
+    below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
+    grid = rrb.Grid(*pictures, grid_columns=columns)
+    return rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras")
+
+
+def _tabs(layout: Layout) -> list[BlueprintPart]:
+    """Return the views of a camera, a tab each."""
     tabs = [overview(layout), *(_every_layer(layout, v) for v in layout.variants)]
     if layout.has_truth:
         plots = []
@@ -76,18 +147,7 @@ def arrange(layout: Layout) -> rrb.Blueprint:
     )
     texts = (document(at.result_path(name), title) for name, title in results)
     tabs.append(rrb.Horizontal(*texts, name="Results"))
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        # Opens at the last frame: the first ones may be training frames, whose error maps are
-        # empty, and a blueprint cannot name a frame to open at.
-        rrb.TimePanel(
-            state="collapsed", timeline=at.FRAME, play_state="following", fps=layout.rate_hz
-        ),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return tabs
 
 
 def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
@@ -299,10 +359,14 @@ _HANDLING: Final = """\
 """
 
 
-def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> StaticData:
-    """Yield what is known before the first frame."""
+def before_the_first_frame(
+    layout: Layout, codecs: Mapping[str, Codec], camera: str = ""
+) -> StaticData:
+    """Yield what is known before the first frame; ``camera`` is its short name in a rig."""
     for path, codec in codecs.items():
         yield path, list(codec.style())
+    if layout.calibration:
+        yield at.CAMERA, list(_lens(layout.calibration))
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
     yield at.GUIDE, [_markdown(guide(layout))]
     for variant in layout.variants:
@@ -315,18 +379,66 @@ def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> Stati
     for path, states in lanes.items():
         colours = [_STATES[state] for state in states]
         yield path, [rr.StateConfiguration(values=states, colors=colours)]
-    yield from _lines(layout)
+    yield from _lines(layout, f"{camera} " if camera else "")
 
 
-def _lines(layout: Layout) -> StaticData:
-    """Yield names and colours of the graphs of rates and counts."""
+def _lens(known: Calibration) -> Iterator[Any]:
+    """Yield the camera's pinhole, and its place where that is known.
+
+    By frames with names, as Rerun's own loader of MCAP files gives them: a pinhole of the entity
+    itself would take its pictures out of every two-dimensional view.
+    """
+    frame = known.frame_id or at.CAMERA.strip("/")
+    yield rr.Pinhole(
+        image_from_camera=np.array(known.matrix).reshape(3, 3),
+        resolution=[known.width, known.height],
+        child_frame=f"{frame}_image_plane",
+        parent_frame=frame,
+    )
+    if (mounting := known.mounting) is not None:
+        yield rr.Transform3D(
+            translation=mounting.translation,
+            quaternion=mounting.rotation,
+            child_frame=frame,
+            parent_frame=mounting.parent,
+        )
+
+
+def of_a_rig(prefixes: Mapping[str, str], first: Layout) -> StaticData:
+    """Yield what is known of several cameras before the first frame.
+
+    ``prefixes`` are the paths below which their entities lie; ``first`` is one camera's layout.
+    """
+    own = {n: v for n, v in first.properties.items() if n not in ("image_topic", "truth_topic")}
+    yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **own, cameras=list(prefixes))]
+    yield at.CAMERAS, [rr.TextDocument(json.dumps(prefixes))]
+    yield at.GUIDE, [_markdown(_rig_guide(first.drive, prefixes))]
+
+
+def after_a_rig(texts: Mapping[str, str]) -> StaticData:
+    """Yield what is known of several cameras after the last frame."""
+    summary = json.loads(texts[at.SUMMARY])
+    drive, cameras = summary["drive"]["name"], summary["cameras"]
+    yield at.GUIDE, [_markdown(_rig_guide(drive, cameras, summary["verdict"]))]
+    for name, text in texts.items():
+        yield at.result_path(name), [rr.TextDocument(text)]
+
+
+def _rig_guide(drive: str, cameras: Iterable[str], verdict: str = "") -> str:
+    names = as_markdown(", ".join(cameras))
+    parts = [f"### {as_markdown(drive)}", "", as_markdown(verdict), "", f"**Cameras:** {names}"]
+    return "\n".join([*parts, "", _ERRORS, "**Tabs:** one for each camera.", "", _HANDLING])
+
+
+def _lines(layout: Layout, camera: str) -> StaticData:
+    """Yield names and colours of the graphs of rates and counts; ``camera`` begins the names."""
     extra = cycle(colours.EXTRA)
     names = [*(variant.name for variant in layout.variants), BASELINE]
     variants = {name: _VARIANTS.get(name) or next(extra) for name in names}
     counts = rr.SeriesLines(names=list(_OUTCOME_COLOURS), colors=list(_OUTCOME_COLOURS.values()))
     for variant, stage in layout.scored():
         for rate in layout.rates:
-            line = _line(variant, variants[variant])
+            line = _line(camera + variant, variants[variant])
             yield at.scalar_path("metrics", variant, stage, rate), [line]
         yield at.scalar_path("counts", variant, stage), [counts]
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Document
 from roadeval.report.findings import Findings, FleetFindings
-from roadeval.report.sections import drive, drives, frames, provenance, summary
+from roadeval.report.sections import drive, drives, frames, provenance, rig, summary
 from roadeval.report.sections.frames import FrameBrowser
 
 ACROSS: Final = 6
@@ -21,11 +21,17 @@ SCORED: Final = (
 """The sections of a drive with truth; without it there is one on its masks."""
 
 
+RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
+"""The sections of several cameras of a drive."""
+
+
 def document(findings: Findings | FleetFindings) -> Document:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFindings):
         parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
         return _of(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
+    if findings.cameras:
+        return _of(findings, *RIG, provenance.section)
     scored = (*SCORED, frames.worst_frames) if findings.totals else (drive.masks,)
     return _of(findings, *scored, provenance.section)
 
@@ -36,6 +42,8 @@ def page_document(findings: Findings | FleetFindings, browsed: FrameBrowser | No
         worst = partial(drives.worst, across=ACROSS)
         parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
         return _of(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
+    if findings.cameras:
+        return _of(findings, *RIG, provenance.section)
     scored = SCORED if findings.totals else (drive.masks,)
     return _of(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
 
@@ -64,6 +72,8 @@ def _subtitle(findings: Findings | FleetFindings) -> Iterator[str]:
         facts, own = findings.facts, findings.properties
         preset, version = preset or own.get("preset"), facts.versions.get("roadeval", "")
         version = version or own.get("version", "")
+        if findings.cameras:
+            yield f"{len(findings.cameras)} cameras"
         yield f"{facts.frames.in_log or facts.frames.evaluated} frames"
         if facts.drive.width:
             yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"

@@ -7,6 +7,7 @@ it only to draw.
 from __future__ import annotations
 
 import base64
+import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -92,24 +93,27 @@ _PNG_HEADER: Final = 33
 
 
 def write_figures(
-    folder: Path, drive: str, windows: Rows, examples: Sequence[ExampleFrame]
+    folder: Path, drive: str, windows: Rows, examples: Sequence[ExampleFrame], camera: str = ""
 ) -> list[Path]:
     """Write every figure that has something to draw as PNG and PDF; return the files.
 
     The folder is made if it is not there. ``windows`` are as in ``windows.csv``, of any number of
-    variants, without a row where there is no truth; ``examples`` are a few frames, for figure 2. An
+    variants, without a row where there is no truth; ``examples`` are a few frames, for figure 2;
+    ``camera`` is which one of a rig, for titles and the files' names. An
     OSError if the folder cannot be written to; a `ReportError` if the system's folder for temporary
     files cannot be.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    drive = f"{drive}, {camera}" if camera else drive
+    ending = f"-{re.sub(r'[^A-Za-z0-9_-]+', '_', camera).strip('_')}" if camera else ""
 
     def drawn() -> Iterator[tuple[str, bytes]]:
         with mpl.rc_context(RC):  # type: ignore[arg-type]
             if examples:
-                yield "fig2_masks", svg(road_masks(drive, examples))
+                yield f"fig2_masks{ending}", svg(road_masks(drive, examples))
             if len(windows):
-                yield "fig3a_error_rate", svg(error_rate(drive, windows))
-                yield "fig3b_fp_fn_rate", svg(fp_fn_rate(drive, windows))
+                yield f"fig3a_error_rate{ending}", svg(error_rate(drive, windows))
+                yield f"fig3b_fp_fn_rate{ending}", svg(fp_fn_rate(drive, windows))
 
     # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
     # and beside the drawing of the next figure; Matplotlib's own ways draw a figure once for each,

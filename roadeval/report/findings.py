@@ -67,6 +67,8 @@ class Commands:
 
     again: Callable[[str], str] | None
     inspect: Callable[[int], str]
+    of_camera: Callable[[str], Commands] | None = None
+    """Of a rig: makes those of a camera, by its name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,11 +119,16 @@ class Findings:
     """Without truth: by variant and frame the share of the image called road."""
     behind: Behind = field(default_factory=dict)
     """The frames behind the numbers of stages and regions."""
+    cameras: Mapping[str, Findings] = field(default_factory=dict)
+    """Of a rig: each camera's own, by its name. What is here is little beside facts and
+    differences, then."""
+    camera: str = ""
+    """Of a rig: which camera this is."""
 
     @property
     def name(self) -> str:
-        """The drive's name."""
-        return self.facts.drive.name
+        """The drive's name, and of a rig the camera's."""
+        return ", ".join(filter(None, (self.facts.drive.name, self.camera)))
 
     @property
     def height(self) -> int:

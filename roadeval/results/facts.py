@@ -17,7 +17,7 @@ from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Calibration
 from roadeval.evaluation.score import Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
@@ -53,6 +53,8 @@ class DriveFacts:
     """Of the frames, in pixels."""
     rate_hz: float | None = None
     topics: list[str] = field(default_factory=list)
+    calibration: Calibration | None = None
+    """The camera's, for images of this size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +223,8 @@ class Facts(_Document):
     tables: dict[str, TableFacts] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     """The files of the results folder; a recording has none."""
+    cameras: dict[str, Facts] = field(default_factory=dict)
+    """Of a rig: each camera's own, by its name."""
 
     FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
     AGAIN = "make it again with roadeval replay"
@@ -228,9 +232,9 @@ class Facts(_Document):
     RESULTS = (
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims"),
-        *("health", "warnings", "losses", "settings", "methods"),
+        *("health", "warnings", "losses", "settings", "methods", "cameras"),
     )
-    OPTIONAL = ("curves", "thresholds", "seeds", "methods", "masks", "files")
+    OPTIONAL = ("curves", "thresholds", "seeds", "methods", "masks", "files", "cameras")
 
     @cached_property
     def finals(self) -> dict[str, str]:

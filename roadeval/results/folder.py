@@ -58,6 +58,7 @@ class ResultsWriter:
     def __init__(self, folder: Path) -> None:
         self._new: Final = NewFolder(folder, CONTENT)
         self._open: Final[dict[str, _Growing]] = {}
+        self._of_cameras: Final[dict[tuple[str, str], _Sum]] = {}
         self._finished = False
 
     @property
@@ -88,16 +89,24 @@ class ResultsWriter:
                     table.close()
             self._new.discard()
 
-    def append(self, lines: Mapping[str, str]) -> None:
-        """Add lines of CSV to tables, by their names."""
+    def append(self, lines: Mapping[str, str], camera: str = "") -> None:
+        """Add lines of CSV to tables, by their names; in a rig they are those of a camera."""
         with self.explained():
             for name, text in lines.items():
                 self._open[name].append(text)
+                if camera:
+                    own = self._of_cameras.setdefault((camera, name), _Sum(TABLES[name].header))
+                    own.add(text)
 
     @property
     def tables(self) -> dict[str, TableFacts]:
         """The tables that have rows so far."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
+
+    def tables_of(self, camera: str) -> dict[str, TableFacts]:
+        """Return what `tables` would be if only a rig's camera were in them."""
+        own = {name: sums for (whose, name), sums in self._of_cameras.items() if whose == camera}
+        return {name: sums.stated for name, sums in own.items()} if camera else self.tables
 
     def finish(self, facts: Facts, run_toml: str) -> Facts:
         """Write ``summary.json`` and ``run.toml``; return the facts with the tables and files.
@@ -120,24 +129,34 @@ class ResultsWriter:
         return writing(self._new.path, ResultsError, advice)
 
 
-class _Growing:
-    """A table that grows."""
+class _Sum:
+    """The rows of a table so far, and the SHA-256 of its text."""
 
-    def __init__(self, folder: Path, table: TableSchema) -> None:
-        self.path: Final = folder / f"{table.name}.csv"
+    def __init__(self, header: str) -> None:
         self.rows = 0
-        self._digest: Final = hashlib.sha256()
-        self._file: Final[IO[bytes]] = self.path.open("wb")
-        self._write(table.header)
+        self._digest: Final = hashlib.sha256(header.encode())
 
     @property
     def stated(self) -> TableFacts:
-        """The rows so far, and the SHA-256 of the text."""
         return TableFacts(self.rows, self._digest.hexdigest())
 
-    def append(self, lines: str) -> None:
+    def add(self, lines: str) -> None:
         self.rows += lines.count("\n")
-        self._write(lines)
+        self._digest.update(lines.encode())
+
+
+class _Growing(_Sum):
+    """A table that grows."""
+
+    def __init__(self, folder: Path, table: TableSchema) -> None:
+        super().__init__(table.header)
+        self.path: Final = folder / f"{table.name}.csv"
+        self._file: Final[IO[bytes]] = self.path.open("wb")
+        self._file.write(table.header.encode())
+
+    def append(self, lines: str) -> None:
+        self.add(lines)
+        self._file.write(lines.encode())
 
     def close(self) -> None:
         self._file.close()
@@ -148,22 +167,19 @@ class _Growing:
         if not self.rows:
             self.path.unlink()
 
-    def _write(self, text: str) -> None:
-        content = text.encode()
-        self._digest.update(content)
-        self._file.write(content)
-
 
 class ResultsFolder:
     """Reads a results folder.
 
     It is as `ResultsWriter` left it. A `ResultsError` if it holds no results, or results of another
-    format.
+    format. Of a rig it is that of one ``camera``, where that is named.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, camera: str = "") -> None:
         self._folder: Final = folder
-        self.facts: Final = Facts.read(folder / SUMMARY)
+        self._camera: Final = camera
+        self._whole: Final = Facts.read(folder / SUMMARY)
+        self.facts: Final = self._whole.cameras[camera] if camera else self._whole
 
     def table(self, name: str) -> pd.DataFrame:
         """Read a table by its name in `roadeval.results.schema.TABLES`.
@@ -171,8 +187,10 @@ class ResultsFolder:
         One that was not written, there being nothing to count, is empty. A `ResultsError` if it is
         damaged, or not the one that the summary states.
         """
-        return read_table(name, self._folder / f"{name}.csv", self.facts.tables)
+        path = self._folder / f"{name}.csv"
+        return read_table(name, path, self._whole.tables, self._camera)
 
     def rows(self, name: str) -> Rows:
         """Read a table as `table` does, without pandas."""
-        return read_rows(name, self._folder / f"{name}.csv", self.facts.tables)
+        path = self._folder / f"{name}.csv"
+        return read_rows(name, path, self._whole.tables, self._camera)

@@ -56,6 +56,7 @@ def summarise(
     firsts = {row["log_digest"]: row["drive"] for row in reversed(drives) if row["log_digest"]}
     known = {row["drive"]: firsts[row["log_digest"]] for row in drives if row["log_digest"]}
     copies = {drive: first for drive, first in known.items() if drive != first}
+    cameras = {row["drive"]: row["camera"] for row in drives}
     groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
     effects = _effects(rows, groups, settings)
     rates = _rates(folder)
@@ -80,13 +81,17 @@ def summarise(
             for rate, difference in each.rates.items()
         ],
         strata=[*_strata(rows, drives, members, groups, settings.confidence)],
-        warnings=[*_of_copies(copies), *_of_drives(drives)],
+        warnings=[*_of_copies(copies, cameras), *_of_drives(drives)],
         conditions=conditions,
         run=run,
     )
 
 
-def _of_copies(copies: Mapping[str, str]) -> Iterator[str]:
+def _of_copies(same: Mapping[str, str], cameras: Mapping[str, str | None]) -> Iterator[str]:
+    """Yield what it means that drives are of the same log: copies, or cameras of a rig."""
+    copies = {copy: of for copy, of in same.items() if cameras[copy] == cameras[of]}
+    if len(same) > len(copies):
+        yield "cameras of one log count as one drive in differences, which are of their mean"
     if copies:
         copy, of = next(iter(copies.items()))
         count = len(copies)

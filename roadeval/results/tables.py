@@ -54,7 +54,10 @@ class TableFacts:
 
 
 def read_table(
-    name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None
+    name: str,
+    source: Path | str,
+    stated: Mapping[str, TableFacts] | None = None,
+    camera: str = "",
 ) -> pd.DataFrame:
     """Read a table of a drive bit-exactly, and check that it is whole.
 
@@ -62,12 +65,13 @@ def read_table(
     one of `roadeval.results.schema.TABLES`; ``source`` a CSV file, or its text with the header
     line. A file that does not exist has no rows, like an empty text. ``stated`` are the number of
     rows and the SHA-256 that the summary states of each table, by name: one that it does not state
-    must be empty. It is None where there is no summary. Words are text, even if they look like
+    must be empty. It is None where there is no summary. With ``camera`` only the rows of that
+    camera are returned. Words are text, even if they look like
     numbers; rates are float64, all other numbers int64.
     """
     import pyarrow as pa
 
-    table = _read(name, source, stated)
+    table = _of_camera(_read(name, source, stated), camera)
     fields = (
         each.with_type(pa.string()) if pa.types.is_dictionary(each.type) else each
         for each in table.schema
@@ -77,13 +81,16 @@ def read_table(
 
 
 def read_rows(
-    name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None
+    name: str,
+    source: Path | str,
+    stated: Mapping[str, TableFacts] | None = None,
+    camera: str = "",
 ) -> Rows:
     """Read a table as `read_table` does, as arrays without the key, and without pandas.
 
     pandas takes a third of a second to import.
     """
-    table = _read(name, source, stated)
+    table = _of_camera(_read(name, source, stated), camera)
     return _arrays(table, TABLES[name].columns[len(KEY) :])
 
 
@@ -112,6 +119,12 @@ def _read(name: str, source: Path | str, stated: Mapping[str, TableFacts] | None
     except ValueError as error:  # Arrow's too
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
+
+
+def _of_camera(table: pa.Table, camera: str) -> pa.Table:
+    from pyarrow import compute
+
+    return table.filter(compute.equal(table["camera"], camera)) if camera else table
 
 
 def _content(path: Path) -> bytes:

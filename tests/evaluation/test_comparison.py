@@ -18,8 +18,8 @@ from roadeval.evaluation.comparison import (
     variants_as_sides,
 )
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import within_drive
 from tests.evaluation.making import a_part, a_side, a_table, compared_drive, rows_of
+from tests.evaluation.stats.test_difference import within
 
 SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
@@ -247,7 +247,7 @@ def test_a_drive_of_a_fleet_has_the_numbers_of_the_comparison_of_its_two_results
     (change,) = compare(alone, SETTINGS).changes
     assert replace(change.difference["ERR"], p_holm=None, comparisons=None) == row.difference
     assert (row.base, row.new) == (change.base["ERR"], change.new["ERR"])
-    assert row.difference == within_drive(noisy(8, 12, 6)[3] / 100, noisy(8)[3] / 100, SETTINGS)
+    assert row.difference == within(noisy(8, 12, 6)[3] / 100, noisy(8)[3] / 100)
 
 
 def test_a_drive_is_compared_with_a_fleet_that_has_it():

@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation.score import FrameCounts, drive_effects, final_stages
+from roadeval.evaluation.score import CameraMasks, FrameCounts, drive_effects, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings()
+
+
+def effects_of(masks, settings=SETTINGS):
+    """The differences of a drive of one camera."""
+    return drive_effects([CameraMasks(np.arange(100), masks)], settings)
 
 
 def a_mask(variant, stage, errors, positions=None):
@@ -19,7 +24,7 @@ def a_mask(variant, stage, errors, positions=None):
 
 def of(*masks):
     """What is subtracted from what: base, variant, stage, and whether both are final."""
-    effects = drive_effects([a_mask(*mask, [3] * 12) for mask in masks], SETTINGS)
+    effects = effects_of([a_mask(*mask, [3] * 12) for mask in masks])
     return [(each.base, each.variant, each.stage, each.final) for each in effects]
 
 
@@ -48,7 +53,7 @@ def test_without_a_base_there_is_no_difference():
 
 def test_a_difference_is_the_variant_minus_the_base_on_the_frames_that_both_have():
     pair = a_mask("filtered", "post", [10, 10, 90]), a_mask("unfiltered", "post", [7, 9], [0, 1])
-    (effect,) = drive_effects(pair, SETTINGS)
+    (effect,) = effects_of(pair)
     found = effect.rates["ERR"]
     assert (found.units, found.mean) == (2, pytest.approx(0.02))
     assert [*effect.rates] == ["ACC", "ERR", "FNR", "FPR"]
@@ -59,7 +64,7 @@ def test_final_masks_against_one_base_are_corrected_together():
     names = [("filtered", "svm"), ("filtered", "post"), ("unfiltered", "svm")]
     names += [("unfiltered", "post"), ("net", "post"), ("blind", "post")]
     masks = [a_mask(*name, rng.integers(5, 20, 40)) for name in names]
-    effects = drive_effects(masks, SETTINGS)
+    effects = effects_of(masks)
     sizes = [(each.base, each.final, each.rates["ERR"].comparisons) for each in effects]
     assert sizes == [
         ("unfiltered", False, None),

@@ -627,7 +627,7 @@ def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
 
     options = settings(max_frames=14)
     with open_log(drive) as log:
-        *_, done = process(prepare(log, options, ignore), Seen(), ignore)
+        *_, (_, done) = process([prepare(log, options, ignore)], Seen(), ignore)
     lean, whole = done.result, done.encoded
     assert any(list(variant.layers()) for variant in whole.variants)
     assert not any(list(variant.layers()) for variant in lean.variants)

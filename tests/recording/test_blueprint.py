@@ -17,7 +17,7 @@ UNFILTERED = VariantLayout("unfiltered", "", ("svm", "post"), (SVM, POST))
 
 def shown(**changes):
     """The views of every tab: by the tab's name, each view's name with its paths."""
-    root = views.arrange(layout(**changes)).root_container
+    root = views.arrange({"": layout(**changes)}).root_container
     return {tab.name: dict(views_in(tab)) for tab in root.contents}
 
 
@@ -82,7 +82,7 @@ def test_true_shadow_is_shown_where_the_log_has_it():
 
 @pytest.mark.parametrize(("width", "height"), [(480, 360), (1920, 400), (300, 900)])
 def test_every_shape_of_image_leaves_room_for_the_curves(width, height):
-    root = views.arrange(layout(width=width, height=height)).root_container
+    root = views.arrange({"": layout(width=width, height=height)}).root_container
     shares = root.contents[0].row_shares
     assert min(shares) > 0
     assert shares[-1] >= sum(shares) * 0.15
@@ -90,5 +90,5 @@ def test_every_shape_of_image_leaves_room_for_the_curves(width, height):
 
 @pytest.mark.parametrize(("width", "height"), [(480, 360), (1920, 400)])
 def test_the_rows_of_the_overview_fill_a_screen_and_no_more(width, height):
-    root = views.arrange(layout(width=width, height=height)).root_container
+    root = views.arrange({"": layout(width=width, height=height)}).root_container
     assert sum(root.contents[0].row_shares) == pytest.approx(990)

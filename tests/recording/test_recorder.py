@@ -238,7 +238,7 @@ def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
         first = recorder.encode(result(0), 0, {})
         large = replace(first, payloads=dict.fromkeys(first.payloads, bytes(CHUNK_BYTES - 1)))
         for number in range(2):
-            recorder.write(replace(large, number=number))
+            recorder.write(replace(large, when=(number,) * 3))
     assert len(first.payloads) > 4
     assert max(sent) < UNWRITTEN + 2 * CHUNK_BYTES
 

@@ -26,7 +26,7 @@ def run(frames, rows, limits=WAIT):
     batcher = Batcher(limits)
     for frame in range(frames):
         for path, columns, value in rows(frame):
-            batcher.add(path, columns, frame, frame, value)
+            batcher.add(path, columns, (frame, frame, frame), value)
         for key in batcher.end_frame():
             yield frame, key[0], rows_of(batcher[key])
             del batcher[key]
@@ -70,9 +70,9 @@ def test_an_entity_is_full_by_its_bytes_and_others_wait_on():
 def test_the_bytes_that_wait_are_known():
     batcher = Batcher(WAIT)
     for frame, text in enumerate(("four", "five5")):
-        batcher.add("/a", texts, frame, frame, text)
-        batcher.add("/b", scalars, frame, frame, 0.5)
-        batcher.add("/c", notes, frame, frame, ("It rains.", "INFO"))
+        batcher.add("/a", texts, (frame, frame, frame), text)
+        batcher.add("/b", scalars, (frame, frame, frame), 0.5)
+        batcher.add("/c", notes, (frame, frame, frame), ("It rains.", "INFO"))
     assert batcher.size == 9 + 2 * 13
     del batcher["/a", texts]
     assert batcher.size == 2 * 13

@@ -128,7 +128,7 @@ def test_memory_holds_few_pictures_however_many_are_kept(tmp_path):
         tracemalloc.start()
         for number in range(count):
             large = {path: payload.ljust(size, b"0") for path, payload in plain.payloads.items()}
-            recorder.write(replace(plain, number=number, payloads=large))
+            recorder.write(replace(plain, when=(number,) * 3, payloads=large))
         del large
         held, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
@@ -140,7 +140,9 @@ def test_frames_that_are_dropped_take_no_room(tmp_path):
         plain = recorder.encode(result(0), 0, {})
         for number in range(50):
             large = {"/camera": bytes(1 << 20)}
-            recorder.write(replace(plain, number=number, payloads=large, worst_error=number / 50))
+            recorder.write(
+                replace(plain, when=(number,) * 3, payloads=large, worst_error=number / 50)
+            )
         assert len(names(tmp_path / f"{recorder.partial.name}-images")) == 2
 
 
@@ -170,9 +172,9 @@ def worst(tmp_path):
 
 
 def test_a_frame_comes_back_with_its_images_alone(worst):
-    worst.offer(EncodedFrame(7, 70, PAYLOADS, scalars={"/metrics": 0.5}))
+    worst.offer(EncodedFrame((7, 70, 70), PAYLOADS, scalars={"/metrics": 0.5}))
     (back,) = worst.take()
-    assert (back.number, back.stamp_ns, back.payloads) == (7, 70, PAYLOADS)
+    assert (back.when, back.payloads) == ((7, 70, 70), PAYLOADS)
     assert list(back.payloads) == list(PAYLOADS)
     assert not back.scalars
 
@@ -180,14 +182,14 @@ def test_a_frame_comes_back_with_its_images_alone(worst):
 def test_nothing_is_left_when_it_is_cleared(worst, tmp_path):
     worst.clear()
     for number in (1, 2):
-        worst.offer(EncodedFrame(number, number, PAYLOADS, worst_error=number))
+        worst.offer(EncodedFrame((number,) * 3, PAYLOADS, worst_error=number))
     assert [path.name for path in (tmp_path / "images").iterdir()] == ["2"]
     worst.clear()
     assert not list(tmp_path.iterdir())
 
 
 def test_images_that_were_lost_are_one_line(worst, tmp_path):
-    worst.offer(EncodedFrame(7, 70, PAYLOADS))
+    worst.offer(EncodedFrame((7, 70, 70), PAYLOADS))
     (tmp_path / "images" / "7").unlink()
     with pytest.raises(RecordingError, match=ONE_LINE):
         list(worst.take())
@@ -195,4 +197,4 @@ def test_images_that_were_lost_are_one_line(worst, tmp_path):
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
     with pytest.raises(RecordingError, match=ONE_LINE):
-        WorstFrames(tmp_path / "missing" / "images", 1).offer(EncodedFrame(7, 70, PAYLOADS))
+        WorstFrames(tmp_path / "missing" / "images", 1).offer(EncodedFrame((7, 70, 70), PAYLOADS))

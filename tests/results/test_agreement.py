@@ -40,7 +40,7 @@ def a_drive(variants):
 
 
 def replayed(rows):
-    effects = drive_effects([*score.mask_counts(rows)], SETTINGS)
+    effects = drive_effects([score.camera_masks(rows)], SETTINGS)
     return effects, verdict(score.totals(rows), effects, SETTINGS)
 
 

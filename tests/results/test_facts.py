@@ -7,16 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.facts import Facts, LogFacts, as_parts, digest_of, json_text, plain
 from roadeval.results.tables import ResultsError
-from tests.evaluation.test_effects import a_mask
+from tests.evaluation.test_effects import a_mask, effects_of
 from tests.results.making import facts_of
 
 NAMES = ("filtered", "unfiltered", "net", "blind")
 TOTALS = {name: {"post": {"ERR": 0.1, "frames": 100}} for name in NAMES}
-EFFECTS = drive_effects([a_mask(n, "post", [3] * 12) for n in NAMES], EvaluationSettings())
+EFFECTS = effects_of([a_mask(n, "post", [3] * 12) for n in NAMES])
 WRITTEN = facts_of(
     totals=TOTALS,
     claims={"filter_ERR": {"held": 2}},

@@ -23,7 +23,7 @@ Drives = Annotated[
 
 
 @takes(
-    *("preset", "config", "variants", "nets", "masks", "tunes", "only", "drives"),
+    *("preset", "config", "variants", "nets", "masks", "tunes", "only", "cameras", "drives"),
     *("training", "truth", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )

@@ -10,7 +10,7 @@ from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
 
 
-@takes("truth", "topics", "labels", "frames.keep_corrupt", "frames.max_pixels")
+@takes("truth", "topics", "cameras", "labels", "frames.keep_corrupt", "frames.max_pixels")
 def info(
     drive: arguments.Drive,
     *,
@@ -26,6 +26,7 @@ def info(
     would pick what it picks, or what it would ask for. Of a log of more than 50 MB only the
     indexes are read, unless --verify asks for all of it.
     """
+    arguments.one_camera(given)
     config = arguments.of_a_log(given)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe

@@ -56,6 +56,7 @@ def inspect(
     worst: Rank = None,
     variant: Variant = None,
     drive: Drive = None,
+    camera: arguments.Camera = None,
     screenshot: Screenshot = None,
     trust_sources: arguments.TrustSources = False,
     json: arguments.Json = False,
@@ -72,7 +73,7 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     from roadeval.jobs.results.result import Result
 
-    opened = Result(recording, trust_sources=trust_sources)
+    opened = arguments.of_camera(Result(recording, trust_sources=trust_sources), camera)
     if opened.fleet:
         if variant is not None:
             raise typer.BadParameter(
@@ -132,6 +133,11 @@ def _show(
             path, warnings = recording_of(opened.fleet, name, watch, messages.note)
         drive, of = DriveResult(path), f"{name}, "
         warnings = (*drive.warnings, *warnings)
+    elif opened.rig:
+        found = job.of_rank(opened, rank or 1, variant)
+        if frame is None:
+            frame, of = found.frame, f"{found.camera}, "
+        drive = opened.cameras[found.camera].drive
     elif rank is not None:
         frame = job.of_rank(opened, rank, variant).frame
     assert drive is not None

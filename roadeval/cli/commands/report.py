@@ -53,6 +53,7 @@ def report(
             "--assets", help="Of a page: script, style and pictures in a folder beside it."
         ),
     ] = False,
+    camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Write the report of a drive or of a fleet, as a PDF or as a page.
@@ -67,7 +68,7 @@ def report(
     size = arguments.paper_of(paper)
     if (pictures is not None or assets) and not (output and is_page(output)):
         raise typer.BadParameter("--pictures and --assets go with a page alone: -o FILE.html")
-    page, opened = PageSettings(pictures, assets), Result(result)
+    page, opened = PageSettings(pictures, assets), arguments.of_camera(Result(result), camera)
     path = write_report(opened, output, paper=size, commands=commands_of(opened), as_page=page)
     if not quiet:
         console.emit(str(path))
@@ -92,19 +93,23 @@ def commands_of(result: Result) -> Commands:
             return shlex.join([*worst, str(rank), *replayed])
 
         return Commands(again=None, inspect=inspect)
-    assert result.drive is not None
-    config, shown = result.drive.configuration, result.drive.viewable or path
+    drive = result.rig.cameras[0] if result.rig else result.drive
+    assert drive is not None
+    config, shown = drive.configuration, drive.viewable or path
+    camera = drive.camera if result.drive else ""
     return Commands(
         again=None
         if config is None
         else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
-        inspect=lambda frame: inspect_command(shown, frame),
+        inspect=lambda frame: inspect_command(shown, frame, camera),
+        of_camera=lambda name: commands_of(result.cameras[name]),
     )
 
 
-def inspect_command(path: Path, frame: int) -> str:
-    """Return the command that opens a frame of a recording in the viewer."""
-    return shlex.join(["roadeval", "inspect", str(path), "--frame", str(frame)])
+def inspect_command(path: Path, frame: int, camera: str = "") -> str:
+    """Return the command that opens a frame of a recording, or of its camera, in the viewer."""
+    of = ["--camera", camera] if camera else []
+    return shlex.join(["roadeval", "inspect", str(path), *of, "--frame", str(frame)])
 
 
 COMMAND: Final = report

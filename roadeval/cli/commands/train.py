@@ -13,7 +13,7 @@ from roadeval.cli.options import Given, takes
 
 @takes(
     *("preset", "config", "variants", "nets", "masks", "tunes", "drives", "training.frames"),
-    *("truth", "topics.image", "topics.truth", "topics.masks", "labels"),
+    *("truth", "cameras", "topics.truth", "topics.masks", "labels"),
     *("topics.sync_tolerance_ms", "topics.resize_truth"),
     *("frames.scale", "frames.keep_corrupt", "frames.max_pixels"),
     *("frames.start", "frames.end"),
@@ -41,6 +41,7 @@ def train(
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
     Replay never evaluates the training frames, on any drive.
     """
+    arguments.one_camera(given)
     config = arguments.configuration(given)
     from roadeval.jobs.run.train import train as run
 

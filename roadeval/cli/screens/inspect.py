@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from roadeval.cli.screens.tables import ascii_of, show_table
-from roadeval.data.words import percent, points
+from roadeval.data.words import percent, points, short_names
 from roadeval.report.blocks import Table
 from roadeval.results.sentences import without_filter
 
@@ -37,10 +37,15 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
         titles = ["", "drive", *titles, "bright %", "shade %", "sun", "kept"]
         show_table(Table(titles, rows, text_columns=(0, 1)), out)
     else:
-        rows = [[str(e.rank), *own, _why(e)] for e, own in zip(found, cells, strict=True)]
-        titles = ["", *titles, "why"]
-        why = [len(titles) - 1]
-        show_table(Table(titles, rows, text_columns=why, breaks=range(1, len(rows))), out)
+        rig = any(each.camera for each in found)
+        names = short_names([*{each.camera: None for each in found}])
+        rows = [
+            [str(e.rank), *([names[e.camera]] if rig else []), *own, _why(e)]
+            for e, own in zip(found, cells, strict=True)
+        ]
+        titles = ["", *(["camera"] if rig else []), *titles, "why"]
+        words = [*([1] if rig else []), len(titles) - 1]
+        show_table(Table(titles, rows, text_columns=words, breaks=range(1, len(rows))), out)
     if of_fleet and not all(each.recording for each in found):
         out.print()
         out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")

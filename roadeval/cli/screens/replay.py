@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from roadeval.cli import console
 from roadeval.cli.screens import tables
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import interval, percent, points
+from roadeval.data.words import counted, interval, percent, points, short_names
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.recording.viewer import has_screen
@@ -42,7 +42,8 @@ OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 def show(outcome: Outcome, out: Console) -> None:
     """Print what a replay read, how well each variant did, and where everything was written."""
     facts = outcome.facts
-    out.print(f"{facts.drive.name}: {account(facts.frames, facts.windows)}")
+    of = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
+    out.print(f"{facts.drive.name}: {of}{account(facts.frames, facts.windows)}")
     out.print()
     if facts.totals:
         out.print(facts.verdict)
@@ -56,6 +57,9 @@ def show(outcome: Outcome, out: Console) -> None:
 
 def _show_scores(facts: Facts, out: Console) -> None:
     tables.show_table(scores(facts.totals), out)
+    if facts.cameras:
+        out.print()
+        tables.show_table(cameras(facts), out)
     repeats = facts.seeds
     if pairs := dict(_pairs(facts)):
         out.print()
@@ -109,6 +113,17 @@ def over_thresholds(curves: Totals) -> Table:
         for stage, own in stages.items()
     ]
     return Table(["over thresholds", "stage", *CURVES.values()], rows, text_columns=(0, 1))
+
+
+def cameras(facts: Facts) -> Table:
+    """Tabulate ERR of each camera's final masks."""
+    names, masks = short_names([*facts.cameras]), [*facts.finals]
+    rows = []
+    for camera, own in facts.cameras.items():
+        errors = {name: own.totals[name][stage]["ERR"] for name, stage in own.finals.items()}
+        cells = [percent(errors.get(name)) for name in masks]
+        rows.append([names[camera], str(own.frames.evaluated), *cells])
+    return Table(["camera", "frames", *(f"{name} ERR %" for name in masks)], rows)
 
 
 def _pairs(facts: Facts) -> Iterator[tuple[str, Mapping[str, Difference]]]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
 from roadeval.errors import RoadevalError
@@ -40,6 +41,7 @@ from roadeval.evaluation.regions import ALL, titles
 from roadeval.evaluation.score import TESTED, FourCounts, Name, counts_of, means, stages_of
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
+    CameraRates,
     Difference,
     DriveMean,
     Stratum,
@@ -331,14 +333,27 @@ class _OnDrive:
     """None where nothing is subtracted, and there are no differences."""
     means: Mapping[str, float] = field(default_factory=dict)
     """Of the frames' differences, by rate."""
-    within: Mapping[str, Difference] = field(default_factory=dict)
-    """Those of which an interval is asked for."""
+    series: CameraRates | None = None
+    """Of the one drive: the frames' rates, ``(n, m)`` each."""
+    within: Difference | None = None
+    """Of a final mask on one of several drives: what changed in `TESTED`."""
     final: bool = True
     title: str = ""
 
     def mean(self, means: Mapping[str, float], rate: str) -> DriveMean:
         """Return one of its means as a drive of its group."""
         return DriveMean(self.part.drive, self.group, means[rate])
+
+
+def _within(own: Sequence[_OnDrive], rate: str, settings: EvaluationSettings) -> Difference:
+    """Return the difference of a rate within a drive, by its cameras."""
+    place = [*METRICS].index(rate)
+    columns = [
+        CameraRates(each.series.stamps, each.series.rates[:, place], each.series.base[:, place])
+        for each in own
+        if each.series
+    ]
+    return within_drive(columns, settings, higher_is_better=METRICS[rate].higher_is_better)
 
 
 _Masks = defaultdict[Name, list[_OnDrive]]
@@ -406,7 +421,9 @@ class _Against:
     ) -> None:
         self.label: Final = new.label
         self._base, self._new, self._settings, self._across = base, new, settings, across
-        self._several: Final = len(pairs) > 1
+        self._several: Final = len({new.drive for _, new in pairs}) > 1
+        self._alone: Final = len(pairs) == 1
+        """Whether it is one camera of one drive, whose frames have numbers of their own."""
         self._left_out: Final = left_out
         self._same_logs: Final = sum(one.drive != other.drive for one, other in pairs)
         self.changed: Final = Note(
@@ -462,16 +479,14 @@ class _Against:
         regions = self._base.rows(base, name), self._new.rows(new, name)
         for mask in masks:
             chosen = mask.final and mask.variant != BASELINE
-            tested = COMPARED
-            if self._several:
-                tested = (TESTED,) if chosen else ()
-            made = self._on_drive(new, group, mask.counts, tested)
+            stamps = mask.after["stamp_ns"]
+            made = self._on_drive(new, group, mask.counts, stamps, tested=chosen)
             self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
             if chosen and self._several:
                 self._add_region_sums(new, group, mask, *regions)
             elif chosen:
                 self._add_regions(new, group, mask, *regions)
-        if not self._several:
+        if self._alone:
             first = next((mask for mask in masks if mask.final), masks[-1])
             self.moved = list(moved_frames(self.label, first))
             if self._across:
@@ -479,27 +494,30 @@ class _Against:
                 self.disagreements = list(disagreements(table, masks[0].after, *names))
 
     def _on_drive(
-        self, part: Part, group: str, counts: tuple[FourCounts, ...], tested: Sequence[str]
+        self,
+        part: Part,
+        group: str,
+        counts: tuple[FourCounts, ...],
+        stamps: npt.NDArray[np.int64],
+        *,
+        tested: bool,
     ) -> _OnDrive:
         before, after = (metrics.table(each) for each in counts)
-        within = {
-            name: within_drive(
-                *(after[:, place], before[:, place], self._settings),
-                higher_is_better=metric.higher_is_better,
-            )
-            for place, (name, metric) in enumerate(METRICS.items())
-            if name in tested
-        }
         base, new = map(_Sum.of, counts)
-        return _OnDrive(part, group, len(before), new, base, means(after - before), within)
+        made = _OnDrive(part, group, len(before), new, base, means(after - before))
+        whole = replace(made, series=CameraRates(stamps, after, before))
+        if not self._several:
+            return whole
+        return replace(made, within=_within([whole], TESTED, self._settings) if tested else None)
 
     def _add_regions(self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows) -> None:
         """Add what changed by region and shade in a final mask that looks at the image."""
         called = self._base.label if self._across else mask.variant
         before = region_counts(base, called, mask.base_stage, mask.before)
         after = region_counts(new, mask.variant, mask.stage, mask.after)
-        for region, title, *counts in parts_of(before, after, mask):
-            made = self._on_drive(part, group, (counts[0], counts[1]), (TESTED,))
+        for region, title, known, *counts in parts_of(before, after, mask):
+            stamps = mask.after["stamp_ns"][known]
+            made = self._on_drive(part, group, (counts[0], counts[1]), stamps, tested=True)
             self._regions[mask.variant, region].append(replace(made, title=title))
 
     def _add_region_sums(
@@ -527,7 +545,7 @@ class _Against:
     def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
         """Return the difference within the one drive, or over several."""
         if not self._several:
-            return own[0].within[rate]
+            return _within(own, rate, self._settings)
         drives = [each.mean(each.means, rate) for each in own]
         better = METRICS[rate].higher_is_better
         return over_drives(drives, self._settings.confidence, higher_is_better=better)
@@ -557,14 +575,14 @@ class _Against:
     def drives(self) -> Iterator[DriveChange]:
         """Yield each of several drives' changes of final masks, the surest first."""
         for (variant, stage), own in self._tested():
-            values = benjamini_hochberg([each.within[TESTED].p for each in own])
+            values = benjamini_hochberg([each.within.p if each.within else None for each in own])
             rows = [
                 DriveChange(
                     *(self.label, variant, stage, each.part.name, each.frames),
-                    *(base.means[TESTED], each.new.means[TESTED], each.within[TESTED], q),
+                    *(base.means[TESTED], each.new.means[TESTED], each.within, q),
                 )
                 for each, q in zip(own, values, strict=True)
-                if (base := each.base)
+                if (base := each.base) and each.within
             ]
             yield from sorted(
                 rows,
@@ -586,7 +604,7 @@ class _Against:
     def _tested(self) -> Iterator[tuple[Name, list[_OnDrive]]]:
         """Yield the final masks of several drives."""
         for mask, own in self._masks.items() if self._several else ():
-            if kept := [each for each in own if TESTED in each.within]:
+            if kept := [each for each in own if each.within]:
                 yield mask, kept
 
     def notes(self) -> Iterator[Note]:

@@ -23,7 +23,7 @@ Rates = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A drive's part of a result. Its tables are read when they are asked for."""
+    """A drive in a result, or one of its cameras. Its tables are read when they are asked for."""
 
     drive: str
     """Its identity in the result."""
@@ -41,6 +41,13 @@ class Part:
     """A name shared with other drives of the result, as of a day or a route."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Values by the tags' keys."""
+    camera: str = ""
+    """Which camera of the drive."""
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Its drive and its camera."""
+        return self.drive, self.camera
 
 
 Pair = tuple[Part, Part]
@@ -122,33 +129,33 @@ class Note:
 
 
 def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[Note]]:
-    """Match the drives of two results, each by its name, else by its log.
+    """Match the drives of two results, each camera by the drive's name, else by its log.
 
     One name with two different logs is no match: the difference would be the scene's. Returned are
     the drives that both have scored, in the base's order, and notes on all others, one for each
     result and reason.
     """
-    there = {part.drive: part for part in new.parts}
-    names = {part.drive for part in base.parts}
+    there = {part.key: part for part in new.parts}
+    names = {part.key for part in base.parts}
     # A log may be in a result twice.
-    logs: defaultdict[str | None, deque[Part]] = defaultdict(deque)
+    logs: defaultdict[tuple[str | None, str], deque[Part]] = defaultdict(deque)
     for part in new.parts:
-        if part.drive not in names:
-            logs[part.digest].append(part)
+        if part.key not in names:
+            logs[part.digest, part.camera].append(part)
     pairs, taken = [], set()
     left: defaultdict[tuple[Kind, str, str], list[str]] = defaultdict(list)
     for part in base.parts:
-        other = there.get(part.drive)
-        if other is None and part.digest and logs[part.digest]:
-            other = logs[part.digest].popleft()
+        other = there.get(part.key)
+        if other is None and part.digest and logs[part.digest, part.camera]:
+            other = logs[part.digest, part.camera].popleft()
         if other is not None:
-            taken.add(other.drive)
+            taken.add(other.key)
         if reason := _why_not(part, other):
             left[reason, base.label, new.label].append(part.name)
         elif other is not None:
             pairs.append((part, other))
     for part in new.parts:
-        if part.drive not in taken:
+        if part.key not in taken:
             left[Kind.ABSENT, new.label, base.label].append(part.name)
     return pairs, [Note(*key, len(names), tuple(names)) for key, names in left.items()]
 
@@ -328,27 +335,28 @@ def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict
 
 def parts_of(
     base: Mapping[str, FourCounts], new: Mapping[str, FourCounts], mask: MaskPair
-) -> Iterator[tuple[str, str, FourCounts, FourCounts]]:
-    """Yield a mask's regions and shades: name, title, and the counts of both there.
+) -> Iterator[tuple[str, str, npt.NDArray[np.bool_], FourCounts, FourCounts]]:
+    """Yield a mask's regions and shades: name, title, its frames, and the counts of both there.
 
     A region that is not the same pixels in both, as the shadow that another filter found, is left
     out: its ERR would describe other places. So is one without a labelled pixel.
     """
     alike = [name for name in base if name in new and _same_pixels(base[name], new[name])]
     for name, title in titles([*base]).items():
-        known = base[name].any(axis=1)
+        known = np.asarray(base[name].any(axis=1))
         if name in alike and known.any():
-            yield name, title, base[name][known], new[name][known]
+            yield name, title, known, base[name][known], new[name][known]
     # True shadow counts where the log has it, else what both results detected alike.
     shadows = [name for name in SHADOWS if name in alike]
     if not shadows:
         return
     share = base[shadows[0]].sum(axis=1) / np.maximum(mask.before["N"], 1)
-    much = share >= max(np.sort(share)[-max(round(SHADED * len(share)), 1)], 1e-9)
+    most = np.sort(share)[-max(round(SHADED * len(share)), 1)]
+    much = np.asarray(share >= max(most, 1e-9))
     if much.any() and not much.all():
         before, after = mask.counts
-        yield "frames_with_shadow", "frames with most shadow", before[much], after[much]
-        yield "other_frames", "the other frames", before[~much], after[~much]
+        yield "frames_with_shadow", "frames with most shadow", much, before[much], after[much]
+        yield "other_frames", "the other frames", ~much, before[~much], after[~much]
 
 
 def _same_pixels(base: FourCounts, new: FourCounts) -> bool:

@@ -1,6 +1,7 @@
 """The score of a drive: counts and rates frame by frame, summed up over frames and windows."""
 
 from roadeval.evaluation.score.counts import (
+    CameraMasks,
     EdgesAndFlicker,
     FourCounts,
     FrameCounts,
@@ -14,6 +15,7 @@ from roadeval.evaluation.score.counts import (
     error_map,
     final_stages,
     means,
+    over_cameras,
     sum_up,
 )
 from roadeval.evaluation.score.frame import (
@@ -27,11 +29,11 @@ from roadeval.evaluation.score.frame import (
 from roadeval.evaluation.score.rows import (
     FILTER,
     by_region,
+    camera_masks,
     causes,
     counts_of,
     each_window,
     finals,
-    mask_counts,
     merged,
     most_changed,
     overlap,

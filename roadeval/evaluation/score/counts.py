@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -87,10 +87,21 @@ class FrameCounts:
         """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
         return metrics.table(self.counts)
 
-    def paired(self, base: FrameCounts) -> tuple[Floats, Floats]:
-        """Return the rates of both masks on the frames that both have, ``(n, m)`` each."""
-        _, mine, theirs = np.intersect1d(self.positions, base.positions, return_indices=True)
-        return self.rates[mine], base.rates[theirs]
+    def paired(self, base: FrameCounts) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+        """Return the positions of the frames that both masks have, ``(n,)``, and the rates there.
+
+        The rates are ``(n, m)`` of this mask and of the base.
+        """
+        both, mine, theirs = np.intersect1d(self.positions, base.positions, return_indices=True)
+        return both, self.rates[mine], base.rates[theirs]
+
+
+class CameraMasks(NamedTuple):
+    """The masks of a camera of a drive."""
+
+    stamps: npt.NDArray[np.int64]
+    """``(n,)``: nanoseconds of each evaluated frame, to which the masks' positions lead."""
+    masks: Sequence[FrameCounts]
 
 
 class GrowingCounts:
@@ -154,6 +165,16 @@ def sum_up(counts: FourCounts) -> Total:
     known = ~np.isnan(rates)
     sums = np.where(known, rates, 0.0).sum(axis=0)
     return _total(len(counts), counts.sum(axis=0), sums, known.sum(axis=0))
+
+
+def over_cameras(totals: Sequence[Total]) -> Total:
+    """Return the total of cameras together: means of the cameras' means, and pooled pixels."""
+    counts = np.sum([[each[name] for name in OUTCOMES] for each in totals], axis=0)
+    frames = sum(each["frames"] for each in totals)
+    found = _total(frames, counts, *np.zeros((2, len(metrics.METRICS))))
+    means_of = np.array([[each[name] for name in metrics.METRICS] for each in totals])
+    undefined = {n: sum(each["undefined"][n] for each in totals) for n in metrics.METRICS}
+    return {**found, **means(means_of), "undefined": undefined}
 
 
 def means(rates: Floats) -> dict[str, float]:

@@ -18,6 +18,7 @@ from roadeval.data.arrays import Floats
 from roadeval.evaluation import metrics
 from roadeval.evaluation.regions import partitions
 from roadeval.evaluation.score.counts import (
+    CameraMasks,
     FourCounts,
     FrameCounts,
     Total,
@@ -81,6 +82,12 @@ def region_totals(regions: Rows) -> dict[tuple[str, str, str], Total]:
 def overlap(total: Mapping[str, Any]) -> dict[str, float]:
     """Compute IoU, F1 and precision of a total's pooled counts."""
     return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
+
+
+def camera_masks(rows: Rows) -> CameraMasks:
+    """Return the masks of the rows of ``frames`` of a camera, in the table's order."""
+    stamps = dict(zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True))
+    return CameraMasks(np.array([*stamps.values()], np.int64), [*mask_counts(rows)])
 
 
 def mask_counts(rows: Rows) -> Iterator[FrameCounts]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,6 +32,7 @@ from roadeval.data import (
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
+    CameraMasks,
     EdgesAndFlicker,
     FrameCounts,
     GrowingCounts,
@@ -45,7 +47,7 @@ from roadeval.evaluation.score.counts import (
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference, holm, within_drive
+from roadeval.evaluation.stats import CameraRates, Difference, holm, within_drive
 
 TESTED: Final = "ERR"
 """The rate whose differences are findings. Those of the final masks against one base are a family,
@@ -68,9 +70,10 @@ class Effect:
     rates: Mapping[str, Difference]
 
 
-def drive_effects(masks: Sequence[FrameCounts], settings: EvaluationSettings) -> list[Effect]:
+def drive_effects(cameras: Sequence[CameraMasks], settings: EvaluationSettings) -> list[Effect]:
     """Compute the differences of a drive: of final masks, and of the filter stage by stage."""
-    by_name = {(mask.variant, mask.stage): mask for mask in masks}
+    masks = [{(mask.variant, mask.stage): mask for mask in each.masks} for each in cameras]
+    by_name = dict.fromkeys(name for own in masks for name in own)
     finals = final_stages(by_name)
     found = []
     for base in (base for base in BASES if base in finals):
@@ -83,13 +86,18 @@ def drive_effects(masks: Sequence[FrameCounts], settings: EvaluationSettings) ->
                 base_stage = finals[base] if final else stage
                 of_filter = (base, variant) == (UNFILTERED, FILTERED)
                 if final or (of_filter and (base, stage) in by_name):
-                    new, old = by_name[variant, stage].paired(by_name[base, base_stage])
+                    pairs = [
+                        (each.stamps, *own[variant, stage].paired(own[base, base_stage]))
+                        for each, own in zip(cameras, masks, strict=True)
+                        if {(variant, stage), (base, base_stage)} <= own.keys()
+                    ]
                     rates = {
                         rate: within_drive(
-                            *(new[:, column], old[:, column], settings),
+                            [CameraRates(s[at], new[:, n], old[:, n]) for s, at, new, old in pairs],
+                            settings,
                             higher_is_better=metric.higher_is_better,
                         )
-                        for column, (rate, metric) in enumerate(METRICS.items())
+                        for n, (rate, metric) in enumerate(METRICS.items())
                         if rate in COMPARED
                     }
                     family.append(Effect(base, base_stage, variant, stage, final, rates))
@@ -161,6 +169,7 @@ class Scoreboard:
         self._order: Final = (*variants, BASELINE)
         self._prior: Final = prior
         self._frames: Final[list[int]] = []
+        self._stamps: Final = array("q")
         self._roles: Final[Counter[str]] = Counter()
         self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
         self._counts: Final = GrowingCounts()
@@ -207,6 +216,7 @@ class Scoreboard:
             self.changes[step] += change
         self.curves.add(result.histograms)
         self._frames.append(result.frame.number)
+        self._stamps.append(result.frame.stamp_ns)
 
     def lose(self) -> None:
         """Note that a frame was read here and could not be decoded."""
@@ -239,7 +249,7 @@ class Scoreboard:
 
     def effects(self) -> list[Effect]:
         """Return the paired differences of the drive."""
-        return drive_effects(self._masks(), self._settings)
+        return drive_effects([self.masks()], self._settings)
 
     def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the evaluated frames' ERR at the threshold that the training frames choose.
@@ -292,6 +302,10 @@ class Scoreboard:
             "seconds": seconds,
         }
 
+    def masks(self) -> CameraMasks:
+        """Return the counts of every mask, as the camera of a drive."""
+        return CameraMasks(np.array(self._stamps, np.int64), self._masks())
+
     def _masks(self) -> list[FrameCounts]:
         """Return the counts by variant in the tables' order, then by stage as they ran."""
         masks = self._counts.so_far().values()
@@ -307,6 +321,6 @@ def _totals(masks: Sequence[FrameCounts]) -> Totals:
 
 def _mean_difference(training: Mapping[Name, FrameCounts], stage: str) -> dict[str, float]:
     """Return the mean difference of each rate, filtered minus unfiltered."""
-    new, base = training[FILTERED, stage].paired(training[UNFILTERED, stage])
+    _, new, base = training[FILTERED, stage].paired(training[UNFILTERED, stage])
     known = {rate: own[~np.isnan(own)] for rate, own in zip(METRICS, (new - base).T, strict=True)}
     return {rate: float(own.mean()) if len(own) else math.nan for rate, own in known.items()}

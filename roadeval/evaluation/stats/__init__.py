@@ -1,6 +1,7 @@
 """The statistics: differences with intervals, within a drive and over drives, and corrections."""
 
 from roadeval.evaluation.stats.autocorrelation import (
+    CameraRates,
     Difference,
     benjamini_hochberg,
     holm,

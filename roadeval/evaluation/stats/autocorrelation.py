@@ -265,19 +265,38 @@ class Difference:
         return f"{count} {noun} {verb} too few for an interval ({self.needed} are needed)"
 
 
+class CameraRates(NamedTuple):
+    """The rates of two masks on the same frames of a camera, in its order.
+
+    NaN where a rate is undefined, which leaves the frame out.
+    """
+
+    stamps: npt.NDArray[np.int64]
+    """``(n,)`` nanoseconds."""
+    rates: Series
+    base: Series
+    """``(n,)`` each."""
+
+    def known(self) -> CameraRates:
+        """Return them on the frames that have both."""
+        both = ~np.isnan(self.rates - self.base)
+        return CameraRates(self.stamps[both], self.rates[both], self.base[both])
+
+
 def within_drive(
-    rates: Series, base: Series, settings: EvaluationSettings, *, higher_is_better: bool = False
+    cameras: Sequence[CameraRates], settings: EvaluationSettings, *, higher_is_better: bool = False
 ) -> Difference:
     """Average paired differences of a drive's frames, ``rates - base``, with an interval.
 
-    Both are ``(n,)`` float64, one a frame in the drive's order; NaN where a rate is undefined,
-    which leaves the frame out.
+    Of several cameras it is the mean of the cameras' means. Frames that they took at the same
+    time are no further evidence: a camera that is there twice changes nothing, see `at_moments`.
     """
-    differences = rates - base
-    known = ~np.isnan(differences)
-    series, n = differences[known], int(known.sum())
+    kept = [known for each in cameras if len((known := each.known()).stamps)]
+    frames = np.concatenate([[], *(each.rates - each.base for each in kept)])
+    series = at_moments(kept) if len(kept) > 1 else frames
+    n = len(frames)
     mean, confidence = float(series.mean()) if n else math.nan, settings.confidence
-    worse, better = int((series > 0).sum()), int((series < 0).sum())
+    worse, better = int((frames > 0).sum()), int((frames < 0).sum())
     if higher_is_better:
         worse, better = better, worse
     found = Difference(
@@ -286,14 +305,14 @@ def within_drive(
         better=better,
         equal=n - worse - better,
     )
-    if n < settings.least_frames:
+    if len(series) < settings.least_frames:
         return replace(found, needed=settings.least_frames)
     if np.ptp(series) == 0:
-        same, sure = float(mean == 0), float(n)
+        same, sure = float(mean == 0), float(len(series))
         return replace(found, low=mean, high=mean, p=same, effective=sure, standard_error=0.0)
     means = mean_distribution(series)
     low, high = means.interval(confidence)
-    level = float(base[known].mean())
+    level = float(np.mean([each.base.mean() for each in kept]))
     return replace(
         found,
         low=max(low, -level),
@@ -302,6 +321,34 @@ def within_drive(
         effective=means.frames,
         standard_error=means.scale,
     )
+
+
+def at_moments(cameras: Sequence[CameraRates]) -> Series:
+    """Return a value a moment; their mean is that of the cameras' mean differences.
+
+    It varies as that mean does: at moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)``
+    over the frames i that were taken then, each by a camera c of C, which has n_c frames. The
+    moments are the frames of the camera that has most; a frame of another belongs to the nearest.
+    """
+    clock = max(cameras, key=lambda each: len(each.stamps)).stamps
+    total, sums = 0.0, np.zeros(len(clock))
+    for each in cameras:
+        differences = each.rates - each.base
+        own = differences.mean()
+        total += own / len(cameras)
+        parts = (differences - own) * (len(clock) / (len(cameras) * len(differences)))
+        np.add.at(sums, _nearest(clock, each.stamps), parts)
+    return total + sums
+
+
+def _nearest(clock: npt.NDArray[np.int64], stamps: npt.NDArray[np.int64]) -> npt.NDArray[np.intp]:
+    """Return the place in ``clock`` that is nearest to each stamp."""
+    order = np.argsort(clock, kind="stable")
+    rising = clock[order]
+    after = np.clip(np.searchsorted(rising, stamps), 1, max(len(clock) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(clock) - 1)
+    return order[np.where(stamps - rising[before] <= rising[after] - stamps, before, after)]
 
 
 def holm(family: Sequence[Difference]) -> list[Difference]:

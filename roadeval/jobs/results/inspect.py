@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,6 +44,8 @@ class WorstFrame:
     """In a fleet: the file of its errors."""
     recording: Path | None = None
     """The drive's recording, where there is one."""
+    camera: str = ""
+    """Of a rig: which camera's frame it is."""
 
 
 def worst_frames(
@@ -60,11 +62,14 @@ def worst_frames(
         if not rows:
             raise _nothing_scored(fleet.path)
         return [_of_fleet(fleet, row) for row in rows[:count]]
-    assert result.drive is not None
-    found = _ranked(result.drive, count or LISTED, variant)
+    cameras = result.rig.cameras if result.rig else [each for each in [result.drive] if each]
+    found = [frame for each in cameras for frame in _ranked(each, count or LISTED, variant)]
+    found = sorted(found, key=lambda each: -(each.rates["ERR"] or 0.0))[: count or LISTED]
+    found = [replace(each, rank=rank) for rank, each in enumerate(found, 1)]
     if not found:
+        (path,) = result.paths
         raise RoadevalError(
-            f"{result.drive.path}: ERR of {variant or _scored(result.drive)[0]} is undefined on "
+            f"{path}: ERR of {variant or _scored(cameras[0])[0]} is undefined on "
             "every frame, so no frame is the worst"
         )
     return found
@@ -103,6 +108,7 @@ def _ranked(
             parts=causes.of(frame),
             notes=drive.notes(frame, chosen),
             recording=drive.path if drive.recording else None,
+            camera=drive.camera,
         )
         for place, (frame, stamp) in enumerate(zip(frames, stamps, strict=True))
     ]

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from roadeval.data import Rows
 from roadeval.data.result import Cells
+from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
@@ -20,7 +21,7 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.frames import FramePicker, browsed, evenly, strips_of
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import DriveResult, Result, RigResult
 from roadeval.report.blocks import Document, ImageFile
 from roadeval.report.charts.standard import BEHIND, WRONG
 from roadeval.report.document import document, page_document
@@ -34,6 +35,7 @@ from roadeval.report.findings import (
 )
 from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.tables import parquet_rows
@@ -96,6 +98,8 @@ def findings_of(
     result: Result, commands: Commands | None, worst: int = WORST_OF_FLEET
 ) -> Findings | FleetFindings:
     """Collect what the report of a result shows, with so many of a fleet's worst frames."""
+    if result.rig:
+        return collect_rig(result.rig, commands)
     if result.fleet:
         return collect_fleet(result.fleet, commands.inspect if commands else None, worst)
     assert result.drive is not None
@@ -161,10 +165,7 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         windows=_windows(result),
         paired=paired,
         regions=score.by_region(result.table("regions")) if len(rows) else {},
-        overlap={
-            variant: {stage: score.overlap(total) for stage, total in stages.items()}
-            for variant, stages in facts.totals.items()
-        },
+        overlap=_overlap(facts),
         changes=_stage_changes(changes),
         error_parts=picker.error_parts(),
         heatmaps={name: _heatmap(heat.of_variant(name)) for name in heat.distinct("variant")},
@@ -179,7 +180,53 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         harmed=picker.moved(paired, worst, harmed=True),
         coverage=_coverage(result, pictured),
         behind=dict(_behind(rows, score.finals(result.table("regions")))) if len(rows) else {},
+        camera=result.camera,
     )
+
+
+def collect_rig(rig: RigResult, commands: Commands | None = None) -> Findings:
+    """Collect everything that the report of several cameras shows."""
+    facts, of_camera = rig.facts, commands and commands.of_camera
+    own = {e.camera: collect(e, of_camera and of_camera(e.camera)) for e in rig.cameras}
+    names = short_names([*own])
+    nothing = as_arrays("windows", ())
+    pairs = [each for each in facts.effects if each.final]
+    return Findings(
+        source=str(rig.path),
+        complete=all(each.complete for each in own.values()),
+        commands=commands,
+        viewable=False,
+        pictured=sum(each.pictured for each in own.values()),
+        facts=facts,
+        properties={},
+        windows=nothing,
+        paired=[PairedComparison(e.variant, e.base, e.rates, nothing) for e in pairs],
+        regions={},
+        overlap=_overlap(facts),
+        changes={},
+        error_parts={},
+        heatmaps=[],
+        oracles=[],
+        levels=as_arrays("probabilities", ()),
+        examples=[],
+        thumbnails=[
+            replace(image, title=f"{names[camera]}, {image.title}")
+            for camera, each in own.items()
+            for image in each.thumbnails[:1]
+        ],
+        worst=[],
+        helped=[],
+        harmed=[],
+        coverage={},
+        cameras=own,
+    )
+
+
+def _overlap(facts: Facts) -> dict[str, dict[str, dict[str, float]]]:
+    return {
+        variant: {stage: score.overlap(total) for stage, total in stages.items()}
+        for variant, stages in facts.totals.items()
+    }
 
 
 def _behind(rows: Rows, regions: Rows) -> Iterator[tuple[tuple[str, str, str], list[int]]]:

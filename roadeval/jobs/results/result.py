@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
@@ -19,6 +20,7 @@ from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.facts import (
+    SUMMARY,
     DriveFacts,
     Facts,
     FleetFacts,
@@ -47,15 +49,16 @@ NO_NUMBER: Final = ("output", "run", "fleet")
 
 
 class DriveResult:
-    """The result of a replay, from an ``.rrd`` or a results folder.
+    """The result of a replay, from an ``.rrd`` or a results folder; of a rig that of a ``camera``.
 
     A `RoadevalError` if it is neither, or by another program or format.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, camera: str = "") -> None:
         self.path = Path(path)
-        self.recording = None if self.path.is_dir() else _recording(self.path)
-        self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path)
+        self.camera: Final = camera
+        self.recording = None if self.path.is_dir() else _recording(self.path, camera)
+        self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path, camera)
         self._read: Final[dict[str, Rows]] = {}
 
     @property
@@ -72,6 +75,11 @@ class DriveResult:
     def name(self) -> str:
         """The drive's name."""
         return self.recording.layout.drive if self.recording else self.facts.drive.name
+
+    @property
+    def title(self) -> str:
+        """The drive's name, and in a rig the camera's."""
+        return f"{self.name}, {self.camera}" if self.camera else self.name
 
     @property
     def configuration(self) -> Path | None:
@@ -95,7 +103,7 @@ class DriveResult:
         if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None
         try:
-            other = DriveResult(path).facts.log_digest
+            other = DriveResult(path, self.camera).facts.log_digest
         except RoadevalError:
             return None
         return path if other == self.facts.log_digest else None
@@ -106,11 +114,15 @@ class DriveResult:
         if not self.complete:
             assert self.recording is not None
             layout, settings = self.recording.layout, EvaluationSettings()
-            effects = drive_effects(list(score.mask_counts(self.rows)), settings)
+            effects = drive_effects([score.camera_masks(self.rows)], settings)
             totals = score.totals(self.rows)
             return Facts(
                 verdict(totals, effects, settings),
-                DriveFacts(layout.drive, width=layout.width, height=layout.height),
+                DriveFacts(
+                    layout.drive,
+                    str(layout.properties.get("image_topic", "")),
+                    *(layout.width, layout.height),
+                ),
                 FrameAccount(
                     trained_on=int(layout.properties.get("training_frames", 0)),
                     evaluated=len(self.rows.distinct("frame")),
@@ -193,6 +205,51 @@ class DriveResult:
         return both
 
 
+class RigResult:
+    """The result of a replay of several cameras, each of which is a `DriveResult`.
+
+    A `RoadevalError` as of one of these, or if the run did not reach its end.
+    """
+
+    def __init__(self, path: Path, cameras: Sequence[str]) -> None:
+        self.path: Final = path
+        self.cameras: Final = [DriveResult(path, name) for name in cameras]
+
+    @property
+    def name(self) -> str:
+        """The drive's name."""
+        return self.cameras[0].name
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings that a reader should see first."""
+        return self.cameras[0].warnings
+
+    @cached_property
+    def facts(self) -> Facts:
+        """The facts of all cameras together; of an incomplete run, those of the first."""
+        if self.path.is_dir():
+            return Facts.read(self.path / SUMMARY)
+        from roadeval.recording import rig_facts
+
+        return rig_facts(self.path) or self.cameras[0].facts
+
+
+Opened = DriveResult | RigResult | FleetFolder
+
+
+def _open(path: Path, *, trust_sources: bool) -> Opened:
+    if is_fleet(path):
+        return FleetFolder(path, trust_sources=trust_sources)
+    if path.is_dir():
+        cameras: Sequence[str] = [*Facts.read(path / SUMMARY).cameras]
+    else:
+        from roadeval.recording import cameras_of
+
+        cameras = cameras_of(path)
+    return RigResult(path, cameras) if cameras else DriveResult(path)
+
+
 class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 
@@ -219,10 +276,33 @@ class Result:
 
     def __init__(self, *paths: str | Path, trust_sources: bool = False) -> None:
         self.paths: Final = tuple(map(Path, paths))
-        self._opened: Final = [
-            FleetFolder(path, trust_sources=trust_sources) if is_fleet(path) else DriveResult(path)
-            for path in self.paths
+        self._opened: list[Opened] = [
+            _open(path, trust_sources=trust_sources) for path in self.paths
         ]
+
+    @cached_property
+    def cameras(self) -> dict[str, Result]:
+        """The result of each camera of a rig that was opened alone, by its name; else none."""
+        found = {}
+        for each in self.rig.cameras if self.rig else ():
+            own = copy(self)
+            own._opened = [each]
+            found[each.camera] = own
+        return found
+
+    @property
+    def rig(self) -> RigResult | None:
+        """The result of several cameras of a drive, where that was opened alone."""
+        (first, *more) = self._opened
+        return first if isinstance(first, RigResult) and not more else None
+
+    @property
+    def _drives(self) -> list[DriveResult | FleetFolder]:
+        """What was opened, a rig camera by camera."""
+        found: list[DriveResult | FleetFolder] = []
+        for each in self._opened:
+            found += each.cameras if isinstance(each, RigResult) else [each]
+        return found
 
     @property
     def name(self) -> str:
@@ -259,7 +339,7 @@ class Result:
     @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings that a reader should see first."""
-        own = (each.warnings for each in self._opened if isinstance(each, DriveResult))
+        own = (each.warnings for each in self._opened if not isinstance(each, FleetFolder))
         return tuple(chain.from_iterable(own))
 
     @property
@@ -274,7 +354,7 @@ class Result:
             (row["variant"] for row in each.facts.rates)
             if isinstance(each, FleetFolder)
             else each.rows.distinct("variant")
-            for each in self._opened
+            for each in self._drives
         )
         return [*dict.fromkeys(chain(*found))]
 
@@ -283,7 +363,7 @@ class Result:
         """The drives."""
         return tuple(
             part
-            for each in self._opened
+            for each in self._drives
             for part in (_members(each) if isinstance(each, FleetFolder) else [_alone(each)])
         )
 
@@ -312,14 +392,14 @@ class Result:
         """A row per evaluated frame, variant and stage of every drive."""
         return _together(
             table
-            for each in self._opened
+            for each in self._drives
             for table in ([each.frames] if isinstance(each, DriveResult) else each.all_frames())
         )
 
     def _table(self, name: str) -> pd.DataFrame:
         return _together(
             each.table(name).to_pandas() if isinstance(each, FleetFolder) else _own(each, name)
-            for each in self._opened
+            for each in self._drives
         )
 
 
@@ -345,9 +425,11 @@ def _own(result: DriveResult, name: str) -> pd.DataFrame:
 
 
 def _alone(result: DriveResult) -> Part:
+    facts = result.facts
     return Part(
-        *(result.name, result.name, result.facts.log_digest),
-        *(len(result.rows) > 0, asked(result.facts.run) | contents(result.facts), result.table),
+        *(result.name, result.title, facts.log_digest, len(result.rows) > 0),
+        *(asked(facts.run) | contents(facts), result.table),
+        camera=facts.drive.camera,
     )
 
 
@@ -370,6 +452,7 @@ def _members(fleet: FleetFolder) -> Iterator[Part]:
             rows=partial(_rows_of_member, fleet, member.drive),
             group=member.group,
             tags=member.tags,
+            camera=row["camera"] or "",
         )
 
 
@@ -419,8 +502,8 @@ def _digest(value: Any, *keys: str) -> str:
     return value[:8] if isinstance(value, str) else ""
 
 
-def _recording(path: Path) -> Recording:
+def _recording(path: Path, camera: str) -> Recording:
     # Only here: a folder is read without what reads a recording.
     from roadeval.recording import Recording
 
-    return Recording(path)
+    return Recording(path, camera)

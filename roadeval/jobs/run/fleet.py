@@ -15,7 +15,14 @@ from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison import Condition
 from roadeval.fleet.engine import ATTEMPTS, died, started
-from roadeval.fleet.entry import DriveEntry, FleetError, deal, groups_of, shuffled
+from roadeval.fleet.entry import (
+    DriveEntry,
+    FleetError,
+    deal,
+    groups_of,
+    shuffled,
+    with_cameras,
+)
 from roadeval.fleet.sources import find_drives
 from roadeval.jobs.run.fleet_work import (
     Done,
@@ -142,6 +149,9 @@ def replay_fleet(
     """
     config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in listed(drives)])
+    if config.cameras:
+        entries = with_cameras(entries, config.cameras)
+        config = replace(config, cameras=())
     if config.fleet.folds is not None and config.training.model is not None:
         raise FleetError(
             "`fleet.folds` and `training.model` do not go together: folds train models"

@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol
 
 from roadeval import logs
 from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig, Variant
-from roadeval.data import FrameResult, Role, VariantLayout
+from roadeval.data import Calibration, FrameResult, Role, VariantLayout
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
@@ -60,11 +60,13 @@ class Failure:
     traceback: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Failures:
     """The frames on which a stage has failed so far, in their order, by variant and error."""
 
     by_error: dict[tuple[str, str], list[Failure]] = field(default_factory=dict)
+    first: list[Failure] | None = field(default_factory=list)
+    """Those of `TRIED` roles; None once a frame of these did not fail."""
 
     def __len__(self) -> int:
         return sum(map(len, self.by_error.values()))
@@ -75,6 +77,8 @@ class Failures:
         own = self.by_error.setdefault(error, [])
         kept = not own and len(self.by_error) <= KEPT
         own.append(failure if kept else replace(failure, traceback=""))
+        if self.first is not None and failure.role in TRIED:
+            self.first.append(failure)
 
     def tracebacks(self) -> tuple[str, ...]:
         """Return where in their code stages failed, for the first few errors."""
@@ -116,6 +120,8 @@ class Run:
     the first frame: a file that they name may be gone after the last.
     """
     board: Scoreboard
+    camera: str = ""
+    """What the camera is called in a rig; elsewhere its topic is its name."""
     beside: set[int] = field(default_factory=set)
     """The training frames of a model file that show a place of this drive, so far."""
     failures: Failures = field(default_factory=Failures)
@@ -124,7 +130,20 @@ class Run:
     @property
     def key(self) -> Key:
         """What every row of its tables begins with."""
-        return Key(self.log.name, self.selection.image.name)
+        return Key(self.log.name, self.camera or self.selection.image.name)
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The camera's calibration, for frames as they are read."""
+        known, size = self.selection.calibration, self.selection.size
+        return known.scaled(*size) if known and size else None
+
+    def add(self, done: ProcessedFrame) -> None:
+        """Add a frame, in the camera's order."""
+        self.board.add(done.result)
+        self.beside.update(done.beside)
+        if done.result.role in TRIED:
+            self.failures.first = None
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""
@@ -140,6 +159,7 @@ class Run:
             has_shadow_truth=self.selection.shadow is not None,
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
+            calibration=self.calibration,
             tables={name: TABLES[name].header for name in STREAMED},
             properties=self._properties(),
         )
@@ -159,10 +179,11 @@ class Run:
         }
 
 
-def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
+def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: str = "") -> Run:
     """Select the topics of a log, train or read the model, and bind the variants' chains.
 
-    A `RoadevalError` if the log, the configuration or the training leave nothing to run.
+    A `RoadevalError` if the log, the configuration or the training leave nothing to run. ``camera``
+    is what the camera is called in a rig.
     """
     selection = log.select()
     again = partial(log.frames, selection)
@@ -206,6 +227,7 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
+        camera,
     )
 
 
@@ -350,33 +372,40 @@ class ProcessedFrame:
     beside: frozenset[int]
 
 
-def process(run: Run, encoder: Encoder, on_progress: OnProgress) -> Iterator[ProcessedFrame]:
-    """Yield every decodable frame in order, and add it to the run's score.
+def process(
+    runs: Sequence[Run], encoder: Encoder, on_progress: OnProgress
+) -> Iterator[tuple[Run, ProcessedFrame]]:
+    """Yield every decodable frame of the cameras by log time, and add it to its run's score.
 
     Decoding, computing, scoring and encoding happen in the worker threads.
     """
-    total, workers = len(run.frames), run.config.run.jobs or os.cpu_count() or 1
-    work = partial(_process, run, encoder)
-    failed: list[Failure] | None = []  # None once a frame beside the training did not fail
-    for position, done in enumerate(ordered(work, enumerate(run.frames, 1), workers), 1):
+    total = sum(len(run.frames) for run in runs)
+    workers = runs[0].config.run.jobs or os.cpu_count() or 1
+    work = partial(_process, encoder)
+    for position, (run, done) in enumerate(ordered(work, _numbered(runs), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
             trim()
         if isinstance(done, ProcessedFrame):
-            run.board.add(done.result)
-            run.beside.update(done.beside)
-            failed = None if done.result.role in TRIED else failed
-            yield done
+            run.add(done)
+            yield run, done
             continue
         run.board.lose()
         if done is not None:
             run.failures.add(done)
-            if failed is not None and done.role in TRIED:
-                failed.append(done)
-                if len(failed) == HOPELESS:
-                    break
-    if failed:
-        raise _hopeless(run, failed) from StageError(failed[0].traceback)
+            if len(run.failures.first or ()) == HOPELESS:
+                break
+    for run in runs:
+        if first := run.failures.first:
+            raise _hopeless(run, first) from StageError(first[0].traceback)
+
+
+def _numbered(runs: Sequence[Run]) -> Iterator[tuple[Run, int, logs.LoggedFrame]]:
+    """Yield the frames of the cameras by log time, each with its position among its camera's."""
+    read = [0] * len(runs)
+    for place, logged in logs.in_step([run.frames for run in runs]):
+        read[place] += 1
+        yield runs[place], read[place], logged
 
 
 def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:
@@ -391,13 +420,13 @@ def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:
 
 
 def _process(
-    run: Run, encoder: Encoder, item: tuple[int, logs.LoggedFrame]
-) -> ProcessedFrame | Failure | None:
-    position, logged = item
+    encoder: Encoder, item: tuple[Run, int, logs.LoggedFrame]
+) -> tuple[Run, ProcessedFrame | Failure | None]:
+    run, position, logged = item
     try:
         frame = replace(logged.decode(), camera=run.key.camera)
     except logs.FrameError:
-        return None  # the log's accounting has it, with the reason
+        return run, None  # the log's accounting has it, with the reason
     use = run.schedule.use(frame)
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
@@ -412,7 +441,7 @@ def _process(
             continue
         except StageError as error:
             where = "".join(traceback.format_exception(error))
-            return Failure(frame.number, use.role, name, str(error), where)
+            return run, Failure(frame.number, use.role, name, str(error), where)
         variants.append(found)
     variants += [
         external_variant(name, mask, frame.probabilities.get(name))
@@ -424,4 +453,4 @@ def _process(
     own = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1, own)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
-    return ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)
+    return run, ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)

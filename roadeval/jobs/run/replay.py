@@ -11,6 +11,7 @@ from typing import Any, Final
 from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
+from roadeval.data.words import short_names
 from roadeval.evaluation.comparison import Condition, Judgement
 from roadeval.fleet import readable
 from roadeval.jobs.outputs import Outputs
@@ -23,7 +24,7 @@ from roadeval.results.comparison import judged
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.over_drives import check_conditions, judge_drives
-from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
+from roadeval.results.rows import Row, as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
@@ -132,69 +133,118 @@ def _written(
     log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
 ) -> Outcome:
     """Run over the log. All outputs are whole before the first of them takes its name."""
-    run = prepare(log, config, on_progress)
+    cameras = config.by_camera()
+    runs = [prepare(log.for_camera(own), own, on_progress, name) for name, own in cameras.items()]
+    layouts = {run.camera: run.layout() for run in runs}
     rule = RecordRule.parse(config.output.record)
     with (
         logs.SidecarWriter(to.mcap) if to.mcap else logs.NoSidecar() as sidecar,
-        recorder_for(to.recording, run.layout(), rule) as recorder,
+        recorder_for(to.recording, layouts, rule) as recorder,
         ResultsWriter(to.reports) as results,
     ):
-        examples = _record(
-            run, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
+        drawn = _record(
+            runs, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
         )
-        rows = sum_rows(run.board)
-        sums = csv_lines(run.key, rows)
-        results.append(sums)
-        shown = [each.frame for each in examples]
-        facts = summary.of(run, shown, results.tables)
-        of_drive = {
-            "scores": list(score_rows(facts, run.board.regions())),
-            "effects": list(effect_rows(facts)),
-        }
-        tracebacks = run.failures.tracebacks()
-        recorder.finish(_texts(run, facts, sums))
+        ended = [_ended(run, results, drawn[run.camera]) for run in runs]
+        facts = _finished(runs, ended, recorder, results, config)
         sidecar.finish()
-        del run  # figures take the room of its frames and models
+        tracebacks = tuple(text for run in runs for text in run.failures.tracebacks())
+        del runs  # figures take the room of its frames and models
         trim()
         if config.output.figures:
             from roadeval.report.figures import write_figures
 
             with results.explained():
-                windows = as_arrays("windows", rows["windows"])
-                write_figures(results.folder, log.name, windows, examples)
+                names = short_names([*cameras])
+                for camera, own in zip(cameras, ended, strict=True):
+                    windows = as_arrays("windows", own.windows)
+                    write_figures(results.folder, log.name, windows, drawn[camera], names[camera])
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
     return Outcome(
         *(to.recording, to.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
         tuple(files),
         tracebacks=tracebacks,
-        rows=of_drive,
+        rows={name: [row for own in ended for row in own.rows[name]] for name in ended[0].rows},
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ended:
+    """What a camera's run has found."""
+
+    facts: Facts
+    texts: Mapping[str, str]
+    """Of its results, as the recording keeps them."""
+    windows: Sequence[Row]
+    rows: Mapping[str, list[dict[str, Any]]]
+    """Those of ``scores`` and ``effects``."""
+
+
+def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _Ended:
+    """Sum up a camera's run, and add the sums to the tables."""
+    rows = sum_rows(run.board)
+    sums = csv_lines(run.key, rows)
+    results.append(sums, run.camera)
+    shown = [each.frame for each in examples]
+    facts = summary.of(run, shown, results.tables_of(run.camera))
+    scores = list(score_rows(facts, run.board.regions()))
+    if run.camera:
+        scores = [{"drive": f"{run.log.name} {run.camera}", **row} for row in scores]
+    return _Ended(
+        facts,
+        _texts(run, facts, sums),
+        rows["windows"],
+        {"scores": scores, "effects": list(effect_rows(facts))},
+    )
+
+
+def _finished(
+    runs: Sequence[Run],
+    ended: Sequence[_Ended],
+    recorder: Recorder | NullRecorder,
+    results: ResultsWriter,
+    config: RunConfig,
+) -> Facts:
+    """Give the recording what was found; return the facts, of several cameras together."""
+    if len(runs) == 1:
+        recorder.finish(ended[0].texts)
+        return ended[0].facts
+    found = {run.camera: own.facts for run, own in zip(runs, ended, strict=True)}
+    facts = summary.of_cameras([run.board for run in runs], found, results.tables)
+    # The seconds differ from run to run, see `_texts`.
+    steady = {name: replace(each, seconds={}) for name, each in found.items()}
+    kept = replace(facts, run=deciding(config).as_dict(), cameras=steady)
+    toml = run_toml(deciding(config), facts.drive.name, VERSION)
+    by_camera = {run.camera: own.texts for run, own in zip(runs, ended, strict=True)}
+    recorder.finish({"summary": kept.text(), "run": toml}, by_camera=by_camera)
+    return facts
+
+
 def _record(
-    run: Run,
+    runs: Sequence[Run],
     recorder: Recorder | NullRecorder,
     results: ResultsWriter,
     sidecar: logs.SidecarWriter | logs.NoSidecar,
     *,
     on_progress: OnProgress,
     on_frame: OnFrame,
-) -> list[ExampleFrame]:
-    """Run over the frames; return those for the figure of masks."""
-    examples = ExampleFrames(len(run.frames))
-    for done in process(run, recorder, on_progress):
-        if forecast := recorder.forecast(done.encoded, len(run.frames)):
-            on_progress(Progress(done.position, len(run.frames), "replaying", forecast))
+) -> dict[str, list[ExampleFrame]]:
+    """Run over the frames; return those for the figure of masks, by camera."""
+    examples = {run.camera: ExampleFrames(len(run.frames)) for run in runs}
+    total = sum(len(run.frames) for run in runs)
+    for position, (run, done) in enumerate(process(runs, recorder, on_progress), 1):
+        if forecast := recorder.forecast(done.encoded, total):
+            on_progress(Progress(position, total, "replaying", forecast))
         recorder.write(done.encoded)
-        results.append(done.lines)
-        sidecar.write(done.result)
-        examples.offer(done.position, done.result)
+        results.append(done.lines, run.camera)
+        sidecar.write(done.result, run.selection.image.frame_id, run.camera)
+        examples[run.camera].offer(done.position, done.result)
         on_frame(done.result)
-    on_progress(Progress(len(run.frames), len(run.frames), "writing"))
+    on_progress(Progress(total, total, "writing"))
     recorder.flush()
     trim()
-    return examples.kept
+    return {camera: each.kept for camera, each in examples.items()}
 
 
 def _texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:

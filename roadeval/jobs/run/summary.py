@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import platform
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from typing import Any, Final
 
 from roadeval.config import AS_IT_IS, TUNED
 from roadeval.data import BASELINE, FINAL_STAGE, Role
+from roadeval.evaluation.score import Scoreboard, drive_effects, over_cameras
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.results.facts import (
     DriveFacts,
@@ -48,6 +50,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             *(run.selection.size or (0, 0)),
             rate_hz=run.selection.image.rate_hz,
             topics=[*run.selection.reasons, *run.config.ignored()],
+            calibration=run.calibration,
         ),
         frames=_accounting(run),
         seeds={"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else {},
@@ -89,6 +92,68 @@ def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, float]]]:
     for name, threshold in own.items():
         for at in found.get(name, {}).values():
             yield name, {"own": threshold, **at}
+
+
+def of_cameras(
+    boards: Sequence[Scoreboard], found: Mapping[str, Facts], tables: dict[str, TableFacts]
+) -> Facts:
+    """Return the facts of a rig: of its cameras together, each of which counts the same."""
+    first, *_ = found.values()
+    by_mask: defaultdict[tuple[str, str], list[Any]] = defaultdict(list)
+    for own in found.values():
+        for variant, stages in own.totals.items():
+            for stage, total in stages.items():
+                by_mask[variant, stage].append(total)
+    totals: dict[str, dict[str, Any]] = {}
+    for (variant, stage), sums in by_mask.items():
+        totals.setdefault(variant, {})[stage] = over_cameras(sums)
+    settings = first.evaluation
+    effects = drive_effects([board.masks() for board in boards], settings)
+    claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
+    accounts = [asdict(each.frames) for each in found.values()]
+    skipped = Counter[str]()
+    for account in accounts:
+        skipped.update(account.pop("skipped"))
+    counted = {name: sum(each[name] or 0 for each in accounts) for name in accounts[0]}
+    return replace(
+        first,
+        **as_parts(effects),
+        verdict=verdict(totals, effects, settings, claims),
+        drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
+        frames=FrameAccount(**counted, skipped=dict(skipped)),
+        totals=totals,
+        windows=sum(each.windows for each in found.values()),
+        claims=claims,
+        health=_added(each.health for each in found.values()),
+        warnings=[*_by_camera({name: each.warnings for name, each in found.items()})],
+        losses=[*_by_camera({name: each.losses for name, each in found.items()})],
+        beyond={},
+        curves={},
+        thresholds={},
+        seeds={},
+        oracles={},
+        seconds={},
+        examples=[],
+        training=TrainingFacts(first.training.source, model=first.training.model),
+        tables=tables,
+        cameras={**found},
+    )
+
+
+def _added(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
+    """Add up the cameras' counts, by two names each."""
+    sums: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for each in parts:
+        for name, counts in each.items():
+            sums[name].update(counts)
+    return {name: dict(counts) for name, counts in sums.items()}
+
+
+def _by_camera(found: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Yield the cameras' sentences: with the camera's name, but for what all say."""
+    common = [each for each in next(iter(found.values())) if all(each in s for s in found.values())]
+    yield from common
+    yield from (f"{name}: {e}" for name, own in found.items() for e in own if e not in common)
 
 
 def versions() -> dict[str, str]:

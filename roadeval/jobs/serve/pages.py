@@ -76,7 +76,8 @@ def serving(
     """Yield a server of results, as of `serve`; what it started ends with the block."""
     with ExitStack() as stack:
         replayer, viewer = Replayer(), WindowViewer()
-        opened = [Result(path, trust_sources=trust_sources) for path in listed(results)]
+        whole = [Result(path, trust_sources=trust_sources) for path in listed(results)]
+        opened = [own for each in whole for own in (each, *each.cameras.values())]
         site = _Site([_served(each, commands, replayer) for each in opened], viewer)
         stack.callback(viewer.close)
         stack.callback(replayer.cancel)
@@ -130,6 +131,7 @@ class _Site:
                 f"compare/{base}/{new}",
             )
             for base, new in combinations(range(len(rows)), 2)
+            if self._served[base].path != self._served[new].path
         ]
         blocks = [
             Heading("Results"),
@@ -148,7 +150,8 @@ class _Site:
 def _served(result: Result, commands: MakeCommands | None, replayer: Replayer) -> _Served:
     if result.fleet:
         return _ServedFleet(result, commands, result.fleet, replayer)
-    assert result.drive is not None
+    if result.drive is None:
+        return _Served(result, commands, Place("pictures/", "../", None, "../"))
     return _ServedDrive(result, commands, result.drive)
 
 
@@ -157,7 +160,7 @@ class _Served:
 
     def __init__(self, result: Result, make_commands: MakeCommands | None, place: Place) -> None:
         (self.path,) = result.paths
-        self.title: Final = result.name
+        self.title: Final = result.drive.title if result.drive else result.name
         self._result: Final = result
         self._make_commands: Final = make_commands
         self._commands: Final = make_commands(result) if make_commands else None
@@ -204,9 +207,9 @@ class _Served:
     def _picture(self, name: str) -> bytes | None:
         return self._pictures.get(name)
 
-    def _more(self, request: Request, viewer: WindowViewer) -> Response:
+    def _more(self, request: Request, viewer: WindowViewer) -> Response:  # noqa: ARG002
         """Answer below the page."""
-        raise NotImplementedError
+        return NOT_FOUND
 
 
 class _ServedDrive(_Served):

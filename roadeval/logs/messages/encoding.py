@@ -29,6 +29,8 @@ class TopicKind(StrEnum):
     IMAGE = "image"
     COMPRESSED = "compressed"
     VIDEO = "video"
+    CALIBRATION = "calibration"
+    TRANSFORMS = "transforms"
     OTHER = "other"
 
 
@@ -71,7 +73,11 @@ SCHEMAS: Final = {
 }
 """By package and message."""
 
-KINDS: Final = {name.partition("/")[2]: schema.kind for name, schema in SCHEMAS.items()}
+PICTURES: Final = (TopicKind.IMAGE, TopicKind.COMPRESSED, TopicKind.VIDEO)
+KINDS: Final = {name.partition("/")[2]: schema.kind for name, schema in SCHEMAS.items()} | {
+    **dict.fromkeys(("CameraInfo", "CameraCalibration"), TopicKind.CALIBRATION),
+    **dict.fromkeys(("TFMessage", "FrameTransform", "FrameTransforms"), TopicKind.TRANSFORMS),
+}
 """By the message alone: its package may be another, with fields of the same names."""
 
 

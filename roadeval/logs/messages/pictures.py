@@ -144,11 +144,13 @@ def nanoseconds(stamp: Any) -> int:
 class Decoder(NamedTuple):
     """Reads the messages of a channel: the whole picture, or only its stamp in nanoseconds.
 
-    Both raise `BadMessage` for a message that cannot be decoded.
+    They raise `BadMessage` for a message that cannot be decoded.
     """
 
     picture: Callable[[Buffer], LoggedPicture]
     stamp: Callable[[Buffer], int]
+    fields: Callable[[Buffer], Any]
+    """Return the message with its fields as attributes, whatever it carries."""
 
 
 @cache
@@ -158,12 +160,17 @@ def message_encodings() -> Mapping[str, Encoding]:
 
 
 def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
-    """Return what a channel carries, by its schema's name."""
+    """Return what a channel carries, by its schema's name.
+
+    Of transforms only those that are static: others come too often to be indexed.
+    """
     encoding = message_encodings().get(channel.message_encoding)
     if schema is None:
         return encoding.without_schema if encoding else TopicKind.OTHER
     kinds = {**KINDS, **encoding.kinds} if encoding else KINDS
-    return kinds.get((parts_of(schema.name) or [""])[-1], TopicKind.OTHER)
+    kind = kinds.get((parts_of(schema.name) or [""])[-1], TopicKind.OTHER)
+    moves = kind is TopicKind.TRANSFORMS and not channel.topic.endswith("static")
+    return TopicKind.OTHER if moves else kind
 
 
 def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
@@ -185,7 +192,11 @@ def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
         with _one_error():
             return nanoseconds(reader.stamp(data))
 
-    return Decoder(picture, stamp)
+    def fields(data: Buffer) -> Any:
+        with _one_error():
+            return reader.decode(data)
+
+    return Decoder(picture, stamp, fields)
 
 
 def message_stamp(channel: Channel, schema: Schema | None, message: Message) -> int | None:

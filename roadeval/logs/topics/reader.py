@@ -17,7 +17,7 @@ from roadeval.images import Limits
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError
-from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.messages.encoding import PICTURES, TopicKind
 from roadeval.logs.messages.pictures import (
     Decoder,
     LoggedPicture,
@@ -78,7 +78,7 @@ class TopicInfo:
     @property
     def is_image(self) -> bool:
         """Whether its messages carry images, as pixels, files or video."""
-        return self.kind is not TopicKind.OTHER
+        return self.kind in PICTURES
 
 
 def describe_topic(reader: TopicReader) -> TopicInfo:
@@ -331,6 +331,10 @@ class TopicReader:
             return self._decoder(position).picture(message.data)
         except BadMessage as error:
             raise self._error(position, str(error)) from error
+
+    def fields(self, position: int) -> Any:
+        """Read a message whatever it carries; a `FrameError` or `BadMessage` if that fails."""
+        return self._decoder(position).fields(self.message(position).data)
 
     def stamp(self, position: int) -> int:
         """Header stamp of a message in nanoseconds, or `UNREADABLE`."""

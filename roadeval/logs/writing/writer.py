@@ -60,6 +60,7 @@ class LogWriter:
         format: str,  # noqa: A002
         *,
         log_time_ns: int | None = None,
+        frame_id: str = FRAME_ID,
     ) -> None:
         """Write an image file as it is.
 
@@ -70,7 +71,7 @@ class LogWriter:
 
         if format not in FORMATS:
             raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
-        message = CompressedImage(frame_id=FRAME_ID, data=data, format=format)
+        message = CompressedImage(frame_id=frame_id, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
 
         def text() -> bytes:
@@ -93,6 +94,7 @@ class LogWriter:
         mask: npt.NDArray[np.uint8],
         *,
         log_time_ns: int | None = None,
+        frame_id: str = FRAME_ID,
     ) -> None:
         """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
 
@@ -103,7 +105,8 @@ class LogWriter:
         codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
         stored = mask if mask.ndim == 2 else cv2.cvtColor(mask, codes[mask.shape[2]])
         _, png = cv2.imencode(".png", stored)
-        self.image(topic, stamp_ns, png.tobytes(), "png", log_time_ns=log_time_ns)
+        content = png.tobytes()
+        self.image(topic, stamp_ns, content, "png", log_time_ns=log_time_ns, frame_id=frame_id)
 
     def json(
         self,
@@ -195,24 +198,27 @@ class SidecarWriter(LogWriter):
 
     ``/roadeval/<variant>/<stage>`` holds a mask (PNG, road 255), ``/roadeval/<variant>/errors``
     the error map in its colours (PNG), ``/roadeval/metrics/<variant>/<stage>`` counts and rates
-    (JSON with a schema).
+    (JSON with a schema). Of a rig the camera's name follows after ``/roadeval``.
     """
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, frame_id: str, camera: str = "") -> None:
         """Write a frame's results; frames come in the order of their log times.
 
-        A `LogError` if the disk is full.
+        ``frame_id`` is the source's, ``camera`` its name in a rig. A `LogError` if the disk is
+        full.
         """
+        root = "/".join(filter(None, (ROOT, camera.strip("/"))))
         stamp, log_time = result.frame.stamp_ns, result.frame.log_time_ns
+        images: dict[str, npt.NDArray[np.uint8]] = {}
         for variant in result.variants:
             for stage, mask in variant.masks():
-                topic, levels = f"{ROOT}/{variant.variant}/{stage}", mask.pixels() * np.uint8(255)
-                self.mask(topic, stamp, levels, log_time_ns=log_time)
+                images[f"{root}/{variant.variant}/{stage}"] = mask.pixels() * np.uint8(255)
         for name, errors in result.errors.items():
-            topic = f"{ROOT}/{name}/{errors.spec.name}"
-            self.mask(topic, stamp, _coloured(errors), log_time_ns=log_time)
+            images[f"{root}/{name}/{errors.spec.name}"] = _coloured(errors)
+        for topic, image in images.items():
+            self.mask(topic, stamp, image, log_time_ns=log_time, frame_id=frame_id or FRAME_ID)
         for tally in result.tallies:
-            topic = f"{ROOT}/metrics/{tally.variant}/{tally.stage}"
+            topic = f"{root}/metrics/{tally.variant}/{tally.stage}"
             schema = METRICS, _schema(tuple(tally.rates))
             self.json(topic, stamp, _message(result.frame, tally), schema, log_time_ns=log_time)
 
@@ -239,7 +245,7 @@ class NoSidecar:
 
     path: Final = None
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, frame_id: str, camera: str = "") -> None:
         """Write nothing."""
 
     def finish(self) -> None:

@@ -89,7 +89,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         yield _differences(findings)
         yield Text(_method(findings.paired), "note")
     for pair in findings.paired:
-        if (pair.treated, pair.control) != (FILTERED, UNFILTERED):
+        if (pair.treated, pair.control) != (FILTERED, UNFILTERED) or not len(pair.frames):
             continue
         if not defined((change := pair.differences["ERR"]).mean):
             yield Text("ERR is undefined on every frame, so what the filter does to it is unknown.")
@@ -121,7 +121,7 @@ def _differences(findings: Findings) -> Table:
                 Cell(points((change := pair.differences["ERR"]).mean), bold=True),
                 marked_interval(change),
                 *(points(pair.differences[rate].mean) for rate in others),
-                *(number(int((sign * pair.frames["ERR"] > 0).sum())) for sign in (-1, 1)),
+                *_won(pair),
                 DASH if change.effective is None else f"{change.effective:.0f}",
             ]
             for pair in pairs
@@ -134,6 +134,15 @@ def _differences(findings: Findings) -> Table:
         groups=[("", 1), ("ERR", 4), ("", len(others)), ("frames", 3)],
         small=True,
     )
+
+
+def _won(pair: PairedComparison) -> Iterator[str]:
+    """Yield on how many frames it is better, and worse; of a rig as the difference counted them."""
+    if len(pair.frames):
+        yield from (number(int((sign * pair.frames["ERR"] > 0).sum())) for sign in (-1, 1))
+    else:
+        change = pair.differences["ERR"]
+        yield from (number(count or 0) for count in (change.better, change.worse))
 
 
 def _method(pairs: Sequence[PairedComparison]) -> str:

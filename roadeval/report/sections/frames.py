@@ -73,10 +73,11 @@ def _frames(
 ) -> Iterator[Block]:
     """Yield frames below a heading, which is on the page of the first of them."""
     for place, frame in enumerate(frames):
-        yield KeepTogether([*(head if place == 0 else ()), *_frame(findings, frame)])
+        yield KeepTogether([*(head if place == 0 else ()), *notable_frame(findings, frame)])
 
 
-def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
+def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
+    """Yield a frame with its sentences, rates and pictures."""
     stamp, *facts = sentences_about(frame)
     if frame.change is not None:
         facts = [f"The filter changes ERR by {points(frame.change)} pp."]

@@ -9,6 +9,7 @@ from statsmodels.stats.multitest import multipletests
 
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
+    CameraRates,
     Difference,
     benjamini_hochberg,
     holm,
@@ -21,23 +22,28 @@ SETTINGS = EvaluationSettings()
 INDEPENDENT = np.random.default_rng(3).normal(0.01, 0.02, 200)
 
 
+def within(rates, base, settings=SETTINGS, **known) -> Difference:
+    """The difference of a drive of one camera."""
+    return within_drive([CameraRates(np.arange(len(rates)), rates, base)], settings, **known)
+
+
 def of(differences: np.ndarray, settings: EvaluationSettings = SETTINGS) -> Difference:
     """The mean of differences from a rate of 30 %."""
     base = np.full(len(differences), 0.3)
-    return within_drive(base + differences, base, settings)
+    return within(base + differences, base, settings)
 
 
 def test_frames_are_counted_as_worse_and_better_by_the_rate_s_direction():
     base = np.full(12, 0.5)
     rates = base + np.array([0.1] * 7 + [-0.1] * 3 + [0.0, math.nan])
-    lower = within_drive(rates, base, SETTINGS)
+    lower = within(rates, base, SETTINGS)
     assert (lower.worse, lower.better, lower.equal, lower.units) == (7, 3, 1, 11)
-    higher = within_drive(rates, base, SETTINGS, higher_is_better=True)
+    higher = within(rates, base, SETTINGS, higher_is_better=True)
     assert (higher.worse, higher.better, higher.equal) == (3, 7, 1)
 
 
 def test_the_mean_is_that_of_the_frames_that_have_a_difference() -> None:
-    found = within_drive(np.array([0.25, np.nan, 0.75]), np.array([0.0, 0.5, 0.0]), SETTINGS)
+    found = within(np.array([0.25, np.nan, 0.75]), np.array([0.0, 0.5, 0.0]), SETTINGS)
     assert (found.mean, found.units) == (0.5, 2)
 
 
@@ -91,7 +97,7 @@ def test_the_same_difference_on_ten_frames_has_an_interval_without_width(
     everywhere: float, p: float
 ) -> None:
     base = np.full(10, 0.5)
-    found = within_drive(base + everywhere, base, SETTINGS)
+    found = within(base + everywhere, base, SETTINGS)
     assert (found.mean, found.low, found.high, found.p) == (everywhere,) * 3 + (p,)
 
 

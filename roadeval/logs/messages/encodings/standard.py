@@ -114,6 +114,8 @@ def _json_message(data: Buffer) -> SimpleNamespace:
     message: SimpleNamespace = json.loads(
         bytes(data), object_hook=lambda fields: SimpleNamespace(**fields)
     )
+    if not hasattr(message, "data"):  # it is no image
+        return message
     if isinstance(message.data, str):
         message.data = base64.b64decode(message.data, validate=True)
     else:

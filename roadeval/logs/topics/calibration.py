@@ -1,0 +1,137 @@
+"""The calibration of a camera, and where it is mounted, from the messages of a log.
+
+Read are ``sensor_msgs/CameraInfo`` and Foxglove's ``CameraCalibration``, the first message of a
+topic; and static transforms, ROS's ``tf2_msgs/TFMessage`` and Foxglove's ``FrameTransform(s)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import Calibration, Mounting
+from roadeval.logs.errors import BadMessage, FrameError
+from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.topics.reader import TopicInfo, TopicReader
+
+LOOKED_AT: Final = 100
+"""Messages of static transforms that are read, at most, of each topic."""
+DEEPEST: Final = 50
+"""Frames on the way from a camera to the root, at most: more are a loop."""
+
+Transform = tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]
+"""The parent frame, and translation and quaternion (x, y, z, w) in it."""
+
+
+def calibration_of(
+    image: TopicInfo, topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]
+) -> tuple[Calibration | None, str]:
+    """Return the calibration of a camera and an empty text, or None and why there is none.
+
+    The topic is that whose ``frame_id`` is the images' own; of several, that whose path shares most
+    with theirs. The text is empty, too, where the log has no calibration at all.
+    """
+    found = {}
+    for topic in topics:
+        if topic.kind is TopicKind.CALIBRATION and topic.count:
+            with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+                found[topic.name] = _read(topic.name, readers[topic.name].fields(0))
+    own = [e for e in found.values() if not e.frame_id or e.frame_id == image.frame_id]
+    near = {each.topic: _shared(each.topic, image.name) for each in own}
+    best = [each for each in own if near[each.topic] == max(near.values())]
+    if not best or (len(best) > 1 or not (best[0].frame_id or near[best[0].topic])):
+        return None, f"none of {', '.join(found)} is clearly of {image.name}" if found else ""
+    (made,) = best
+    if not made.matrix[0] or not made.matrix[4]:
+        return None, f"{made.topic}: its focal length is 0: the camera was never calibrated"
+    if image.size not in (None, (made.width, made.height)):
+        return None, f"{made.topic}: it is for images of {made.width}x{made.height}"
+    static = [each for each in topics if each.kind is TopicKind.TRANSFORMS]
+    transforms = dict(_transforms(readers[each.name] for each in static))
+    return replace(made, mounting=_mounting(made.frame_id, transforms)), ""
+
+
+def _shared(one: str, other: str) -> int:
+    """Return how many parts at the begin two paths share."""
+    pairs = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
+    return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)
+
+
+def _read(topic: str, message: Any) -> Calibration:
+    def numbers(name: str) -> tuple[float, ...]:
+        value = getattr(message, name, None)
+        return tuple(map(float, getattr(message, name.upper()) if value is None else value))
+
+    header = getattr(message, "header", message)
+    matrix = numbers("k")
+    if len(matrix) != 9 or not np.isfinite(matrix).all():
+        raise ValueError(topic)
+    return Calibration(
+        topic,
+        int(message.width),
+        int(message.height),
+        matrix,
+        str(message.distortion_model),
+        numbers("d"),
+        str(header.frame_id),
+    )
+
+
+def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform]]:
+    """Yield each frame's transform in its parent; later ones replace earlier ones."""
+    for reader in readers:
+        for position in range(min(len(reader), LOOKED_AT)):
+            with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+                message = reader.fields(position)
+                for each in getattr(message, "transforms", [message]):
+                    yield _transform(each)
+
+
+def _transform(each: Any) -> tuple[str, Transform]:
+    moved = getattr(each, "transform", each)
+    at = np.array([getattr(moved.translation, axis) for axis in "xyz"], np.float64)
+    turn = np.array([getattr(moved.rotation, axis) for axis in "xyzw"], np.float64)
+    length = np.linalg.norm(turn)
+    if not np.isfinite([*at, *turn]).all() or not length:
+        raise ValueError(each)
+    if hasattr(each, "header"):
+        return str(each.child_frame_id), (str(each.header.frame_id), at, turn / length)
+    return str(each.child_frame_id), (str(each.parent_frame_id), at, turn / length)
+
+
+def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | None:
+    """Follow the transforms from a camera's frame to the root; None if they begin nowhere.
+
+    A loop has no root: then there is none, too.
+    """
+    names = {name.lstrip("/"): transform for name, transform in transforms.items()}
+    at, turn, name = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), frame.lstrip("/")
+    for depth in range(DEEPEST):
+        if name not in names:
+            if not depth:
+                return None
+            return Mounting(name, tuple(at.tolist()), tuple(turn.tolist()))
+        parent, offset, rotation = names[name]
+        at, turn, name = (
+            offset + _turned(rotation, at),
+            _product(rotation, turn),
+            parent.lstrip("/"),
+        )
+    return None
+
+
+def _product(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64]) -> Any:
+    """Multiply two quaternions x, y, z, w."""
+    (a, b), (c, d) = (one[:3], one[3]), (other[:3], other[3])
+    return np.append(b * c + d * a + np.cross(a, c), b * d - a @ c)
+
+
+def _turned(rotation: npt.NDArray[np.float64], point: npt.NDArray[np.float64]) -> Any:
+    """Turn a point by a unit quaternion."""
+    twice = 2 * np.cross(rotation[:3], point)
+    return point + rotation[3] * twice + np.cross(rotation[:3], twice)

@@ -1,0 +1,262 @@
+"""Several cameras of one log: replayed together, scored apart, and looked at as one drive."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+import roadeval
+from roadeval.data import FrameResult
+from tests.e2e.commands import DEMO, here
+
+IMAGE, TRUTH = "/camera/image", "/truth/road"
+NAMES = {f"/{name}{IMAGE}": None for name in ("front", "copy", "rear")}.keys()
+TABLES = ("frames", "windows", "regions", "oracles", "changes", "heat", "disagreements")
+"""Those of a drive that the two variants of the paper fill."""
+
+
+def a_rig(path: Path, cameras: dict[str, tuple[int, int]]) -> Path:
+    """A log in which each camera shows some frames of the demo, by their positions."""
+    with DEMO.open("rb") as file:
+        messages = [*make_reader(file).iter_messages()]
+    stamps = sorted({m.log_time for _, channel, m in messages if channel.topic == IMAGE})
+    schemas: dict[int, int] = {}
+    channels: dict[str, int] = {}
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for schema, channel, message in messages:
+            if channel.topic not in (IMAGE, TRUTH):
+                continue
+            place = int(np.searchsorted(stamps, message.log_time, side="right")) - 1
+            for name, (first, last) in cameras.items():
+                topic = f"/{name}{channel.topic}"
+                if not first <= place < last:
+                    continue
+                if schema.id not in schemas:
+                    kind = schema.name, schema.encoding, schema.data
+                    schemas[schema.id] = writer.register_schema(*kind)
+                if topic not in channels:
+                    own = channel.message_encoding, schemas[schema.id]
+                    channels[topic] = writer.register_channel(topic, *own)
+                writer.add_message(
+                    channels[topic], message.log_time, message.data, message.log_time
+                )
+        writer.finish()
+    return path
+
+
+def topics(*cameras: str) -> list[str]:
+    return [word for name in cameras for word in ("--image-topic", f"/{name}{IMAGE}")]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rig")
+    a_rig(folder / "rig.mcap", {"front": (0, 40), "copy": (0, 40), "rear": (45, 80)})
+    run = here("replay", "rig.mcap", *topics("front", "copy", "rear"), cwd=folder)
+    assert run.returncode == 0, run.stderr
+    for name in ("front", "rear"):
+        own = "replay", "rig.mcap", *topics(name), "--save", f"{name}.rrd", "-o", name, "-q"
+        assert here(*own, cwd=folder).returncode == 0
+    return folder
+
+
+@pytest.mark.parametrize("camera", ["front", "rear"])
+@pytest.mark.parametrize("table", TABLES)
+def test_each_camera_has_the_rows_of_a_replay_of_it_alone(rig: Path, camera: str, table: str):
+    both = [pd.read_csv(rig / own / f"{table}.csv") for own in ("reports/rig", camera)]
+    together = both[0][both[0]["camera"] == f"/{camera}{IMAGE}"].reset_index(drop=True)
+    assert len(together)
+    pd.testing.assert_frame_equal(together, both[1])
+
+
+@pytest.mark.parametrize("camera", ["front", "rear"])
+def test_each_camera_has_the_layers_of_a_replay_of_it_alone(rig: Path, camera: str):
+    of_rig = roadeval.Recording(rig / "recordings" / "rig.rrd", f"/{camera}{IMAGE}")
+    alone = roadeval.Recording(rig / f"{camera}.rrd")
+    assert of_rig.frame_numbers == alone.frame_numbers
+    for frame in alone.frame_numbers[::8]:
+        assert np.array_equal(of_rig.image(frame), alone.image(frame))
+        for variant in alone.variants:
+            for spec in variant.layers:
+                layer = variant.name, spec.name, frame
+                assert np.array_equal(of_rig.layer(*layer), alone.layer(*layer), equal_nan=True)
+    for table in ("frames", "regions", "windows"):
+        pd.testing.assert_frame_equal(of_rig.table(table), alone.table(table))
+    assert of_rig.facts.totals == alone.facts.totals
+
+
+def test_a_camera_that_is_there_twice_narrows_no_interval(rig: Path, tmp_path: Path):
+    places = "--save", tmp_path / "two.rrd", "-o", tmp_path / "two", "-q"
+    assert here("replay", rig / "rig.mcap", *topics("front", "copy"), *places).returncode == 0
+    twice = json.loads((tmp_path / "two" / "summary.json").read_text())
+    once = json.loads((rig / "front" / "summary.json").read_text())
+    for part in ("difference", "against_blind"):
+        for name, rates in once[part].items():
+            for rate, alone in rates.items():
+                both = twice[part][name][rate]
+                assert both["units"] == 2 * alone["units"]
+                for end in ("mean", "low", "high", "p", "effective"):
+                    assert both[end] == pytest.approx(alone[end], rel=1e-9, abs=1e-12)
+    assert twice["totals"]["filtered"]["post"]["ERR"] == pytest.approx(
+        once["totals"]["filtered"]["post"]["ERR"]
+    )
+
+
+def test_each_camera_counts_the_same_in_a_mean(rig: Path):
+    summary = json.loads((rig / "reports" / "rig" / "summary.json").read_text())
+    rows = pd.read_csv(rig / "reports" / "rig" / "frames.csv")
+    own = rows[(rows["variant"] == "filtered") & (rows["stage"] == "post")]
+    total = summary["totals"]["filtered"]["post"]
+    assert total["ERR"] == pytest.approx(own.groupby("camera")["ERR"].mean().mean())
+    assert total["frames"] == len(own)
+    assert total["pooled_ERR"] == pytest.approx((own["FP"] + own["FN"]).sum() / own["N"].sum())
+    assert list(summary["cameras"]) == [*NAMES]
+
+
+def test_a_comparison_of_the_variants_has_the_numbers_of_the_replay(rig: Path):
+    summary = json.loads((rig / "reports" / "rig" / "summary.json").read_text())
+    found = roadeval.compare(rig / "recordings" / "rig.rrd")
+    (change,) = [c for c in found.comparison.changes if c.final]
+    wanted = summary["difference"]["post"]["ERR"]
+    for end in ("mean", "low", "high", "p"):
+        assert getattr(change.difference["ERR"], end) == pytest.approx(wanted[end], abs=1e-12)
+
+
+def test_a_rig_is_compared_camera_by_camera_with_a_replay_of_one(rig: Path):
+    found = roadeval.compare([rig / "recordings" / "rig.rrd", rig / "rear.rrd"])
+    assert found.comparison.paired
+    assert all(change.unchanged for change in found.comparison.changes)
+    rows = roadeval.Result(rig / "rear.rrd").frames
+    assert found.comparison.changes[0].frames == rows["frame"].nunique()
+
+
+def test_results_have_a_row_for_each_camera(rig: Path):
+    for path in ("recordings/rig.rrd", "reports/rig"):
+        result = roadeval.Result(rig / path)
+        assert list(result.cameras) == [*NAMES]
+        assert result.drives["camera"].tolist() == list(result.cameras)
+        assert set(result.frames["camera"]) == set(result.cameras)
+
+
+def test_the_first_screen_lists_the_cameras(rig: Path):
+    out = here(
+        "replay", "rig.mcap", *topics("front", "rear"), "-o", "x", "--record", "none", cwd=rig
+    )
+    assert "rig: 2 cameras, 55 of 75 frames were evaluated" in out.stdout
+    assert [line.split()[0] for line in out.stdout.splitlines() if line[:5] in ("front", "rear ")]
+
+
+def test_reports_show_all_cameras_and_each(rig: Path):
+    (folder := rig / "made").mkdir()
+    for name in ("all.pdf", "all.html"):
+        assert here("report", rig / "recordings/rig.rrd", "-o", folder / name).returncode == 0
+    one = "report", rig / "recordings/rig.rrd", "--camera", "rear", "-o", folder / "one.html"
+    assert here(*one).returncode == 0
+    page = (folder / "all.html").read_text()
+    assert all(f"Camera {name}" in page for name in ("front", "copy", "rear"))
+    assert (folder / "all.pdf").read_bytes().startswith(b"%PDF")
+    assert "rig, /rear/camera/image" in (folder / "one.html").read_text()
+
+
+def test_the_worst_frames_name_their_camera(rig: Path):
+    run = here("inspect", rig / "recordings/rig.rrd", "--list", "--json")
+    frames = json.loads(run.stdout)
+    errors = [each["rates"]["ERR"] for each in frames]
+    assert errors == sorted(errors, reverse=True)
+    assert {each["camera"] for each in frames} <= {
+        f"/{n}{IMAGE}" for n in ("front", "copy", "rear")
+    }
+    alone = here("inspect", rig / "recordings/rig.rrd", "--camera", "rear", "--list", "--json")
+    assert {each["camera"] for each in json.loads(alone.stdout)} == {f"/rear{IMAGE}"}
+
+
+def test_worst_frames_of_all_cameras_are_recorded(rig: Path, tmp_path: Path):
+    out = tmp_path / "worst.rrd"
+    words = "--record", "worst:5", "--save", out, "-o", tmp_path / "r", "-q"
+    assert here("replay", rig / "rig.mcap", *topics("front", "rear"), *words).returncode == 0
+    kept = [roadeval.Recording(out, f"/{name}{IMAGE}").frame_numbers for name in ("front", "rear")]
+    assert sum(map(len, kept)) == 5
+    rows = roadeval.Result(out).frames.query("variant != 'blind' and stage == 'post'")
+    worst = rows.groupby(["camera", "frame"])["ERR"].max().nlargest(5)
+    assert {frame for _, frame in worst.index} == {n for own in kept for n in own}
+
+
+def test_a_file_names_the_cameras(rig: Path, tmp_path: Path):
+    text = "".join(f'[[cameras]]\nname = "{n}"\nimage = "/{n}{IMAGE}"\n' for n in ("front", "rear"))
+    (tmp_path / "rig.toml").write_text(text)
+    words = "--config", tmp_path / "rig.toml", "--save", tmp_path / "o.rrd", "-o", tmp_path / "o"
+    assert here("replay", rig / "rig.mcap", *words, "-q").returncode == 0
+    assert set(roadeval.Result(tmp_path / "o").frames["camera"]) == {"front", "rear"}
+    assert roadeval.Recording(tmp_path / "o.rrd", "rear").frame_numbers[0] == 0
+    again = here(
+        "replay", rig / "rig.mcap", "--config", tmp_path / "o.rrd", "--record", "none", "-q"
+    )
+    assert again.returncode == 0, again.stderr
+
+
+def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path, tmp_path: Path):
+    words = *topics("front", "copy"), "-o", tmp_path / "fleet", "--workers", 1, "-q"
+    assert here("fleet", rig / "rig.mcap", *words).returncode == 0
+    fleet = roadeval.Result(tmp_path / "fleet")
+    assert fleet.drives["name"].tolist() == ["rig front", "rig copy"]
+    (effect,) = [
+        e
+        for e in fleet.facts.effects
+        if (e.base, e.variant, e.metric) == ("unfiltered", "filtered", "ERR")
+    ]
+    assert (effect.units, effect.groups, effect.low) == (2, 1, None)
+    assert any("cameras of one log count as one drive" in each for each in fleet.facts.warnings)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--truth-topic", "/front/truth/road"), "which camera's?"),
+        (("--truth", "labels"), "belong to one camera"),
+        (topics("front"), "given twice"),
+    ],
+)
+def test_what_does_not_say_which_camera_is_refused(rig: Path, words: list[str], said: str):
+    run = here("replay", rig / "rig.mcap", *topics("front", "rear"), *words, "-q")
+    assert run.returncode in (1, 2)
+    assert said in run.stderr
+
+
+def test_a_command_that_looks_at_one_camera_takes_no_second(rig: Path):
+    run = here("info", rig / "rig.mcap", *topics("front", "rear"))
+    assert run.returncode == 2
+    assert "one camera at a time" in run.stderr
+
+
+def test_a_recording_of_a_rig_is_opened_by_a_camera(rig: Path):
+    with pytest.raises(roadeval.RoadevalError, match="several cameras; name one of /front"):
+        roadeval.Recording(rig / "recordings" / "rig.rrd")
+
+
+def test_an_interrupted_run_of_a_rig_is_read_camera_by_camera(rig: Path, tmp_path: Path):
+    seen = []
+
+    def stop(result: FrameResult) -> None:
+        seen.append(result.frame.camera)
+        if len(seen) == 60:
+            raise KeyboardInterrupt
+
+    cameras = [{"image": f"/{name}{IMAGE}"} for name in ("front", "copy")]
+    config = roadeval.configure({"cameras": cameras})
+    with pytest.raises(KeyboardInterrupt):
+        roadeval.replay(
+            rig / "rig.mcap", config, save=tmp_path / "o.rrd", reports=tmp_path, on_frame=stop
+        )
+    (partial,) = tmp_path.glob("*.partial*")
+    result = roadeval.Result(partial)
+    assert not result.complete
+    counted = result.frames.query("variant == 'filtered' and stage == 'post'")
+    assert counted.groupby("camera").size().between(15, 30).all()
+    run = here("inspect", partial, "--list", "--camera", "front", "--json")
+    assert {each["camera"] for each in json.loads(run.stdout)} == {f"/front{IMAGE}"}

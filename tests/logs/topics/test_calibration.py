@@ -1,0 +1,259 @@
+"""The calibration of a camera and its mounting, in the messages of three kinds of writers."""
+
+import json
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from mcap_ros2.writer import Writer as Ros2Writer
+from scipy.spatial.transform import Rotation
+
+from roadeval.data import Calibration
+from roadeval.logs import LogConfig, TopicSettings, open_log
+
+LINE = "=" * 80
+STAMP = {"sec": 5, "nanosec": 0}
+SIZE = 64, 48
+K = [50.0, 0.0, 32.0, 0.0, 51.0, 24.0, 0.0, 0.0, 1.0]
+D = [-0.1, 0.01, 0.0, 0.0, 0.0]
+HEADER = f"""{LINE}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{LINE}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+GEOMETRY = f"""{LINE}
+MSG: geometry_msgs/TransformStamped
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/Transform transform
+{LINE}
+MSG: geometry_msgs/Transform
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+{LINE}
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+{LINE}
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+TEXTS = {
+    "sensor_msgs/msg/CompressedImage": (
+        f"std_msgs/Header header\nstring format\nuint8[] data\n{HEADER}"
+    ),
+    "sensor_msgs/msg/CameraInfo": (
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n"
+        f"float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n{HEADER}"
+    ),
+    "tf2_msgs/msg/TFMessage": f"geometry_msgs/TransformStamped[] transforms\n{GEOMETRY}{HEADER}",
+}
+Parts = tuple[str, str, tuple[float, ...], Rotation]
+"""A transform: the child, its parent, and translation and rotation in it."""
+TREE: list[Parts] = [
+    ("cam", "mast", (0.1, 0.0, 0.5), Rotation.from_euler("zyx", (90, 10, -90), degrees=True)),
+    ("mast", "base_link", (1.0, -0.2, 1.0), Rotation.from_euler("z", 30, degrees=True)),
+]
+
+
+def header(frame_id: str) -> dict[str, Any]:
+    return {"stamp": STAMP, "frame_id": frame_id}
+
+
+def image() -> bytes:
+    return cv2.imencode(".jpg", np.zeros((*SIZE[::-1], 3), np.uint8))[1].tobytes()
+
+
+def info(frame_id: str = "cam", k: list[float] = K, size: tuple[int, int] = SIZE) -> dict[str, Any]:
+    width, height = size
+    lens = {"distortion_model": "plumb_bob", "d": D, "k": k, "r": [0.0] * 9, "p": [0.0] * 12}
+    return {"header": header(frame_id), "height": height, "width": width, **lens}
+
+
+def transforms(tree: list[Parts]) -> dict[str, Any]:
+    return {
+        "transforms": [
+            {
+                "header": header(parent),
+                "child_frame_id": child,
+                "transform": {
+                    "translation": dict(zip("xyz", at, strict=True)),
+                    "rotation": dict(zip("xyzw", turn.as_quat().tolist(), strict=True)),
+                },
+            }
+            for child, parent, at, turn in tree
+        ]
+    }
+
+
+def ros2(path: Path, infos: dict[str, dict[str, Any]], tree: list[Parts] = TREE) -> Path:
+    """A log of ROS 2 with one camera on /front/image/compressed."""
+    with path.open("wb") as file:
+        writer = Ros2Writer(file)
+        schemas = {name: writer.register_msgdef(name, text) for name, text in TEXTS.items()}
+
+        def add(topic: str, kind: str, message: dict[str, Any]) -> None:
+            writer.write_message(topic, schemas[kind], message, log_time=5 * 10**9)
+
+        add("/tf_static", "tf2_msgs/msg/TFMessage", transforms(tree))
+        for topic, message in infos.items():
+            add(topic, "sensor_msgs/msg/CameraInfo", message)
+        picture = {"header": header("cam"), "format": "jpeg", "data": image()}
+        add("/front/image/compressed", "sensor_msgs/msg/CompressedImage", picture)
+        writer.finish()
+    return path
+
+
+def found(path: Path, topic: str | None = None) -> tuple[Calibration | None, str]:
+    with open_log(path, LogConfig(topics=TopicSettings(image=topic))) as log:
+        selection = log.select()
+        return selection.calibration, selection.no_calibration
+
+
+def test_a_camera_of_ros_2_is_known_with_its_place_on_the_vehicle(tmp_path: Path):
+    known, _ = found(ros2(tmp_path / "a.mcap", {"/front/camera_info": info()}))
+    assert known is not None
+    assert known.mounting is not None
+    assert (known.topic, known.width, known.height) == ("/front/camera_info", *SIZE)
+    assert (known.matrix, known.distortion, known.model) == (tuple(K), tuple(D), "plumb_bob")
+    (_, _, at, turn), (_, _, mast_at, mast_turn) = TREE
+    assert known.mounting.parent == "base_link"
+    assert known.mounting.translation == pytest.approx(np.array(mast_at) + mast_turn.apply(at))
+    turned = Rotation.from_quat(known.mounting.rotation)
+    assert (turned.inv() * (mast_turn * turn)).magnitude() == pytest.approx(0, abs=1e-12)
+
+
+def test_a_camera_of_ros_1_is_known(tmp_path: Path):
+    def text(words: str) -> bytes:
+        return struct.pack("<I", len(words)) + words.encode()
+
+    own = TEXTS["sensor_msgs/msg/CameraInfo"].partition(LINE)[0]
+    own = re.sub(r" ([dkrp])\n", lambda found: found[0].upper(), own)
+    head = f"{LINE}\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+    stamped = struct.pack("<III", 0, 5, 0) + text("cam")
+    lens = struct.pack("<II", *SIZE[::-1]) + text("plumb_bob") + struct.pack("<I5d", 5, *D)
+    messages = {
+        "/front/camera_info": (
+            *("sensor_msgs/CameraInfo", own),
+            stamped + lens + struct.pack("<30d", *K, *[0.0] * 21),
+        ),
+        "/front/image/compressed": (
+            *(
+                "sensor_msgs/CompressedImage",
+                "std_msgs/Header header\nstring format\nuint8[] data\n",
+            ),
+            stamped + text("jpeg") + struct.pack("<I", len(image())) + image(),
+        ),
+    }
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros1")
+        for topic, (name, fields, data) in messages.items():
+            schema = writer.register_schema(name, "ros1msg", (fields + head).encode())
+            channel = writer.register_channel(topic, "ros1", schema)
+            writer.add_message(channel, 5 * 10**9, data, 5 * 10**9)
+        writer.finish()
+    known, _ = found(tmp_path / "a.mcap")
+    assert known is not None
+    assert (known.matrix, known.distortion, known.mounting) == (tuple(K), tuple(D), None)
+
+
+def test_a_camera_of_foxglove_is_known(tmp_path: Path):
+    time = {"sec": 5, "nsec": 0}
+    lens = {"width": 64, "height": 48, "distortion_model": "rational_polynomial", "D": D, "K": K}
+    (_, _, at, turn), _ = TREE
+    messages = {
+        "/front/calibration": (
+            "foxglove.CameraCalibration",
+            {"timestamp": time, "frame_id": "cam", **lens},
+        ),
+        "/tf_static": (
+            "foxglove.FrameTransform",
+            {
+                "timestamp": time,
+                "parent_frame_id": "car",
+                "child_frame_id": "cam",
+                "translation": dict(zip("xyz", at, strict=True)),
+                "rotation": dict(zip("xyzw", turn.as_quat().tolist(), strict=True)),
+            },
+        ),
+        "/front/image": (
+            "foxglove.CompressedImage",
+            {"timestamp": time, "frame_id": "cam", "format": "jpeg", "data": list(image())},
+        ),
+    }
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for topic, (name, message) in messages.items():
+            schema = writer.register_schema(name, "jsonschema", b"{}")
+            channel = writer.register_channel(topic, "json", schema)
+            when = 5 * 10**9
+            writer.add_message(channel, when, json.dumps(message).encode(), when)
+        writer.finish()
+    known, _ = found(tmp_path / "a.mcap")
+    assert known is not None
+    assert known.mounting is not None
+    assert (known.matrix, known.model) == (tuple(K), "rational_polynomial")
+    assert (known.mounting.parent, known.mounting.translation) == ("car", at)
+
+
+def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
+    infos = {"/rear/camera_info": info("cam_rear"), "/front/camera_info": info()}
+    known, _ = found(ros2(tmp_path / "a.mcap", infos))
+    assert known is not None
+    assert known.topic == "/front/camera_info"
+    infos = {"/rear/camera_info": info(), "/front/camera_info": info()}
+    known, _ = found(ros2(tmp_path / "b.mcap", infos))
+    assert known is not None
+    assert known.topic == "/front/camera_info"
+
+
+@pytest.mark.parametrize(
+    ("infos", "said"),
+    [
+        ({"/front/camera_info": info(k=[0.0] * 9)}, "focal length is 0"),
+        ({"/front/camera_info": info(size=(128, 96))}, "images of 128x96"),
+        ({"/rear/camera_info": info("cam_rear")}, "none of /rear/camera_info is clearly of"),
+        ({}, ""),
+    ],
+)
+def test_what_cannot_be_used_is_said_and_not_used(tmp_path: Path, infos: Any, said: str):
+    known, why = found(ros2(tmp_path / "a.mcap", infos))
+    assert known is None
+    assert said in why
+    assert bool(said) == bool(why)
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        [],
+        [("cam", "mast", (0.0,) * 3, TREE[0][3]), ("mast", "cam", (0.0,) * 3, TREE[0][3])],
+        [("other", "base_link", (0.0,) * 3, TREE[0][3])],
+    ],
+)
+def test_a_place_that_no_transform_leads_to_is_not_known(tmp_path: Path, tree: list[Parts]):
+    known, _ = found(ros2(tmp_path / "a.mcap", {"/front/camera_info": info()}, tree))
+    assert known is not None
+    assert known.mounting is None
+
+
+def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
+    known = Calibration("/c", 64, 48, tuple(K)).scaled(32, 24)
+    point = np.array([0.3, -0.2, 2.0])
+    whole, half = (np.array(m).reshape(3, 3) @ point for m in (K, known.matrix))
+    assert half[:2] / half[2] == pytest.approx(whole[:2] / whole[2] / 2)
