@@ -89,9 +89,6 @@ def _parts(value: Any) -> Iterator[Any]:
         yield from value.parts()
 
 
-# --- Words and tables -----------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Heading(Block):
     """A heading; one of level 1 is numbered. All are in the outline."""
@@ -189,9 +186,6 @@ def plain(cell: Cell | str) -> str:
     return cell.text if isinstance(cell, Cell) else cell
 
 
-# --- Pictures -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Figure(Block):
     """Charts beside each other below one legend, with a caption."""
@@ -222,9 +216,6 @@ class ImageGrid(Block):
     """Places of the first row that stay free."""
     caption: str = ""
     """Printed below all of them."""
-
-
-# --- Arrangement ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,9 +269,6 @@ class Document(Block):
     def files(self) -> Mapping[str, bytes]:
         """Return every image file's bytes by its name."""
         return {image.name: image.content for image in self.images()}
-
-
-# --- What only a page has -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,6 @@ POINTS: Final = 1500
 """Points of a series along the drive, at most: more do not fit beside each other on a screen."""
 
 
-# --- How variants look ----------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Look:
     """How a series is drawn; no two variants differ by their colour alone."""
@@ -87,9 +84,6 @@ def looks_of_results(masks: Mapping[str, tuple[str, str]]) -> dict[str, Look]:
         )
         for name, (result, variant) in masks.items()
     }
-
-
-# --- Charts ---------------------------------------------------------------------------------------
 
 
 class ChartKind(StrEnum):

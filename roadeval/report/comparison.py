@@ -151,9 +151,6 @@ def _warnings(comparison: Comparison) -> Iterator[Block]:
         yield BulletList("Beware", told.warnings(comparison), "warning")
 
 
-# --- Rates ----------------------------------------------------------------------------------------
-
-
 def overview(
     comparison: Comparison, judgements: Sequence[Judgement], most: int | None = None
 ) -> Iterator[Block]:
@@ -297,9 +294,6 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         yield _moved_table(comparison.moved, inspect)
 
 
-# --- Drives ---------------------------------------------------------------------------------------
-
-
 def changed_drives(comparison: Comparison) -> Iterator[Block]:
     """Yield a table a mask of the drives that changed, the surest first."""
     for result, variant in _masks(comparison):
@@ -368,9 +362,6 @@ def _plot(comparison: Comparison) -> Iterator[Block]:
         if (each.result, each.variant, each.stage) == key
     )
     yield charts.forest(rows, over, f"change of {TESTED} of {own[0].variant}")
-
-
-# --- Regions and frames ---------------------------------------------------------------------------
 
 
 def _region_table(rows: Sequence[RegionChange], caption: str) -> Table:

@@ -30,9 +30,6 @@ Tick = tuple[float, str]
 """A place on an axis, from the left or the bottom, and the number or name there."""
 
 
-# --- Ranges ---------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Span:
     """A closed range of numbers."""
@@ -79,9 +76,6 @@ def span_of_frames(charts: Iterable[Chart | HeatMap]) -> Span:
     low, high = min(numbers), max(numbers)
     margin = max((high - low) / 80, 0.5)
     return Span(low - margin, high + margin)
-
-
-# --- Parts ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,9 +185,6 @@ class MapDrawing:
     """The colours of the scale, as ``#RRGGBB``."""
     top: str
     """What the last of them means."""
-
-
-# --- Drawing --------------------------------------------------------------------------------------
 
 
 def drawn(chart: Chart | HeatMap, frames: Span | None = None) -> Drawing | MapDrawing:
@@ -308,9 +299,6 @@ def _mark(chart: Chart, series: Series, place: int, values: Span) -> Mark | None
     cut = {(True, False): "left", (False, True): "right", (True, True): "both"}.get(beyond, "")
     left, right = (min(max(values.percent(end), 0.0), 100.0) for end in (low, high))
     return Mark(series.name, series.look, middle, text, left, right, cut, frames)
-
-
-# --- Values ---------------------------------------------------------------------------------------
 
 
 def values(chart: Chart | HeatMap, drawing: Drawing | MapDrawing) -> dict[str, Any]:

@@ -168,8 +168,6 @@ def _width(text: str) -> float:
     return width
 
 
-# --- Figures 3a and 3b ----------------------------------------------------------------------------
-
 MARKED: Final = 25
 """Up to this many points each has its marker; beyond, about as many do."""
 CROWDED: Final = 150
@@ -267,8 +265,6 @@ def _subtitle(windows: Rows) -> str:
     short = f", the last of {rest}" if rest < size else ""
     return f"Final mask ({stages}); {each}{short}; lower is better"
 
-
-# --- Figure 2 -------------------------------------------------------------------------------------
 
 LEFT: Final = 0.28
 TOP: Final = 0.78

@@ -150,8 +150,6 @@ class Findings:
         return self.totals[variant][self.finals[variant]]
 
 
-# --- Many drives ----------------------------------------------------------------------------------
-
 Row = Mapping[str, Any]
 
 

@@ -190,8 +190,6 @@ def _family(found: Difference, settings: EvaluationSettings) -> str:
     return f" (corrected for {found.comparisons} comparisons)" if decided else ""
 
 
-# --- The frames of a drive -----------------------------------------------------------------------
-
 _WHY: Final = {
     "trained on": "to train on",
     "unlabelled": "without truth",
@@ -216,9 +214,6 @@ def account(frames: FrameAccount, windows: int | None = None) -> str:
     told = f"{of}{counted(whole, 'frame')} {verb} evaluated{within}."
     why = [f"{number(count)} {_WHY.get(name, name)}" for name, count in frames.skipped.items()]
     return f"{told} Left out: {', '.join(why)}." if why else told
-
-
-# --- Marks in tables ------------------------------------------------------------------------------
 
 
 def is_significant(p_holm: float | None, confidence: float) -> bool:
@@ -246,9 +241,6 @@ def correction(differences: Iterable[Difference]) -> str:
         f"{MARK} significant after Holm's correction for the {many} of ERR of final "
         f"masks{families}; others are not corrected."
     )
-
-
-# --- The verdict on a result ----------------------------------------------------------------------
 
 
 def verdict(
@@ -399,9 +391,6 @@ def step_by_step(parts: Mapping[str, float]) -> str:
     return ", ".join([f"{first}{without} leaves {error:.1f} % wrong", *steps])
 
 
-# --- Other seeds of the training -----------------------------------------------------------------
-
-
 def spread(values: Sequence[float | None]) -> tuple[float, float, float] | None:
     """Return the median, least and greatest of the values that are defined; None without any."""
     known = [value for value in values if defined(value)]
@@ -447,9 +436,6 @@ def of_seeds(seeds: Mapping[str, Any]) -> str:
     )
 
 
-# --- A frame --------------------------------------------------------------------------------------
-
-
 def without_filter(notes: Iterable[str]) -> list[str]:
     """Return a frame's notes without that on the filter, where its part of ERR is shown."""
     return [note for note in notes if not note.startswith(_OF_FILTER)]
@@ -483,8 +469,6 @@ def notes(
                 f"(ERR {percent(blind['ERR'], 1)} %)."
             )
 
-
-# --- The paper's claims ---------------------------------------------------------------------------
 
 CLAIMED: Final = {
     "filter_ERR": "ERR is lower with the filter (section 5, figure 3a)",

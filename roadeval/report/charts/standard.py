@@ -50,9 +50,6 @@ LEAST_SHARE: Final = 1.0
 """Percent of the frames to which a heat map's shades reach at least."""
 
 
-# --- Over the drive -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class OverDrive:
     """A figure of a drive's report."""
@@ -149,9 +146,6 @@ def coverage(shares: Mapping[str, Mapping[int, float]]) -> Chart:
             for name, look in looks([*shares]).items()
         ],
     )
-
-
-# --- By stage, by region, over the image ----------------------------------------------------------
 
 
 def stages(totals: Totals, behind: Behind = UNKNOWN) -> list[Chart]:
@@ -327,9 +321,6 @@ def levels(finals: Sequence[Change]) -> list[Chart]:
         )
         for rate in SHORT
     ]
-
-
-# --- Drive by drive -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

@@ -197,9 +197,6 @@ def _source(image: ImageFile | bytes, place: Place) -> str:
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
 
 
-# --- Tables ---------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class _Row:
     """A row's cells, each with whether it repeats the one above, and its classes."""
@@ -233,9 +230,6 @@ def _unknown(kind: str) -> NoReturn:
 def code() -> Mapping[str, bytes]:
     """Return the files of style and script, for pages that have them beside them."""
     return {STYLE: style().encode(), SCRIPT: script().encode()}
-
-
-# --- Sections -------------------------------------------------------------------------------------
 
 
 @dataclass(slots=True)
@@ -289,9 +283,6 @@ def _name(text: str, taken: set[str]) -> str:
         name = f"{plain}-{count}"
     taken.add(name)
     return name
-
-
-# --- Files ----------------------------------------------------------------------------------------
 
 
 class Beside(StrEnum):

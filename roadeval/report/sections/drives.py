@@ -105,9 +105,6 @@ def _tags(findings: FleetFindings) -> dict[str, str]:
     }
 
 
-# --- All drives, on a page ------------------------------------------------------------------------
-
-
 def table(findings: FleetFindings) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
@@ -163,9 +160,6 @@ def _point(values: Mapping[str, float], drive: str) -> str:
 def _light(findings: FleetFindings, name: str, drive: str) -> str:
     value = findings.drives[drive][name]
     return DASH if value is None else f"{value:.2f}"
-
-
-# --- What is missing ------------------------------------------------------------------------------
 
 
 def missing(findings: FleetFindings) -> Iterator[Block]:

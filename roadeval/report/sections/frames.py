@@ -244,9 +244,6 @@ def browser(frames: FrameBrowser | None) -> Iterator[Block]:
         yield frames
 
 
-# --- Strips ---------------------------------------------------------------------------------------
-
-
 def strip(
     frame: NotableFrame, variants: Sequence[str], command: str = "", layers: int = SMALL_ON_PAGE
 ) -> Strip:

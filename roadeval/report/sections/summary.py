@@ -113,9 +113,6 @@ def _beware(warned: list[str]) -> BulletList:
     return BulletList("Beware", warned or ["Nothing known."], "warning" if warned else "plain")
 
 
-# --- Rates ----------------------------------------------------------------------------------------
-
-
 def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
     """Yield a cell in percent for each value; that of the best is bold."""
     known = [value for value in values if defined(value)]
@@ -235,9 +232,6 @@ def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
     )
 
 
-# --- Warnings and notes ---------------------------------------------------------------------------
-
-
 def _trained_here(placement: str | None) -> str:
     if placement == "spread":
         return (
@@ -339,9 +333,6 @@ def _legend(findings: Findings) -> str:
         f"Errors of {first} across the drive. Green: road found; orange: non-road called road "
         "(FP); purple: road missed (FN); grey: ignored."
     )
-
-
-# --- Accounts -------------------------------------------------------------------------------------
 
 
 def drives_account(counts: Mapping[str, int], frames: int) -> str:
