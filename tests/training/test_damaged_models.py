@@ -14,7 +14,7 @@ import pytest
 from roadeval.cli.app import main
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.beyond.trees import Blend, Stack
+from roadeval.pipeline.beyond.trees import Blend
 from roadeval.training import TrainingSettings, fit, save_model
 from roadeval.training.learning import from_file
 from tests.e2e.commands import DEMO
@@ -105,9 +105,9 @@ def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
         ("filtered/svm/scale", np.zeros_like, "scale holds a number outside"),
         ("filtered/svm/mean", np.negative, "mean holds a number outside 0 to 255"),
         ("filtered/svm/vectors", lambda a: a[1:], r"weights has the shape .* instead of \(m,\)"),
-        ("robust/trees/top/forest/values", lambda a: a.astype(np.float64), "instead of float32"),
-        ("robust/trees/top/forest/feature", np.negative, "feature holds a number outside 0 to"),
-        ("robust/trees/top/forest/kept", np.zeros_like, "rules out a tree's last leaf"),
+        ("robust/trees/forest/values", lambda a: a.astype(np.float64), "instead of float32"),
+        ("robust/trees/forest/feature", np.negative, "feature holds a number outside 0 to"),
+        ("robust/trees/forest/kept", np.zeros_like, "rules out a tree's last leaf"),
         ("prior", lambda a: a + 0.5, "prior holds a number outside 0 to 1"),
         ("prior", lambda a: a * 255 > 0, "prior is of type bool"),
     ],
@@ -196,11 +196,11 @@ def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
     small.write_text('preset = "robust"\n[trees]\ntrees = 10\nfeatures = ["place"]\n')
     pipelines = configure(SMALL).pipelines()
     sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
-    known = sound.parameters["unfiltered"]["trees"].top
+    known = sound.parameters["unfiltered"]["trees"]
     twice = {n: np.tile(getattr(known.network, n), 2) for n in ("lowest", "scale", "planes")}
     network = replace(known.network, ranks=np.tile(known.network.ranks, (2, 1)), **twice)
     forest = replace(known.forest, feature=known.forest.feature + np.int32(3), inputs=6)
-    beyond = {"trees": Stack(Blend(forest, network), np.array([[24, 32]], np.int32))}
+    beyond = {"trees": Blend(forest, network, known.sizes)}
     save_model(replace(sound, parameters={"unfiltered": beyond}), Path("x.model"))
     words = ["replay", str(DEMO), "--config", str(small), "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1

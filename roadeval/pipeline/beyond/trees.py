@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -69,20 +69,10 @@ ALL: Final = (1 << LEAVES) - 1
 """The bits of all leaves."""
 BINS: Final = 255
 """Ranges of a feature that a tree can tell apart: the most that scikit-learn knows."""
-
-
-class Growth(NamedTuple):
-    """How trees are grown."""
-
-    trees: int
-    leaves: int
-    """Of a tree, at most."""
-    rate: float
-    """Share of what is left to mend that a tree mends."""
-    least: int
-    """Training pixels of a leaf, at least."""
-    share: float
-    """Of the features, drawn anew for each node, among which it chooses."""
+RATE: Final = 0.1
+"""Share of what is left to mend that a tree mends."""
+SHARE: Final = 0.33
+"""Of the features, drawn anew for each node, among which it chooses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,18 +114,21 @@ class Forest:
         return total + np.float32(self.offset)
 
 
-def grow(values: Values, road: Flags, weights: Floats | None, growth: Growth, seed: int) -> Forest:
-    """Grow trees with scikit-learn's gradient boosting on histograms [1]_.
+def grow(
+    values: Values,
+    road: Flags,
+    weights: Floats | None,
+    settings: TreesSettings,
+    seed: int,
+    *,
+    share: float = SHARE,
+) -> Forest:
+    """Grow trees with scikit-learn's gradient boosting on histograms.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
     ``values`` are ``(n, F)`` finite features, ``road`` ``(n,)`` labels, of which both occur;
-    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. ``seed`` is that of the
-    draw of features.
-
-    References
-    ----------
-    .. [1] J. H. Friedman, Greedy Function Approximation: A Gradient Boosting Machine, The Annals of
-       Statistics 29 (2001).
+    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. Each node chooses among
+    a ``share`` of the features, which ``seed`` draws.
     """
     from threadpoolctl import threadpool_limits
 
@@ -150,11 +143,11 @@ def grow(values: Values, road: Flags, weights: Floats | None, growth: Growth, se
     )
     # Only here: the import takes a second, and a model from a file does not need it.
     boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
-        learning_rate=growth.rate,
-        max_iter=growth.trees,
-        max_leaf_nodes=growth.leaves,
-        min_samples_leaf=growth.least,
-        max_features=growth.share,
+        learning_rate=RATE,
+        max_iter=settings.trees,
+        max_leaf_nodes=settings.leaves,
+        min_samples_leaf=settings.least,
+        max_features=share,
         early_stopping=False,
         random_state=seed,
     )
@@ -224,10 +217,6 @@ FULL: Final = 65535
 """The code of probability 1."""
 IN_LIGHT, IN_SHADE = 2 / 3, 1 / 3
 """The network's weight."""
-RATE: Final = 0.1
-"""Share of what is left to mend that a tree mends."""
-SHARE: Final = 0.33
-"""Of the features, drawn anew for each node, among which it chooses."""
 OWN_CAMERA, OTHERS = 1.0, 4.0
 """``reach_weight`` where the camera itself taught the trees, and where others did."""
 FARTHEST: Final = 3.0
@@ -291,70 +280,49 @@ class TreesSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blend:
-    """A forest and a network that learnt from the same pixels."""
+    """A forest and a network that learnt from the same pixels, maybe on top of another blend."""
 
     forest: Forest
     network: HiddenLayer
-
-    def __post_init__(self) -> None:
-        if self.forest.inputs != self.network.inputs:
-            raise ValueError(
-                f"the forest sees {self.forest.inputs} features of a pixel, and the network "
-                f"{self.network.inputs}"
-            )
-
-    @property
-    def inputs(self) -> int:
-        """How many features of a pixel both see."""
-        return self.network.inputs
-
-    def log_odds(self, values: Values, weight: Values | float) -> Values:
-        """Return the weighted mean of both for each pixel of ``(inputs, n)`` features, ``(n,)``.
-
-        The weight, 0 to 1, is the network's: one, or ``(n,)``.
-        """
-        trees, network = self.forest.sums(values), self.network.sums(values)
-        mean: Values = trees + np.asarray(weight, np.float32) * (network - trees)
-        return mean
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stack:
-    """A blend, and the one of other drives that it was taught on top of, if any."""
-
-    top: Blend
-    """Its last feature is what the base gives, where there is one."""
     sizes: Sizes
-    """``(n, 2)`` int32: height and width of the images that taught it, or the base, each once."""
+    """``(n, 2)`` int32: height and width of the images that taught them, each once."""
     base: Blend | None = None
+    """The one of other drives, whose log-odds are the last feature of these."""
 
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, sizes=("n", 2))
         check_range("sizes", self.sizes, 1, GREATEST)
-        if self.base is not None and self.top.inputs != self.base.inputs + 1:
+        own = self.network.inputs
+        if self.forest.inputs != own:
             raise ValueError(
-                f"what stands on top sees {self.top.inputs} features of a pixel, and the base "
+                f"the forest sees {self.forest.inputs} features of a pixel, and the network {own}"
+            )
+        if self.base is not None and own != self.base.inputs + 1:
+            raise ValueError(
+                f"what stands on top sees {own} features of a pixel, and the base "
                 f"{self.base.inputs}"
             )
 
     @property
     def inputs(self) -> int:
         """How many features of a pixel are given to it."""
-        return (self.base or self.top).inputs
+        return self.base.inputs if self.base else self.network.inputs
 
     def knows(self, image: Rgb) -> bool:
-        """Return whether images of the size of one taught it."""
-        return bool((self.sizes == image.shape[:2]).all(axis=1).any())
+        """Return whether images of the size of one taught it, or what it stands on."""
+        own = bool((self.sizes == image.shape[:2]).all(axis=1).any())
+        return own or (self.base is not None and self.base.knows(image))
 
     def log_odds(self, values: Values, weight: Values | float) -> Values:
-        """Return what the blend on top gives for each pixel, ``(n,)`` float32.
+        """Return the weighted mean of both for each pixel of ``(inputs, n)`` features, ``(n,)``.
 
-        ``values`` and ``weight`` are as in `Blend.log_odds`; both blends take the same weight.
+        The weight, 0 to 1, is the network's: one, or ``(n,)``; the base takes the same.
         """
         if self.base is not None:
-            known = self.base.log_odds(values, weight)
-            values = np.concatenate([values, known[None]])
-        return self.top.log_odds(values, weight)
+            values = np.concatenate([values, self.base.log_odds(values, weight)[None]])
+        trees, network = self.forest.sums(values), self.network.sums(values)
+        mean: Values = trees + np.asarray(weight, np.float32) * (network - trees)
+        return mean
 
 
 def see(settings: TreesSettings, image: Rgb, opinion: Opinion | None = None) -> Values:
@@ -375,17 +343,17 @@ def seen(scene: Scene, settings: TreesSettings, opinion: Opinion | None) -> Valu
     return np.concatenate([own, opinions(opinion, scene.shape)])
 
 
-def fit(sample: TrainingSet, settings: TreesSettings) -> Stack:
+def fit(sample: TrainingSet, settings: TreesSettings) -> Blend:
     """Grow the trees, and train the network, on the sampled pixels and their mirror images.
 
     The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
     the classes weigh as much as they have there.
     """
     values = at_samples(sample, partial(see, settings))
-    return Stack(_grown(np.concatenate(values), sample, settings), _sizes(sample))
+    return _grown(np.concatenate(values), sample, settings)
 
 
-def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
+def adapt(known: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
     """Learn from a drive's own pixels, for which what is known already is one more feature."""
     if known.base is not None:
         raise MisfitError("the model was adapted to a drive already; train it again")
@@ -393,22 +361,17 @@ def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
     values = np.concatenate(at_samples(sample, partial(see, settings)))
     by_feature = np.ascontiguousarray(values.T)
     given = known.log_odds(by_feature, network_weight(by_feature, settings))
-    top = _grown(np.column_stack([values, given]), sample, settings)
-    return Stack(top, np.unique(np.vstack([known.sizes, _sizes(sample)]), axis=0), known.top)
-
-
-def _sizes(sample: TrainingSet) -> Sizes:
-    return np.unique(np.array([each.shape[:2] for each in sample.images], np.int32), axis=0)
+    return replace(_grown(np.column_stack([values, given]), sample, settings), base=known)
 
 
 def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blend:
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
     s, seed = settings, sample.seed
-    growth = Growth(s.trees, s.leaves, RATE, s.least, SHARE)
-    forest = grow(values, road, weights, growth, seed)
+    forest = grow(values, road, weights, s, seed)
     network = train(values, road, weights, seed, planes=s.hidden, passes=s.passes, noise=s.noise)
-    return Blend(forest, network)
+    sizes = np.unique(np.array([each.shape[:2] for each in sample.images], np.int32), axis=0)
+    return Blend(forest, network, sizes)
 
 
 def balanced_back(road: Flags, share: float) -> Floats:
@@ -418,7 +381,7 @@ def balanced_back(road: Flags, share: float) -> Floats:
     return weights
 
 
-def check_fit(learnt: Stack, settings: TreesSettings) -> None:
+def check_fit(learnt: Blend, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
     known = len(names_of(settings.features))
     if settings.opinion == (learnt.inputs == known) or learnt.inputs < known:
@@ -443,7 +406,7 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     return weight
 
 
-def log_odds(planes: Values, learnt: Stack, settings: TreesSettings) -> Values:
+def log_odds(planes: Values, learnt: Blend, settings: TreesSettings) -> Values:
     """Compute the log-odds of road from `features`, ``(F, h, w)``; ``(h, w)`` float32."""
     values = planes.reshape(len(planes), -1)
     return learnt.log_odds(values, network_weight(values, settings)).reshape(planes.shape[1:])
@@ -455,7 +418,7 @@ def probability(odds: Values) -> Values:
     return result
 
 
-def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
+def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(learnt, settings)
     names = names_of(settings.features)
@@ -504,7 +467,7 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     adapt=adapt,
-    parameters=Stack,
+    parameters=Blend,
     oracle=perfect_mask,
     inference_only=("reach_weight", "threshold"),
     hears=lambda settings: settings.opinion,

@@ -11,7 +11,6 @@ from roadeval.pipeline.beyond.features import GROUPS, SHADE, SUN, names_of
 from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
 from roadeval.pipeline.beyond.trees import (
     Blend,
-    Growth,
     TreesSettings,
     balanced_back,
     grow,
@@ -82,10 +81,10 @@ def test_rarer_road_is_less_probable():
 
 def test_a_blend_is_the_weighted_mean(network):
     values, road = features_and_road()
-    forest = grow(values, road, None, Growth(10, 8, 0.1, 5, 0.33), 0)
+    forest = grow(values, road, None, TreesSettings(trees=10, leaves=8, least=5), 0)
     seen = planes_of(values)
     trees, other = forest.sums(seen), network.sums(seen)
-    blend = Blend(forest, network)
+    blend = Blend(forest, network, np.ones((1, 2), np.int32))
     for weight in (0, 0.25, 1, np.linspace(0, 1, len(other), dtype=np.float32)):
         expected = trees + np.float32(weight) * (other - trees)
         np.testing.assert_allclose(blend.log_odds(seen, weight), expected, rtol=1e-4, atol=1e-5)

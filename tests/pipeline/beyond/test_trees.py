@@ -16,8 +16,6 @@ from roadeval.pipeline.beyond.trees import (
     BINS,
     NODES,
     Blend,
-    Growth,
-    Stack,
     TreesSettings,
     balanced_back,
     bin_edges,
@@ -55,7 +53,7 @@ def learnt(sample):
 
 @pytest.fixture(scope="module")
 def forest(learnt):
-    return learnt.top.forest
+    return learnt.forest
 
 
 def features_and_road(seed=0, count=600):
@@ -69,8 +67,9 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values, road = features_and_road(count=1000)
     values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
     weights = balanced_back(road, 0.2) if weighted else None
-    growth = Growth(SMALL.trees, leaves, trees.RATE, SMALL.least, share=1.0)
-    found = grow(values, road, weights, growth, 0).sums(np.ascontiguousarray(values.T))
+    found = grow(values, road, weights, replace(SMALL, leaves=leaves), 0, share=1.0).sums(
+        np.ascontiguousarray(values.T)
+    )
     boosting = HistGradientBoostingClassifier(
         learning_rate=trees.RATE,
         max_iter=SMALL.trees,
@@ -112,10 +111,10 @@ def test_bins_of_few_values_part_each_from_the_next(feature, edges):
 
 
 def test_the_same_seed_grows_the_same_trees(sample, forest):
-    again = trees.fit(sample, SMALL).top.forest
+    again = trees.fit(sample, SMALL).forest
     for field in fields(forest):
         np.testing.assert_array_equal(getattr(again, field.name), getattr(forest, field.name))
-    other = trees.fit(replace(sample, seed=1), SMALL).top.forest
+    other = trees.fit(replace(sample, seed=1), SMALL).forest
     assert (other.feature != forest.feature).any()
 
 
@@ -323,13 +322,14 @@ def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, g
 
 def test_what_stands_on_top_sees_the_base_as_its_last_feature(sample, learnt):
     adapted = trees.adapt(learnt, sample, SMALL)
-    assert adapted.base is learnt.top
+    assert adapted.base is learnt
     assert adapted.inputs == learnt.inputs
     values = np.ascontiguousarray(np.concatenate(at_samples(sample, partial(trees.see, SMALL))).T)
     known = learnt.log_odds(values, 0.5)
-    expected = adapted.top.log_odds(np.concatenate([values, known[None]]), 0.5)
+    top = replace(adapted, base=None)
+    expected = top.log_odds(np.concatenate([values, known[None]]), 0.5)
     np.testing.assert_array_equal(adapted.log_odds(values, 0.5), expected)
-    assert (adapted.top.forest.feature == learnt.inputs).any()
+    assert (adapted.forest.feature == learnt.inputs).any()
 
 
 def test_adapted_trees_know_what_other_drives_taught():
@@ -351,8 +351,8 @@ def test_what_was_adapted_is_not_adapted_again(sample, learnt):
 
 
 def test_parts_that_see_other_features_are_refused(sample, learnt):
-    other = trees.fit(sample, replace(SMALL, features=("place",))).top
+    other = trees.fit(sample, replace(SMALL, features=("place",)))
     with pytest.raises(ValueError, match="the forest sees 3 features of a pixel, and the network"):
-        Blend(other.forest, learnt.top.network)
+        Blend(other.forest, learnt.network, learnt.sizes)
     with pytest.raises(ValueError, match="on top sees 3 features of a pixel, and the base 3"):
-        Stack(other, learnt.sizes, other)
+        replace(other, base=other)
