@@ -126,8 +126,9 @@ def settle(
     config: LogConfig,
     *,
     several: bool = False,
+    of_rig: bool = False,
 ) -> Selection:
-    """Settle what to replay of a log's own topics.
+    """Settle what to replay of a log's own topics; ``of_rig`` is that of `choose_truth`.
 
     A `LogError` as `roadeval.logs.Log.select` says.
     """
@@ -138,7 +139,7 @@ def settle(
     if config.truth.path:
         truth = Choice(None, "")
     else:
-        truth = choose_truth(topics, image, asked.truth, config.labels)
+        truth = choose_truth(topics, image, asked.truth, config.labels, of_rig=of_rig)
     choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow, config.labels)}
     for name, topic in asked.masks.items():
         choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")

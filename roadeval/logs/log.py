@@ -94,6 +94,7 @@ class Log:
         self._limits = Limits(config.frames.max_pixels, config.frames.keep_corrupt)
         self._lost_files = damage
         self._beside: list[Log] = []
+        self._of_rig = False
         self._with_truth: tuple[LabelSource, list[int]] | None = None
         self._containers = [
             container
@@ -204,9 +205,10 @@ class Log:
         label image has another size, or no mask belongs to a frame.
         """
         try:
-            found = settle(self.topics, self._readers, self.config, several=several)
-            if (own := self.config.truth).path:
-                settings = MaskSettings(**vars(own), labels=self.config.labels)
+            own = self.topics, self._readers, self.config
+            found = settle(*own, several=several, of_rig=self._of_rig)
+            if (place := self.config.truth).path:
+                settings = MaskSettings(**vars(place), labels=self.config.labels)
                 truth = self._beside_log(settings, found, several=several)
                 found = replace(found, labels={TRUTH: truth, **found.labels})
             beside = {
@@ -256,9 +258,9 @@ class Log:
         return beside_log(reader, settings, camera, lambda: other.digest, name, several=several)
 
     def for_camera(self, config: LogConfig) -> Log:
-        """Return the same open log with something else asked of it, as of another camera."""
+        """Return the same open log with what is asked of one camera of several."""
         other = copy(self)
-        other.config, other._with_truth = config, None
+        other.config, other._with_truth, other._of_rig = config, None, True
         return other
 
     def frames(self, selection: Selection) -> FrameStream:

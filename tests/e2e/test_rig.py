@@ -1,6 +1,7 @@
 """Several cameras of one log: replayed together, scored apart, and looked at as one drive."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,11 @@ TABLES = ("frames", "windows", "regions", "oracles", "changes", "heat", "disagre
 """Those of a drive that the two variants of the paper fill."""
 
 
-def a_rig(path: Path, cameras: dict[str, tuple[int, int]]) -> Path:
-    """A log in which each camera shows some frames of the demo, by their positions."""
+def a_rig(path: Path, cameras: dict[str, tuple[int, int]], without: Iterable[str] = ()) -> Path:
+    """A log in which each camera shows some frames of the demo, by their positions.
+
+    Those of ``without`` have no labels.
+    """
     with DEMO.open("rb") as file:
         messages = [*make_reader(file).iter_messages()]
     stamps = sorted({m.log_time for _, channel, m in messages if channel.topic == IMAGE})
@@ -35,7 +39,7 @@ def a_rig(path: Path, cameras: dict[str, tuple[int, int]]) -> Path:
             place = int(np.searchsorted(stamps, message.log_time, side="right")) - 1
             for name, (first, last) in cameras.items():
                 topic = f"/{name}{channel.topic}"
-                if not first <= place < last:
+                if not first <= place < last or (name in without and channel.topic == TRUTH):
                     continue
                 if schema.id not in schemas:
                     kind = schema.name, schema.encoding, schema.data
@@ -212,6 +216,20 @@ def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path,
     ]
     assert (effect.units, effect.groups, effect.low) == (2, 1, None)
     assert any("cameras of one log count as one drive" in each for each in fleet.facts.warnings)
+
+
+def test_a_camera_without_labels_is_recorded_and_says_why(rig: Path, tmp_path: Path):
+    log = a_rig(tmp_path / "half.mcap", {"front": (0, 30), "rear": (0, 30)}, without={"rear"})
+    places = "--save", tmp_path / "o.rrd", "-o", tmp_path / "o"
+    run = here("replay", log, *topics("front", "rear"), *places)
+    assert run.returncode == 0, run.stderr
+    assert "belongs to another camera" in run.stderr
+    summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    assert [bool(own["totals"]) for own in summary["cameras"].values()] == [True, False]
+    assert summary["totals"] == summary["cameras"][f"/front{IMAGE}"]["totals"]
+    alone = roadeval.Recording(tmp_path / "o.rrd", f"/rear{IMAGE}")
+    assert alone.layer("unfiltered", "post", frame=5).any()
+    assert here("report", tmp_path / "o.rrd", "-o", tmp_path / "o.pdf").returncode == 0
 
 
 @pytest.mark.parametrize(

@@ -134,7 +134,10 @@ def _written(
 ) -> Outcome:
     """Run over the log. All outputs are whole before the first of them takes its name."""
     cameras = config.by_camera()
-    runs = [prepare(log.for_camera(own), own, on_progress, name) for name, own in cameras.items()]
+    runs = [
+        prepare(log.for_camera(own) if name else log, own, on_progress, name)
+        for name, own in cameras.items()
+    ]
     layouts = {run.camera: run.layout() for run in runs}
     rule = RecordRule.parse(config.output.record)
     with (

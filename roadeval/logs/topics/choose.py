@@ -79,14 +79,20 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
 
 
 def choose_truth(
-    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, labels: LabelSettings
+    topics: Sequence[TopicInfo],
+    image: TopicInfo,
+    asked: str | None,
+    labels: LabelSettings,
+    *,
+    of_rig: bool = False,
 ) -> Choice:
     """Choose the topic of the road truth.
 
     An image of single values is preferred; one of colours where those are asked for, or where there
     is no other. A `LogError` if the one asked for is not there or no image, or if several are
-    candidates; or if the meaning of values is given, and the only label images are compressed with
-    loss.
+    candidates, or are another camera's; or if the meaning of values is given, and the only label
+    images are compressed with loss. ``of_rig`` says that other cameras are replayed, too, so that
+    labels of these are none of this one's.
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.truth`")
@@ -102,10 +108,13 @@ def choose_truth(
         no_others = ", and no other camera's by path and frame_id" if is_rig else ""
         return Choice(truth, f"the label image, by its name and its {by}{no_others}")
     if others := _clear_truths(roads, image, colors=colors):
+        whose = f"{others[0].name} belongs to another camera than {image.name}, by "
+        whose += elsewhere[others[0].name]
+        if of_rig:
+            return Choice(None, whose)
         raise LogError(
-            f"{others[0].name} belongs to another camera than {image.name}, by "
-            f"{elsewhere[others[0].name]}: name it with `topics.truth` to use it nevertheless, or "
-            "give an empty name there to continue without truth"
+            f"{whose}: name it with `topics.truth` to use it nevertheless, or give an empty name "
+            "there to continue without truth"
         )
     if roads:
         why = "no topic is clearly road truth; name one with `topics.truth`:"
