@@ -157,6 +157,19 @@ def test_a_manifest_says_more_of_a_drive_that_is_named_beside_it(folder):
         assert second.settings == DriveSettings(second.source, {"frames": {"every": 5}})
 
 
+def test_a_log_may_be_named_once_for_each_of_its_cameras(folder):
+    put("a.mcap")
+    put("b.mcap")
+    Path("rig.csv").write_text(
+        "path,topics.image\na.mcap,/front/image\na.mcap,/rear/image\nb.mcap,\n"
+    )
+    front, rear, other = find_drives(["rig.csv"])
+    assert (front.camera, rear.camera, other.camera) == ("/front/image", "/rear/image", "")
+    assert (front.name, rear.name, other.name) == ("a front", "a rear", "b")
+    assert front.id == f"{identity(front.source)}-front" != rear.id
+    assert find_drives(["rig.csv", "rig.csv"]) == [front, rear, other]
+
+
 def test_two_descriptions_of_one_drive_are_refused(folder):
     put("a.mcap")
     Path("1.csv").write_text("path,tag.weather\na.mcap,rain\n")
