@@ -122,9 +122,11 @@ def _read(name: str, source: Path | str, stated: Mapping[str, TableFacts] | None
 
 
 def _of_camera(table: pa.Table, camera: str) -> pa.Table:
+    if not camera:
+        return table
     from pyarrow import compute
 
-    return table.filter(compute.equal(table["camera"], camera)) if camera else table
+    return table.filter(compute.equal(table["camera"], camera))
 
 
 def _content(path: Path) -> bytes:
