@@ -10,7 +10,8 @@ from dataclasses import dataclass
 class Progress:
     """How far a job is: ``done`` of ``total`` frames of ``stage``.
 
-    ``stage`` is ``training``, ``replaying``, ``writing``, ``rendering`` or ``verifying``; ``total``
+    ``stage`` is ``training``, ``replaying``, ``writing``, ``reading``, ``rendering`` or
+    ``verifying``; ``total``
     is None where it is not known.
     """
 

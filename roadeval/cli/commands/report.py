@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from roadeval.cli import arguments, console, messages
+from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
@@ -69,7 +69,15 @@ def report(
     if (pictures is not None or assets) and not (output and is_page(output)):
         raise typer.BadParameter("--pictures and --assets go with a page alone: -o FILE.html")
     page, opened = PageSettings(pictures, assets), arguments.of_camera(Result(result), camera)
-    path = write_report(opened, output, paper=size, commands=commands_of(opened), as_page=page)
+    with progress.watched(quiet) as watch:
+        path = write_report(
+            opened,
+            output,
+            paper=size,
+            commands=commands_of(opened),
+            as_page=page,
+            on_progress=watch,
+        )
     if not quiet:
         console.emit(str(path))
     for warning in opened.warnings:

@@ -22,6 +22,7 @@ from roadeval.data import (
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import NOTEWORTHY
+from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import DriveResult
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
@@ -32,6 +33,7 @@ from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
     from roadeval.recording import Recording
+
 
 WORST: Final = 4
 MOVED: Final = 2
@@ -322,6 +324,7 @@ def strips_of(
     inspect: Callable[[int], str] | None,
     count: int | None = None,
     taken: int = 0,
+    on_progress: OnProgress = ignore,
 ) -> tuple[list[Strip], list[str]]:
     """Return frames with their pictures, and the variants whose layers had no room.
 
@@ -337,7 +340,13 @@ def strips_of(
     if count is None and chosen and FEWEST * bytes_of(picker.strip(chosen[0], inspect)) > room:
         picker = FramePicker(result, None, LAYERS)
         left_out = [variant.name for variant in result.recording.variants[LAYERS:]]
-    made = (picker.strip(frame, inspect) for frame in chosen)
+
+    def each() -> Iterator[Strip]:
+        for done, frame in enumerate(chosen, 1):
+            yield picker.strip(frame, inspect)
+            on_progress(Progress(done, len(chosen), "reading"))
+
+    made = each()
     shown = made if count is not None else fitting(made, room)
     return sorted(shown, key=lambda each: each.frame), left_out
 

@@ -20,6 +20,7 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
 from roadeval.jobs.outputs import holding
+from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import FramePicker, browsed, evenly, strips_of
 from roadeval.jobs.results.result import DriveResult, Result, RigResult
 from roadeval.report.blocks import Document, ImageFile
@@ -66,6 +67,7 @@ def write_report(
     paper: Paper = Paper.A4,
     commands: Commands | None = None,
     as_page: PageSettings = PageSettings(),
+    on_progress: OnProgress = ignore,
 ) -> Path:
     """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
 
@@ -81,6 +83,8 @@ def write_report(
         in ``.html`` gives a page.
     commands
         What the reader may type for more; none by default.
+    on_progress
+        Called with each pictured frame of a page.
     """
     opened = result if isinstance(result, Result) else Result(result)
     (source,) = opened.paths
@@ -90,7 +94,7 @@ def write_report(
         if not is_page(path):
             return write_file(path, pdf(document(findings_of(opened, commands)), paper))
         kept = Beside.PICTURES if opened.fleet else Beside.NOTHING
-        made = page_of(opened, commands, as_page.pictures)
+        made = page_of(opened, commands, as_page.pictures, on_progress)
         return write_page(path, made, Beside.ALL if as_page.assets else kept)
 
 
@@ -120,7 +124,10 @@ def is_page(path: Path) -> bool:
 
 
 def page_of(
-    result: Result, commands: Commands | None = None, pictures: int | None = None
+    result: Result,
+    commands: Commands | None = None,
+    pictures: int | None = None,
+    on_progress: OnProgress = ignore,
 ) -> Document:
     """Return the page of a result as a document, with so many pictured frames.
 
@@ -132,7 +139,7 @@ def page_of(
     drive, inspect = result.drive, commands.inspect if commands else None
     frames = browsed(drive, inspect)
     taken = len(page(page_document(findings, frames))) if pictures is None else 0
-    strips, left_out = strips_of(drive, inspect, pictures, taken)
+    strips, left_out = strips_of(drive, inspect, pictures, taken, on_progress)
     return page_document(findings, replace(frames, strips=strips, left_out=left_out))
 
 
