@@ -213,7 +213,7 @@ class ImageGrid(Block):
     pictures: Sequence[tuple[str, ImageFile]]
     columns: int
     skip: int = 0
-    """Places of the first row that stay free."""
+    """Places of the first row that stay free, on paper."""
     caption: str = ""
     """Printed below all of them."""
 

@@ -64,7 +64,7 @@ def of_folder(demo, tmp_path_factory):
 def test_a_results_folder_gives_the_same_numbers_without_pictures(of_folder, words):
     told, _ = of_folder
     assert "Made without pictures" in told
-    table = re.search(r"final mask ERR .*? precision (.*?) Frames: ", told)
+    table = re.search(r"final mask ERR .*? precision (.*?) \d+ of \d+ frames were evaluated", told)
     assert table
     assert table[1] in words
 
@@ -125,7 +125,7 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(kille
     assert not any("Where the final masks go wrong" in page for page in pages)
     assert any("If a stage were perfect" in page for page in pages)
     assert "This run did not reach its end" in first
-    (evaluated,) = re.findall(r"(\d+) evaluated", first)
+    (evaluated,) = re.findall(r"(\d+) frames? w\w+ evaluated", first)
     # Of the 20 frames with truth ten are trained on, and six more come before the end.
     assert 0 < int(evaluated) < 10
 
