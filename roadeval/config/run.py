@@ -165,7 +165,7 @@ class RunConfig(LogConfig):
             )
 
     def _check_cameras(self) -> None:
-        names = [each.name or each.image for each in self.cameras]
+        names = [visible(each.name or each.image) for each in self.cameras]
         for name in names:
             if names.count(name) > 1:
                 raise ConfigError(f"camera {name}: given twice")
@@ -195,7 +195,7 @@ class RunConfig(LogConfig):
             return {"": self}
         fields = ("image", "truth", "shadow", "masks")
         return {
-            each.name or each.image: replace(
+            visible(each.name or each.image): replace(
                 self,
                 cameras=(),
                 topics=replace(self.topics, **{name: getattr(each, name) for name in fields}),

@@ -246,6 +246,19 @@ def test_what_does_not_say_which_camera_is_refused(rig: Path, words: list[str], 
     assert said in run.stderr
 
 
+def test_a_camera_whose_topic_cannot_be_shown_is_read_back(tmp_path: Path):
+    name = "cam\x1b[31m,\n"
+    a_rig(tmp_path / "a.mcap", {name: (0, 24), "rear": (0, 24)})
+    cameras = [{"image": f"/{name}{IMAGE}"}, {"image": f"/rear{IMAGE}"}]
+    config = roadeval.configure({"cameras": cameras})
+    roadeval.replay(tmp_path / "a.mcap", config, save=tmp_path / "o.rrd", reports=tmp_path / "o")
+    shown = r"/cam\u001b[31m,\n/camera/image"
+    for path in ("o.rrd", "o"):
+        result = roadeval.Result(tmp_path / path)
+        assert list(result.cameras) == [shown, f"/rear{IMAGE}"]
+        assert set(result.frames["camera"]) == set(result.cameras)
+
+
 def test_a_command_that_looks_at_one_camera_takes_no_second(rig: Path):
     run = here("info", rig / "rig.mcap", *topics("front", "rear"))
     assert run.returncode == 2
