@@ -58,7 +58,6 @@ class ResultsWriter:
     def __init__(self, folder: Path) -> None:
         self._new: Final = NewFolder(folder, CONTENT)
         self._open: Final[dict[str, _Growing]] = {}
-        self._of_cameras: Final[dict[tuple[str, str], _Sum]] = {}
         self._finished = False
 
     @property
@@ -89,24 +88,16 @@ class ResultsWriter:
                     table.close()
             self._new.discard()
 
-    def append(self, lines: Mapping[str, str], camera: str = "") -> None:
-        """Add lines of CSV to tables, by their names; in a rig they are those of a camera."""
+    def append(self, lines: Mapping[str, str]) -> None:
+        """Add lines of CSV to tables, by their names."""
         with self.explained():
             for name, text in lines.items():
                 self._open[name].append(text)
-                if camera:
-                    own = self._of_cameras.setdefault((camera, name), _Sum(TABLES[name].header))
-                    own.add(text)
 
     @property
     def tables(self) -> dict[str, TableFacts]:
         """The tables that have rows so far."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
-
-    def tables_of(self, camera: str) -> dict[str, TableFacts]:
-        """Return what `tables` would be if only a rig's camera were in them."""
-        own = {name: sums for (whose, name), sums in self._of_cameras.items() if whose == camera}
-        return {name: sums.stated for name, sums in own.items()} if camera else self.tables
 
     def finish(self, facts: Facts, run_toml: str) -> Facts:
         """Write ``summary.json`` and ``run.toml``; return the facts with the tables and files.
@@ -129,34 +120,24 @@ class ResultsWriter:
         return writing(self._new.path, ResultsError, advice)
 
 
-class _Sum:
-    """The rows of a table so far, and the SHA-256 of its text."""
-
-    def __init__(self, header: str) -> None:
-        self.rows = 0
-        self._digest: Final = hashlib.sha256(header.encode())
-
-    @property
-    def stated(self) -> TableFacts:
-        return TableFacts(self.rows, self._digest.hexdigest())
-
-    def add(self, lines: str) -> None:
-        self.rows += lines.count("\n")
-        self._digest.update(lines.encode())
-
-
-class _Growing(_Sum):
+class _Growing:
     """A table that grows."""
 
     def __init__(self, folder: Path, table: TableSchema) -> None:
-        super().__init__(table.header)
         self.path: Final = folder / f"{table.name}.csv"
+        self.rows = 0
+        self._digest: Final = hashlib.sha256()
         self._file: Final[IO[bytes]] = self.path.open("wb")
-        self._file.write(table.header.encode())
+        self._write(table.header)
+
+    @property
+    def stated(self) -> TableFacts:
+        """The rows so far, and the SHA-256 of the text."""
+        return TableFacts(self.rows, self._digest.hexdigest())
 
     def append(self, lines: str) -> None:
-        self.add(lines)
-        self._file.write(lines.encode())
+        self.rows += lines.count("\n")
+        self._write(lines)
 
     def close(self) -> None:
         self._file.close()
@@ -166,6 +147,11 @@ class _Growing(_Sum):
         self.close()
         if not self.rows:
             self.path.unlink()
+
+    def _write(self, text: str) -> None:
+        content = text.encode()
+        self._digest.update(content)
+        self._file.write(content)
 
 
 class ResultsFolder:

@@ -188,9 +188,9 @@ def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -
     """Sum up a camera's run, and add the sums to the tables."""
     rows = sum_rows(run.board)
     sums = csv_lines(run.key, rows)
-    results.append(sums, run.camera)
+    results.append(sums)
     shown = [each.frame for each in examples]
-    facts = summary.of(run, shown, results.tables_of(run.camera))
+    facts = summary.of(run, shown, {} if run.camera else results.tables)
     scores = list(score_rows(facts, run.board.regions()))
     if run.camera:
         scores = [{"drive": f"{run.log.name} {run.camera}", **row} for row in scores]
@@ -240,7 +240,7 @@ def _record(
         if forecast := recorder.forecast(done.encoded, total):
             on_progress(Progress(position, total, "replaying", forecast))
         recorder.write(done.encoded)
-        results.append(done.lines, run.camera)
+        results.append(done.lines)
         sidecar.write(done.result, run.selection.image.frame_id, run.camera)
         examples[run.camera].offer(done.position, done.result)
         on_frame(done.result)
