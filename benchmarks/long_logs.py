@@ -256,6 +256,26 @@ for path in sys.argv[1:]:
     with open(path, "rb") as file:
         print(hashlib.file_digest(file, "sha256").hexdigest())
 """
+# What Rerun's own loader costs, of a process that ends without Python: it is asked for its numbers
+# before it is taken leave of.
+_LOADER: Final = """
+import os, subprocess, sys
+from pathlib import Path
+import rerun_cli
+
+program = next(Path(rerun_cli.__file__).parent.glob("rerun*"))
+child = subprocess.Popen([program, "mcap", "convert", sys.argv[1], "-o", sys.argv[2]],
+                         stdout=subprocess.DEVNULL)
+peak = 0
+while os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None:
+    lines = dict(each.split(":", 1) for each in Path(f"/proc/{child.pid}/status").open())
+    peak = lines.get("VmHWM", f"{peak} kB").split()[0]
+    os.sched_yield()
+read = dict(each.split(": ") for each in Path(f"/proc/{child.pid}/io").open())["rchar"]
+child.wait()
+used = os.times()
+Path(os.environ["COST"]).write_text(f"{read.strip()} {sum(used[2:4])} {peak}")
+"""
 _LAYER: Final = f"""{_END}
 from roadeval import Recording
 recording = Recording(sys.argv[1])
@@ -300,6 +320,9 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
     out, reports = folder / "out.rrd", folder / "reports"
     replay = "replay", drive, "--image-topic", "/cameras/front/image/compressed"
     replay = *replay, "--save", out, "--reports", reports
+    topics = [f"/cameras/{name}/image/compressed" for name in CAMERAS]
+    rig = "replay", drive, *(word for topic in topics for word in ("--image-topic", topic))
+    rig = *rig, "--save", folder / "rig.rrd", "--reports", folder / "rig"
     every: dict[str, tuple[Any, ...]] = {
         "sha256sum": (_SHA256, *files),
         "seeking": (_SEEKING, 53, *files),
@@ -308,6 +331,8 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
         "fifty": (_ROADEVAL, *replay, "--max-frames", 50, "--model", folder / "front.model"),
         "labelled": (_ROADEVAL, *replay, "--every", 20, "--train-frames", 3),
         "replay": (_ROADEVAL, *replay, "--train-frames", 3),
+        "rig": (_ROADEVAL, *rig, "--train-frames", 3),
+        "loader": (_LOADER, files[0], folder / "loader.rrd"),
         "layer": (_LAYER, out),
         "pdf": (_ROADEVAL, "report", out, "-o", folder / "report.pdf"),
         "page": (_ROADEVAL, "report", out, "-o", folder / "report.html"),
@@ -319,7 +344,8 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
     for name in parts:
         found = measured(*every[name])
         read = max(found.pop("read") - own, 0)
-        made = out.stat().st_size if "replay" in every[name] else 0
+        saved = {"rig": folder / "rig.rrd", "loader": folder / "loader.rrd"}.get(name, out)
+        made = saved.stat().st_size if name == "loader" or "replay" in every[name] else 0
         yield {
             "what": name,
             "read, MB": f"{read / 1e6:.0f}",
@@ -330,8 +356,8 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
 
 
 PARTS: Final = (
-    *("sha256sum", "seeking", "info", "verify", "fifty", "labelled", "replay"),
-    *("layer", "pdf", "page"),
+    *("sha256sum", "seeking", "loader", "info", "verify", "fifty", "labelled", "replay"),
+    *("rig", "layer", "pdf", "page"),
 )
 
 

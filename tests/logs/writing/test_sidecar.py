@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -41,9 +42,9 @@ def result() -> FrameResult:
     )
 
 
-def write(path: Path) -> Path:
+def write(path: Path, frame_id: str = "cam_front", camera: str = "") -> Path:
     with SidecarWriter(path) as sidecar:
-        sidecar.write(result())
+        sidecar.write(result(), frame_id, camera)
     return path
 
 
@@ -53,6 +54,19 @@ def image(data: bytes) -> list[list[list[int]]]:
         pixels = cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGBA)
     found: list[list[list[int]]] = pixels.tolist()
     return found
+
+
+@pytest.mark.parametrize(("source", "kept"), [("cam_front", "cam_front"), ("", "camera")])
+def test_masks_are_in_the_frame_of_the_camera(tmp_path: Path, source: str, kept: str) -> None:
+    with write(tmp_path / "results.mcap", source, "/front").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = {
+            channel.topic: message.frame_id
+            for _, channel, _, message in reader.iter_decoded_messages(
+                ["/roadeval/front/filtered/post", "/roadeval/front/filtered/errors"]
+            )
+        }
+    assert found == {f"/roadeval/front/filtered/{name}": kept for name in ("post", "errors")}
 
 
 def test_masks_and_errors_bear_the_images_own_times(tmp_path: Path) -> None:
