@@ -45,6 +45,17 @@ def write_drive(path: Path, first: int = 0) -> None:
             log.mask("/front/road_mask", at, truth)
 
 
+def write_rig(path: Path) -> None:
+    """Write a drive of two cameras whose truths explain themselves."""
+    with LogWriter(path) as log:
+        for number in range(FRAMES):
+            for place, name in enumerate(("front", "left")):
+                image, _ = scene(number + 7 * place)
+                at, truth = stamp(number), labels(number + 7 * place, 255, 0, 128)
+                log.image(f"/{name}/image", at, encoded(image[..., ::-1]), "png")
+                log.mask(f"/{name}/labels", at, truth)
+
+
 def encoded(pixels: np.ndarray) -> bytes:
     return cv2.imencode(".png", pixels)[1].tobytes()
 
@@ -98,6 +109,7 @@ def world(tmp_path_factory) -> Path:
     shutil.copy(folder / "street.mcap", folder / "tuesday")
     write_images(folder)
     write_bare_drive(folder / "bare.mcap")
+    write_rig(folder / "rig.mcap")
     red_network(folder / "road.onnx")
     reports = folder / "reports" / "drive"
     roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)

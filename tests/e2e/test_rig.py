@@ -2,22 +2,36 @@
 
 import json
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import Writer
 
 import roadeval
 from roadeval.data import FrameResult
+from roadeval.logs import LogWriter, open_log
 from tests.e2e.commands import DEMO, here
 
 IMAGE, TRUTH = "/camera/image", "/truth/road"
+SIZE, ROAD = (160, 120), np.uint8(255)
 NAMES = {f"/{name}{IMAGE}": None for name in ("front", "copy", "rear")}.keys()
 TABLES = ("frames", "windows", "regions", "oracles", "changes", "heat", "disagreements")
 """Those of a drive that the two variants of the paper fill."""
+
+
+@cache
+def scenes() -> list[tuple[int, bytes, np.ndarray]]:
+    """The demo's frames, a quarter as wide: stamp, JPEG and truth."""
+    with open_log(DEMO) as log:
+        frames = [frame.decode() for frame in log.frames(log.select())]
+    small = [(cv2.resize(each.image, SIZE), cv2.resize(each.truth, SIZE)) for each in frames]
+    return [
+        (each.stamp_ns, cv2.imencode(".jpg", image[..., ::-1])[1].tobytes(), (truth == 1) * ROAD)
+        for each, (image, truth) in zip(frames, small, strict=True)
+    ]
 
 
 def a_rig(path: Path, cameras: dict[str, tuple[int, int]], without: Iterable[str] = ()) -> Path:
@@ -25,32 +39,13 @@ def a_rig(path: Path, cameras: dict[str, tuple[int, int]], without: Iterable[str
 
     Those of ``without`` have no labels.
     """
-    with DEMO.open("rb") as file:
-        messages = [*make_reader(file).iter_messages()]
-    stamps = sorted({m.log_time for _, channel, m in messages if channel.topic == IMAGE})
-    schemas: dict[int, int] = {}
-    channels: dict[str, int] = {}
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
-        for schema, channel, message in messages:
-            if channel.topic not in (IMAGE, TRUTH):
-                continue
-            place = int(np.searchsorted(stamps, message.log_time, side="right")) - 1
+    with LogWriter(path) as log:
+        for place, (stamp, image, truth) in enumerate(scenes()):
             for name, (first, last) in cameras.items():
-                topic = f"/{name}{channel.topic}"
-                if not first <= place < last or (name in without and channel.topic == TRUTH):
-                    continue
-                if schema.id not in schemas:
-                    kind = schema.name, schema.encoding, schema.data
-                    schemas[schema.id] = writer.register_schema(*kind)
-                if topic not in channels:
-                    own = channel.message_encoding, schemas[schema.id]
-                    channels[topic] = writer.register_channel(topic, *own)
-                writer.add_message(
-                    channels[topic], message.log_time, message.data, message.log_time
-                )
-        writer.finish()
+                if first <= place < last:
+                    log.image(f"/{name}{IMAGE}", stamp, image, "jpeg")
+                    if name not in without:
+                        log.mask(f"/{name}{TRUTH}", stamp, truth)
     return path
 
 

@@ -256,7 +256,7 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
 
 @pytest.mark.parametrize("by", ["network", "masks"])
 def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path, by):
-    drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(4)]
+    drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(2)]
     fleet = {"folds": 2, "workers": 1}
     if by == "network":
         config = with_network(folder, fleet=fleet)
@@ -267,7 +267,7 @@ def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path,
         roadeval.replay_fleet(drives, tmp_path / "out", config, executor=executor)
     scores = roadeval.Result(tmp_path / "out").scores.query("stage == 'post'")
     errs = scores.pivot_table(index="drive", columns="variant", values="ERR")
-    assert len(errs) == 4
+    assert len(errs) == 2
     assert (errs.mine_tuned < errs.mine / 3).all()
 
 
