@@ -107,8 +107,10 @@ def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
     for name, counts in board.curves.counts.items():
         other, road = at_levels(counts)
         levels = (other + road).nonzero()[0]
-        columns = (levels.tolist(), road[levels].tolist(), other[levels].tolist())
-        probabilities += [(*name, *level) for level in zip(*columns, strict=True)]
+        worst = board.curves.worst(name)
+        columns = (each[levels].tolist() for each in (road, other, worst))
+        rows = zip(levels.tolist(), *columns, strict=True)
+        probabilities += [(*name, *row) for row in rows]
     return {
         "windows": window_rows(board.windows()),
         "changes": [

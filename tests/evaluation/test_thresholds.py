@@ -133,12 +133,25 @@ def test_levels_hold_256_codes_each():
     assert levels[1, [0, 1, 255]].tolist() == [3, 4, 8]
 
 
+def test_the_worst_frame_at_a_threshold_is_the_one_with_most_wrong_pixels():
+    frames = [drawn(seed, share=0.1 + 0.2 * seed) for seed in range(4)]
+    curves = Curves()
+    for number, each in enumerate(frames):
+        curves.add(10 * number, {("net", "post"): histogram(*each)})
+    for level, worst in enumerate(curves.worst(("net", "post")).tolist()):
+        wrong = []
+        for codes, truth in frames:
+            called = codes // 256 >= level
+            wrong.append(int((called != (truth == 1))[truth != 255].sum()))
+        assert worst == 10 * wrong.index(max(wrong))
+
+
 def test_frames_add_up_in_any_order():
     frames = [{("net", "post"): histogram(*drawn(seed))} for seed in range(3)]
     one, other = Curves(), Curves()
-    for each in frames:
-        one.add(each)
-    for each in reversed(frames):
-        other.add(each)
+    for number, each in enumerate(frames):
+        one.add(number, each)
+    for number, each in enumerate(reversed(frames)):
+        other.add(number, each)
     assert one.totals() == other.totals()
     assert one.totals()["net"]["post"]["frames"] == 3

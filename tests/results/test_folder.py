@@ -78,7 +78,7 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
         "disagreements": "drive,camera,frame,from_variant,to_variant,repaired,spoiled,N",
         "changes": "drive,camera,from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
         "heat": "drive,camera,variant,top,left,side,labelled,FP,FN",
-        "probabilities": "drive,camera,variant,stage,level,road,other",
+        "probabilities": "drive,camera,variant,stage,level,road,other,worst_frame",
     }
 
 
@@ -95,7 +95,7 @@ def test_lines_by_hand(tmp_path: Path) -> None:
     line = (tmp_path / "regions.csv").read_text().splitlines()[1]
     assert line == f"{OF}5,filtered,post,shadow,3,0,1,0,4"
     lines = (tmp_path / "probabilities.csv").read_text().splitlines()[1:]
-    assert lines == [f"{OF}filtered,post,0,2,9", f"{OF}filtered,post,156,5,7"]
+    assert lines == [f"{OF}filtered,post,0,2,9,6", f"{OF}filtered,post,156,5,7,6"]
 
 
 def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path: Path) -> None:

@@ -162,6 +162,11 @@ class Curves:
         self.counts: Final[dict[Name, Sums]] = {}
         """``(2, 65536)`` int64 each: non-road and road."""
         self._frames: Final[Counter[Name]] = Counter()
+        self._worst: Final[dict[Name, tuple[Sums, Sums]]] = {}
+
+    def worst(self, name: Name) -> Sums:
+        """Return the frame with most wrong pixels if each level were the threshold, ``(256,)``."""
+        return self._worst[name][1]
 
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
         """Return ERR of all pixels at the threshold that errs least on other frames.
@@ -177,13 +182,18 @@ class Curves:
                 found.setdefault(variant, {})[stage] = at
         return found
 
-    def add(self, histograms: Mapping[Name, Histogram]) -> None:
-        """Add the histograms of a frame."""
+    def add(self, frame: int, histograms: Mapping[Name, Histogram]) -> None:
+        """Add the histograms of the frame of this number."""
         for name, counts in histograms.items():
             self._frames[name] += 1
             if name not in self.counts:
                 self.counts[name] = np.zeros(counts.shape, np.int64)
+                self._worst[name] = np.full(LEVELS, -1), np.full(LEVELS, -1)
             self.counts[name] += counts
+            levels, (most, worst) = at_levels(counts.astype(np.int64)), self._worst[name]
+            wrong = np.append(levels[0].sum(), wrong_above(levels)[:-1])
+            more = wrong > most
+            most[more], worst[more] = wrong[more], frame
 
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return by variant and stage what is quoted of curves, fit for JSON.

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import BASELINE, Rows, colours
+from roadeval.data.arrays import Floats, Sums
 from roadeval.data.result import Cells
 from roadeval.data.words import in_percent, points
 from roadeval.evaluation import score
@@ -420,8 +421,8 @@ Masks = Mapping[str, Mapping[str, Mapping[str, Any]]]
 def curves(levels: Rows, quoted: Masks, totals: Masks, behind: Behind = UNKNOWN) -> list[Chart]:
     """Return precision over recall, the ROC, and reliability; none without a probability.
 
-    A mask has frames behind it, those with its highest ERR. A point of a curve has none: it adds up
-    the pixels of all frames, and results hold no counts by level of each.
+    A mask has frames behind it, those with its highest ERR; a point of a curve has the frame that
+    would be most wrong at its threshold.
 
     ``levels`` are as in ``probabilities.csv``, ``quoted`` and ``totals`` as ``curves`` and
     ``totals`` in ``summary.json``; ``behind`` has the frames with the highest rate, by variant,
@@ -431,22 +432,25 @@ def curves(levels: Rows, quoted: Masks, totals: Masks, behind: Behind = UNKNOWN)
         return []
     drawn = looks([*(name for name in totals if name != BASELINE), BASELINE])
     recall, roc = [], []
-    for name, each in _thresholds(levels).items():
-        recall.append(_curve(name, drawn[name], each.recall, each.precision))
+    found = _thresholds(levels)
+    for name, (each, worst) in found.items():
+        own = worst[each.codes]
+        recall.append(_curve(name, drawn[name], each.recall, each.precision, own))
         # From the threshold that nothing reaches.
-        ends = (np.concatenate([[0.0], rates]) for rates in (each.fpr, each.recall))
-        roc.append(_curve(name, drawn[name], *ends))
+        xs, ys = (np.concatenate([[0.0], rates]) for rates in (each.fpr, each.recall))
+        roc.append(_curve(name, drawn[name], xs, ys, np.append(own[:1], own)))
     finals = {name: [*totals[name]][-1] for name in drawn if name in totals}
     masks = {name: _mask(totals[name][stage]) for name, stage in finals.items()}
     for name, (fpr, tpr, precision) in masks.items():
         title, frames = f"{name}: the mask", behind.get((name, finals[name], score.TESTED), ())
         recall.append(_mark(title, drawn[name], tpr, precision, frames))
         roc.append(_mark(title, drawn[name], fpr, tpr, frames))
-    bins = [
-        _curve(name, drawn[name], *([b[key] for b in own["bins"]] for key in _AXES))
-        for name, stages in quoted.items()
-        for own in stages.values()
-    ]
+    bins = []
+    for name, stages in quoted.items():
+        for curve in stages.values():
+            said, share = (np.array([each[key] for each in curve["bins"]]) for key in _AXES)
+            at = np.minimum(said * LEVELS, LEVELS - 1).astype(int)
+            bins.append(_curve(name, drawn[name], said, share, found[name][1][at]))
     ideal = Series("as probabilities say", Look(FAINT, "dotted"), [0.0, 100.0], [0.0, 100.0])
     fprs, tprs, precisions = zip(*masks.values(), strict=True)
     # What is recall below the first chart is so beside the second, too.
@@ -468,14 +472,19 @@ def curves(levels: Rows, quoted: Masks, totals: Masks, behind: Behind = UNKNOWN)
 _AXES: Final = ("probability", "road")
 
 
-def _thresholds(levels: Rows) -> dict[str, Thresholds]:
-    """Return the thresholds of each variant that says how probable road is."""
+def _thresholds(levels: Rows) -> dict[str, tuple[Thresholds, Sums]]:
+    """Return the thresholds of each variant that says how probable road is.
+
+    With each comes the frame that is most wrong at each level, ``(256,)``.
+    """
     made = {}
     for variant, _, places in levels.masks():
         rows = levels.take(places)
         counts = np.zeros((2, LEVELS), np.int64)
         counts[:, rows["level"]] = rows["other"], rows["road"]
-        made[variant] = Thresholds.of(counts)
+        # A level that does not occur is the threshold that the next one is.
+        at = np.searchsorted(rows["level"], np.arange(LEVELS)).clip(max=len(rows) - 1)
+        made[variant] = Thresholds.of(counts), rows["worst_frame"][at]
     return made
 
 
@@ -490,10 +499,11 @@ def _below(values: Sequence[float]) -> float:
     return float(min(math.floor(min([*known, LEAST_AXIS]) / STEP) * STEP, LEAST_AXIS))
 
 
-def _curve(name: str, look: Look, x: Any, y: Any) -> Series:
+def _curve(name: str, look: Look, x: Floats, y: Floats, worst: Sums) -> Series:
     across, up = (100 * np.asarray(each, float) for each in (x, y))
     known = np.isfinite(across)
-    return Series(name, look, across[known].tolist(), up[known].tolist())
+    frames = [[frame] for frame in worst[known].tolist()]
+    return Series(name, look, across[known].tolist(), up[known].tolist(), frames=frames)
 
 
 def _mark(name: str, look: Look, x: float, y: float, frames: Sequence[int]) -> Series:

@@ -26,9 +26,9 @@ QUOTED = {
     "ECE": 0.07,
     "bins": BINS,
 }
-LEVELS = [("filtered", "post", 20, 2, 8), ("filtered", "post", 230, 4, 1)]
+LEVELS = [("filtered", "post", 20, 2, 8, 31), ("filtered", "post", 230, 4, 1, 17)]
 
-COLUMNS = ["variant", "stage", "level", "road", "other"]
+COLUMNS = ["variant", "stage", "level", "road", "other", "worst_frame"]
 
 
 def findings(**quoted):
@@ -69,15 +69,18 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
     assert [*reliability.series[0].points()] == [(10, 20), (90, 70)]
 
 
-def test_behind_a_mask_are_its_worst_frames_and_behind_a_curve_none():
+def test_behind_a_mask_are_its_worst_frames_and_behind_a_threshold_the_worst_one():
     found = replace(findings(), behind={("filtered", "post", "ERR"): [7, 3]})
     (figure,) = (block for block in opened(thresholds(found)) if isinstance(block, Figure))
     recall, roc, reliability = figure.charts
     for chart in (recall, roc):
         behind = {each.name: each.frames for each in chart.series}
         assert behind.pop("filtered: the mask") == [[7, 3]]
+        assert behind.pop("filtered") == [[17]] * (chart is roc) + [[17], [31]]
         assert not any(behind.values())
-    assert not any(each.frames for each in reliability.series)
+    # Of a share, that at the threshold of its probability: 0.1 and 0.9 are above the lower level.
+    bins, ideal = reliability.series
+    assert (bins.frames, ideal.frames) == ([[17], [17]], ())
 
 
 def test_the_axes_begin_and_end_where_the_masks_lie():
