@@ -163,6 +163,14 @@ def test_reports_show_all_cameras_and_each(rig: Path):
     assert "rig, /rear/camera/image" in (folder / "one.html").read_text()
 
 
+def test_a_report_lands_beside_others_by_the_recordings_name(rig: Path):
+    for place in ("recordings/rig.rrd", "reports/rig"):
+        for words in ((), ("--camera", "rear")):
+            assert here("report", place, *words, cwd=rig).returncode == 0
+    for name in ("rig", "rig-rear_camera_image", "rig/report", "rig/report-rear_camera_image"):
+        assert (rig / "reports" / f"{name}.pdf").exists()
+
+
 def test_the_worst_frames_name_their_camera(rig: Path):
     run = here("inspect", rig / "recordings/rig.rrd", "--list", "--json")
     frames = json.loads(run.stdout)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -88,8 +89,11 @@ def write_report(
     """
     opened = result if isinstance(result, Result) else Result(result)
     (source,) = opened.paths
-    usual = Path("reports", f"{source.stem}.pdf") if opened.recording else None
-    path = Path(output or usual or _beside(source))
+    own = opened.drive.camera if opened.drive else ""
+    camera = re.sub(r"[^A-Za-z0-9_-]+", "_", own.strip("/"))
+    camera = f"-{camera}" if camera else ""
+    usual = Path("reports", f"{source.stem}{camera}.pdf") if opened.recording else None
+    path = Path(output or usual or _beside(source, camera))
     with holding(path, inputs=[source]):
         if not is_page(path):
             return write_file(path, pdf(document(findings_of(opened, commands)), paper))
@@ -110,9 +114,9 @@ def findings_of(
     return collect(result.drive, commands)
 
 
-def _beside(folder: Path) -> Path:
+def _beside(folder: Path, camera: str) -> Path:
     """Return where the report of a folder lies; its other files may come from someone else."""
-    path = folder / "report.pdf"
+    path = folder / f"report{camera}.pdf"
     if leads_outside(path, folder):
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
     return path

@@ -345,7 +345,8 @@ class Result:
     @property
     def recording(self) -> Path | None:
         """The recording, where that was opened alone."""
-        return self.drive.path if self.drive and self.drive.recording else None
+        own = self.rig.cameras[0] if self.rig else self.drive
+        return own.path if own and own.recording else None
 
     @cached_property
     def variants(self) -> list[str]:
