@@ -50,6 +50,7 @@ from roadeval.data.result import (
     Transition,
     VariantLayout,
     VariantResult,
+    as_plain,
     is_plain,
 )
 
@@ -95,6 +96,7 @@ __all__ = [
     "TruthBits",
     "VariantLayout",
     "VariantResult",
+    "as_plain",
     "best_code",
     "everywhere",
     "histogram",

@@ -46,6 +46,15 @@ def is_plain(name: str) -> bool:
     return _PLAIN.fullmatch(name) is not None
 
 
+def as_plain(name: str) -> str:
+    """Return a name as letters, digits, ``-`` and ``_`` alone, for files, identities and paths.
+
+    >>> as_plain("/front/image raw")
+    'front_image_raw'
+    """
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")
+
+
 @dataclass(frozen=True, slots=True)
 class Counts:
     """Pixels by outcome; road is the positive class, ignored pixels are in none (section 5)."""

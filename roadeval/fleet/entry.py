@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
 from roadeval.config import DriveSettings
+from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.logs import METADATA, CameraSettings, files_of, natural
@@ -163,7 +164,7 @@ def identity(source: str, size: int = DIGEST) -> str:
     >>> identity("s3://bucket/monday, rain.mcap")
     'monday_rain-39c9a6a7'
     """
-    word = re.sub(r"[^A-Za-z0-9_-]+", "_", stem_of(source))[:LONGEST].strip("-_")
+    word = as_plain(stem_of(source))[:LONGEST].strip("-_")
     digest = blake2b(source.encode(errors="surrogateescape"), digest_size=size)
     return f"{word or 'drive'}-{digest.hexdigest()}"
 
@@ -203,10 +204,12 @@ def cameras_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
     found = []
     for entry in entries:
         if len(own := cameras[entry.source]) > 1:
-            short = short_names(own)[entry.camera] or "camera"
-            word = re.sub(r"[^A-Za-z0-9_-]+", "_", short).strip("_")
+            short = short_names(own)[entry.camera]
+            # Two topics may be the same word: the digest parts them.
+            digest = blake2b(entry.camera.encode(), digest_size=DIGEST).hexdigest()
+            drive = f"{entry.id}-{as_plain(short)[:LONGEST]}-{digest}"
             name = f"{entry.name} {visible(short)}"
-            entry = replace(entry, id=f"{entry.id}-{word}", name=name)  # noqa: PLW2901
+            entry = replace(entry, id=drive, name=name)  # noqa: PLW2901
         found.append(entry)
     return found
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Final
@@ -23,6 +23,7 @@ from roadeval.data import (
     LayerKind,
     LayerSpec,
     VariantLayout,
+    as_plain,
     is_plain,
 )
 from roadeval.data.colours import CLEAR, SHADOW, with_opacity
@@ -70,6 +71,15 @@ MOST_WAITING: Final = 128
 
 class RecordingError(RoadevalError):
     """A recording cannot be written or read."""
+
+
+class SeveralCamerasError(RecordingError):
+    """A recording of several cameras, none of which was named."""
+
+    def __init__(self, path: object, cameras: Sequence[str]) -> None:
+        names = ", ".join(cameras)
+        super().__init__(f"{path}: a recording of several cameras; name one of {names}")
+        self.cameras: Final = cameras
 
 
 class DamagedError(RecordingError):
@@ -170,8 +180,7 @@ def prefixes(cameras: Iterable[str]) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for name in cameras:
-        path = re.sub(r"[^A-Za-z0-9_/-]", "_", name.strip("/"))
-        path = re.sub("/+", "/", f"/{path}") if path else ""
+        path = "".join(f"/{as_plain(part)}" for part in name.split("/") if part)
         while path and path in found.values():
             path += "_"
         found[name] = path

@@ -354,7 +354,7 @@ class Recorder:
             self._worst.offer(encoded)
 
     def forecast(self, encoded: EncodedFrame, frames: int) -> str:
-        """Say how large the recording of so many frames becomes, by its first one with images.
+        """Return how large the recording of so many frames becomes, by its first with images.
 
         Empty for any further one, and where it is small and fits.
         """
@@ -553,7 +553,7 @@ class NullRecorder:
         """Encode nothing."""
 
     def forecast(self, _encoded: None, _frames: int) -> str:
-        """Say nothing."""
+        """Return nothing to say."""
         return ""
 
     def write(self, encoded: None) -> None:

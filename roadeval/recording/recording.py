@@ -17,7 +17,7 @@ import pyarrow as pa
 
 from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.recording import layout as at
-from roadeval.recording.layout import Layout, RecordingError
+from roadeval.recording.layout import Layout, RecordingError, SeveralCamerasError
 from roadeval.recording.rrd_file import RrdFile, Span, flat, whole
 from roadeval.results.facts import Facts, another_format
 from roadeval.results.tables import TableFacts, read_rows, read_table
@@ -30,11 +30,6 @@ if TYPE_CHECKING:
 
 
 _CAMERA: Final = "EncodedImage:blob"
-
-
-def cameras_of(path: Path) -> tuple[str, ...]:
-    """Return the names of a recording's cameras; none where it has only one."""
-    return tuple(_cameras(RrdFile(path)))
 
 
 def rig_facts(path: Path) -> Facts | None:
@@ -79,9 +74,7 @@ class Recording:
             form = int(self._file.static(at.PROPERTIES, "format") or 0)
         cameras = _cameras(self._file)
         if cameras and camera not in cameras:
-            raise RecordingError(
-                f"{self.path}: a recording of several cameras; name one of {', '.join(cameras)}"
-            )
+            raise SeveralCamerasError(self.path, [*cameras])
         self._file.below = cameras.get(camera, "")
         text = self._file.document(at.LAYOUT)
         if text is None:

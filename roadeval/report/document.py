@@ -32,8 +32,10 @@ def document(findings: Findings | FleetFindings) -> Document:
         return _of(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
     if findings.cameras:
         return _of(findings, *RIG, provenance.section)
-    scored = (*SCORED, frames.worst_frames) if findings.totals else (drive.masks,)
-    return _of(findings, *scored, provenance.section)
+    # The frames, which fill pages, come last: what is short finds room before them.
+    scored = SCORED if findings.totals else (drive.masks,)
+    gallery = (frames.worst_frames,) if findings.totals else ()
+    return _of(findings, *scored, provenance.section, *gallery)
 
 
 def page_document(findings: Findings | FleetFindings, browsed: FrameBrowser | None) -> Document:

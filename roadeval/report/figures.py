@@ -7,7 +7,6 @@ it only to draw.
 from __future__ import annotations
 
 import base64
-import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,6 +36,7 @@ from roadeval.data import (
     Rgb,
     Rows,
     Truth,
+    as_plain,
     colours,
 )
 from roadeval.evaluation import score
@@ -105,7 +105,7 @@ def write_figures(
     """
     folder.mkdir(parents=True, exist_ok=True)
     drive = f"{drive}, {camera}" if camera else drive
-    ending = f"-{re.sub(r'[^A-Za-z0-9_-]+', '_', camera).strip('_')}" if camera else ""
+    ending = f"-{as_plain(camera)}" if camera else ""
 
     def drawn() -> Iterator[tuple[str, bytes]]:
         with mpl.rc_context(RC):  # type: ignore[arg-type]

@@ -166,8 +166,16 @@ def test_a_log_may_be_named_once_for_each_of_its_cameras(folder):
     front, rear, other = find_drives(["rig.csv"])
     assert (front.camera, rear.camera, other.camera) == ("/front/image", "/rear/image", "")
     assert (front.name, rear.name, other.name) == ("a front", "a rear", "b")
-    assert front.id == f"{identity(front.source)}-front" != rear.id
+    assert front.id.startswith(f"{identity(front.source)}-front-")
+    assert is_plain(front.id)
+    assert front.id != rear.id
     assert find_drives(["rig.csv", "rig.csv"]) == [front, rear, other]
+
+
+def test_cameras_whose_names_look_alike_have_identities_of_their_own(folder):
+    put("a.mcap")
+    Path("rig.csv").write_text("path,topics.image\na.mcap,/cam 1\na.mcap,/cam_1\na.mcap,/\n")
+    assert len({entry.id for entry in find_drives(["rig.csv"])}) == 3
 
 
 def test_two_descriptions_of_one_drive_are_refused(folder):

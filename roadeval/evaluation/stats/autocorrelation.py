@@ -324,7 +324,7 @@ def within_drive(
 
 
 def at_moments(cameras: Sequence[CameraRates]) -> Series:
-    """Return a value a moment; their mean is that of the cameras' mean differences.
+    """Return a value a moment, ``(T,)``; their mean is that of the cameras' mean differences.
 
     It varies as that mean does: at moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)``
     over the frames i that were taken then, each by a camera c of C, which has n_c frames. The
@@ -342,7 +342,7 @@ def at_moments(cameras: Sequence[CameraRates]) -> Series:
 
 
 def _nearest(clock: npt.NDArray[np.int64], stamps: npt.NDArray[np.int64]) -> npt.NDArray[np.intp]:
-    """Return the place in ``clock`` that is nearest to each stamp."""
+    """Return the place in ``clock``, ``(T,)``, that is nearest to each of ``(n,)`` stamps."""
     order = np.argsort(clock, kind="stable")
     rising = clock[order]
     after = np.clip(np.searchsorted(rising, stamps), 1, max(len(clock) - 1, 1))

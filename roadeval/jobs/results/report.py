@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Rows
+from roadeval.data import Rows, as_plain
 from roadeval.data.result import Cells
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
@@ -90,8 +89,7 @@ def write_report(
     opened = result if isinstance(result, Result) else Result(result)
     (source,) = opened.paths
     own = opened.drive.camera if opened.drive else ""
-    camera = re.sub(r"[^A-Za-z0-9_-]+", "_", own.strip("/"))
-    camera = f"-{camera}" if camera else ""
+    camera = f"-{as_plain(own)}" if own else ""
     usual = Path("reports", f"{source.stem}{camera}.pdf") if opened.recording else None
     path = Path(output or usual or _beside(source, camera))
     with holding(path, inputs=[source]):

@@ -18,7 +18,7 @@ from roadeval.evaluation import score
 from roadeval.evaluation.comparison import Part
 from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.recording.layout import DamagedError, RecordingError
+from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
     SUMMARY,
     DriveFacts,
@@ -208,7 +208,7 @@ class DriveResult:
 class RigResult:
     """The result of a replay of several cameras, each of which is a `DriveResult`.
 
-    A `RoadevalError` as of one of these, or if the run did not reach its end.
+    A `RoadevalError` as of one of these.
     """
 
     def __init__(self, path: Path, cameras: Sequence[str]) -> None:
@@ -241,13 +241,12 @@ Opened = DriveResult | RigResult | FleetFolder
 def _open(path: Path, *, trust_sources: bool) -> Opened:
     if is_fleet(path):
         return FleetFolder(path, trust_sources=trust_sources)
-    if path.is_dir():
-        cameras: Sequence[str] = [*Facts.read(path / SUMMARY).cameras]
-    else:
-        from roadeval.recording import cameras_of
-
-        cameras = cameras_of(path)
-    return RigResult(path, cameras) if cameras else DriveResult(path)
+    try:
+        drive = DriveResult(path)
+    except SeveralCamerasError as error:
+        return RigResult(path, error.cameras)
+    cameras = drive.facts.cameras if drive.recording is None else ()
+    return RigResult(path, [*cameras]) if cameras else drive
 
 
 class Result:
@@ -298,7 +297,7 @@ class Result:
 
     @property
     def _drives(self) -> list[DriveResult | FleetFolder]:
-        """What was opened, a rig camera by camera."""
+        """The drives and fleets that were opened; of a rig each camera."""
         found: list[DriveResult | FleetFolder] = []
         for each in self._opened:
             found += each.cameras if isinstance(each, RigResult) else [each]

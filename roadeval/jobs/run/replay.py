@@ -209,7 +209,7 @@ def _finished(
     results: ResultsWriter,
     config: RunConfig,
 ) -> Facts:
-    """Give the recording what was found; return the facts, of several cameras together."""
+    """Finish the recording; return the facts, of several cameras those of all together."""
     if len(runs) == 1:
         recorder.finish(ended[0].texts)
         return ended[0].facts

@@ -121,7 +121,7 @@ def _differences(findings: Findings) -> Table:
                 Cell(points((change := pair.differences["ERR"]).mean), bold=True),
                 marked_interval(change),
                 *(points(pair.differences[rate].mean) for rate in others),
-                *_won(pair),
+                *(number(count or 0) for count in (change.better, change.worse)),
                 DASH if change.effective is None else f"{change.effective:.0f}",
             ]
             for pair in pairs
@@ -134,15 +134,6 @@ def _differences(findings: Findings) -> Table:
         groups=[("", 1), ("ERR", 4), ("", len(others)), ("frames", 3)],
         small=True,
     )
-
-
-def _won(pair: PairedComparison) -> Iterator[str]:
-    """Yield on how many frames it is better, and worse; of a rig as the difference counted them."""
-    if len(pair.frames):
-        yield from (number(int((sign * pair.frames["ERR"] > 0).sum())) for sign in (-1, 1))
-    else:
-        change = pair.differences["ERR"]
-        yield from (number(count or 0) for count in (change.better, change.worse))
 
 
 def _method(pairs: Sequence[PairedComparison]) -> str:
@@ -356,7 +347,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
 
 
 def _compensation(findings: Findings) -> Iterator[Text]:
-    """Say whether a filter that finds all shadow, and nothing else, would help."""
+    """Return whether a filter that finds all shadow, and nothing else, would help."""
     if not {FILTERED, UNFILTERED} <= findings.totals.keys():
         return
     without = findings.total(UNFILTERED)

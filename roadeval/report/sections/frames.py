@@ -198,7 +198,7 @@ class FrameBrowser(Block):
 
     @property
     def conditions(self) -> dict[str, int]:
-        """What a frame can be, in words, with a number for each."""
+        """Return the conditions that frames have, in words, each with a number."""
         words = dict.fromkeys(each for row in self.shown for each in row.conditions)
         return {each: place for place, each in enumerate(words)}
 
@@ -217,12 +217,12 @@ class FrameBrowser(Block):
 
     @property
     def command(self) -> str:
-        """What opens a frame in the viewer, with ``{}`` for its number; empty without one."""
+        """Return the command that opens a frame, with ``{}`` for its number; empty without one."""
         return self.inspect(0).replace(" --frame 0", " --frame {}") if self.inspect else ""
 
     @property
     def note(self) -> str:
-        """What to know of the table."""
+        """Return what the table is of and what it leaves out, in sentences."""
         told, of = [], number(len(self.rows))
         if (shown := len(self.shown)) < len(self.rows):
             told.append(
