@@ -12,6 +12,7 @@ import pytest
 
 import roadeval
 from roadeval.data import FrameResult
+from roadeval.evaluation.comparison import Kind
 from roadeval.logs import LogWriter, open_log
 from tests.e2e.commands import DEMO, here
 
@@ -133,6 +134,9 @@ def test_a_rig_is_compared_camera_by_camera_with_a_replay_of_one(rig: Path):
     assert all(change.unchanged for change in found.comparison.changes)
     rows = roadeval.Result(rig / "rear.rrd").frames
     assert found.comparison.changes[0].frames == rows["frame"].nunique()
+    (note,) = found.comparison.notes
+    assert (note.kind, note.count) == (Kind.ABSENT, 2)
+    assert not any("rear" in name for name in note.names)
 
 
 def test_results_have_a_row_for_each_camera(rig: Path):
@@ -140,7 +144,8 @@ def test_results_have_a_row_for_each_camera(rig: Path):
         result = roadeval.Result(rig / path)
         assert list(result.cameras) == [*NAMES]
         assert result.drives["camera"].tolist() == list(result.cameras)
-        assert set(result.frames["camera"]) == set(result.cameras)
+        rows = pd.read_csv(rig / "reports" / "rig" / "frames.csv")["camera"].value_counts()
+        assert result.frames["camera"].value_counts().to_dict() == rows.to_dict()
 
 
 def test_the_first_screen_lists_the_cameras(rig: Path):
