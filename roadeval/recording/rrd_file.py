@@ -54,6 +54,8 @@ _COMPRESSION, _SIZE, _CONTENT = 2, 3, 5
 _BYTES: Final = 2
 """The kind of a field with a length; all others are one number."""
 _LZ4: Final = 2
+_MOST_PACKED: Final = 255
+"""Bytes that LZ4 makes of one, at most: a message may claim any size."""
 _PROBE: Final = """
 import sys
 from rerun.chunk import RrdReader
@@ -242,7 +244,8 @@ def flat(lists: pa.ListArray) -> pa.Array:
 def unpacked(message: bytes) -> pa.RecordBatch:
     """Return the rows of a message of the file: Protocol Buffers, in which LZ4 packs Arrow's own.
 
-    Rerun itself goes through the whole entity for any row of it, or aborts at damage.
+    An error of any kind if it is damaged. Rerun itself goes through the whole entity for any row of
+    it, or aborts at damage.
     """
     import lz4.block
 
@@ -256,6 +259,8 @@ def unpacked(message: bytes) -> pa.RecordBatch:
             fields[tag >> 3], at = message[at : at + number], at + number
     content = fields[_CONTENT]
     if fields.get(_COMPRESSION) == _LZ4:
+        if fields[_SIZE] > _MOST_PACKED * len(content):
+            raise ValueError("a size that cannot be")
         content = lz4.block.decompress(content, uncompressed_size=fields[_SIZE])
     return pa.ipc.open_stream(content).read_next_batch()
 
@@ -330,11 +335,8 @@ def _places(store: LazyStoreInternal) -> dict[str, list[Place]]:
     names = [f"chunk_{name}" for name in names]
     names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in index.schema.names]
     places: dict[str, list[Place]] = {}
-    for (
-        path,
-        *place,
-    ) in zip(*(index.column(c).to_pylist() for c in names), strict=True):
-        offset, size, static, *frames = place
+    rows = zip(*(index.column(name).to_pylist() for name in names), strict=True)
+    for path, offset, size, static, *frames in rows:
         span = Span() if static or not frames else Span(*frames)
         places.setdefault(path, []).append(Place(offset, size, static, span))
     for own in places.values():

@@ -150,3 +150,10 @@ def test_a_name_that_is_not_utf8_is_refused(recording, tmp_path):
     path.write_bytes(recording.path.read_bytes())
     with pytest.raises(RecordingError, match="not UTF-8: rename it"):
         Recording(path)
+
+
+def test_a_message_that_claims_a_size_that_cannot_be_is_not_unpacked():
+    """Fields 2, 3 and 5 of Protocol Buffers: LZ4, a size of a TiB, and one byte of content."""
+    claimed = bytes((0x10, 2, 0x18, *(0x80,) * 5, 0x20, 0x2A, 1, 0))
+    with pytest.raises(ValueError, match="cannot be"):
+        rrd_file.unpacked(claimed)
