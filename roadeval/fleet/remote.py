@@ -80,6 +80,7 @@ _STATUSES: Final = {
     401: "the server asks who you are",
     403: "the server denies access",
     404: "there is no such file",
+    412: "it changed while it was read",
 }
 
 

@@ -1,5 +1,6 @@
 """Logs behind URLs, of which only parts are read."""
 
+import hashlib
 import re
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -24,12 +25,17 @@ class _Handler(BaseHTTPRequestHandler):
         self.do_GET()
 
     def do_GET(self) -> None:
+        status = 0
         content = (self.server.folder / Path(urlsplit(self.path).path).name).read_bytes()
-        asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        tag = f'"{hashlib.md5(content).hexdigest()}"'
+        if self.headers.get("If-Match", tag) != tag:
+            content, status = b"", 412
+        asked = not status and re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         begin, end = (int(asked[1]), int(asked[2]) + 1) if asked else (0, len(content))
         if self.command == "GET":
             self.server.sent += end - begin
-        self.send_response(206 if asked else 200)
+        self.send_response(status or (206 if asked else 200))
+        self.send_header("ETag", tag)
         self.send_header("Content-Length", str(end - begin))
         if asked:
             self.send_header("Content-Range", f"bytes {begin}-{end - 1}/{len(content)}")
@@ -89,6 +95,15 @@ def test_a_changed_byte_in_a_chunk_is_told_where_all_is_read(server, tmp_path):
     assert not one.losses
     assert "checksum is wrong" in other.losses[0]
     assert one.sha256 != other.sha256
+
+
+def test_a_log_that_changes_while_it_is_read_is_named(server, tmp_path, monkeypatch):
+    monkeypatch.setattr(remote, "_PART", 1 << 10)
+    path = write(tmp_path / "noise.mcap")
+    with open_log(readable(f"{server.url}/noise.mcap")) as log:
+        flipped(path, path.stat().st_size // 2, path)
+        with pytest.raises(FleetError, match=r"noise\.mcap: it changed while it was read"):
+            log.verify()
 
 
 def test_what_is_no_log_behind_a_url_is_named(server, tmp_path):
