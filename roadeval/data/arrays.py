@@ -54,6 +54,13 @@ Reach = npt.NDArray[np.int64]
 extends to either side in its own row and in each of the r rows above and below, never more in a row
 further away."""
 
+
+def sigmoid(values: Values) -> Values:
+    """Compute ``1 / (1 + exp(-x))`` of float32, in a form that cannot overflow."""
+    result: Values = np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * values)
+    return result
+
+
 TN: Final = 0
 TP: Final = 1
 FP: Final = 2

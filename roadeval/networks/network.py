@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask, Probability, Rgb
-from roadeval.data.arrays import Values
+from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import OnnxFile, load
 from roadeval.networks.settings import NetSettings
 from roadeval.runtime.text import visible
@@ -128,24 +128,18 @@ def road_probability(scores: Values, settings: NetSettings) -> Values:
     if settings.decide == "argmax":
         other = scores[~chosen].max(axis=0)
         if settings.activation != "none":
-            return _sigmoid(best - other)
+            return sigmoid(best - other)
         with np.errstate(invalid="ignore"):
             share: Values = best / (best + other)
         return np.where(best + other > 0, share, 0.0).astype(np.float32)
     if settings.activation == "sigmoid":
-        return _sigmoid(best)
+        return sigmoid(best)
     if settings.activation == "softmax":
         powers = np.exp(scores - scores.max(axis=0))
         share = powers[chosen].sum(axis=0) / powers.sum(axis=0)
     else:
         share = np.clip(scores[chosen].sum(axis=0), 0, 1)
     return share
-
-
-def _sigmoid(values: Values) -> Values:
-    """Compute ``1 / (1 + exp(-x))``, in a form that cannot overflow."""
-    result: Values = 0.5 + 0.5 * np.tanh(0.5 * values)
-    return result
 
 
 GREY: Final = 114

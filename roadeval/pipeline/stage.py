@@ -10,11 +10,10 @@ one is a filter without parameters to learn::
     class DarkerSettings:
         share: float = 0.5
 
-    def bind(settings: DarkerSettings, _parameters: None) -> Callable[[View], Output]:
-        def run(view: View) -> Output:
-            image = (view.image * settings.share).astype(np.uint8)
-            return Output((Layer(DARKER, image),), image=image)
-        return run
+    @per_view
+    def bind(settings: DarkerSettings, _learnt: None, view: View) -> Output:
+        image = (view.image * settings.share).astype(np.uint8)
+        return Output((Layer(DARKER, image),), image=image)
 
     STAGE = Stage("darker", "Half as bright", DarkerSettings, bind, (DARKER,), is_filter=True)
 
@@ -25,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial, wraps
 from typing import Any, Final, TypeVar, cast, dataclass_transform
 
 import cv2
@@ -48,7 +48,16 @@ from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
 from roadeval.runtime.discovery import Code
 
-__all__ = ["Opinion", "Output", "Stage", "TrainingSet", "View", "perfect_mask", "stage_settings"]
+__all__ = [
+    "Opinion",
+    "Output",
+    "Stage",
+    "TrainingSet",
+    "View",
+    "per_view",
+    "perfect_mask",
+    "stage_settings",
+]
 
 T = TypeVar("T")
 
@@ -212,6 +221,18 @@ class Stage:
     def reported(self) -> str:
         """Its name in tables, recordings and timing."""
         return self.mask or self.name
+
+
+def per_view(
+    run: Callable[[Any, Any, View], Output],
+) -> Callable[[Any, Any], Callable[[View], Output]]:
+    """Return the `Stage.bind` of a stage that prepares nothing: ``run(settings, learnt, view)``."""
+
+    @wraps(run)
+    def bind(settings: Any, learnt: Any) -> Callable[[View], Output]:
+        return partial(run, settings, learnt)
+
+    return bind
 
 
 def perfect_mask(_settings: Any, _parameters: Any) -> Callable[[View, Truth], Output]:

@@ -9,7 +9,6 @@ where the patch lies in the shade or on a dark vehicle.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Final, Literal
 
@@ -20,7 +19,7 @@ from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
-from roadeval.pipeline.stage import Output, Stage, View, stage_settings
+from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
 GAINS: Final = (0.25, 6.0)
@@ -76,16 +75,13 @@ def expose(image: Rgb, gain: npt.NDArray[np.float64], level: float) -> Rgb:
     return exposed
 
 
-def bind(settings: ExposureSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return the exposure as a pure function of what it sees."""
-
-    def run(view: View) -> Output:
-        gain = gains(view.image, settings)
-        image = expose(view.image, gain, settings.level)
-        facts = {f"{name}_gain": float(gain[c]) for c, name in enumerate(("red", "green", "blue"))}
-        return Output((Layer(EXPOSED, image),), image=image, facts=facts)
-
-    return run
+@per_view
+def bind(settings: ExposureSettings, _learnt: None, view: View) -> Output:
+    """Expose what is seen."""
+    gain = gains(view.image, settings)
+    image = expose(view.image, gain, settings.level)
+    facts = {f"{name}_gain": float(gain[c]) for c, name in enumerate(("red", "green", "blue"))}
+    return Output((Layer(EXPOSED, image),), image=image, facts=facts)
 
 
 STAGE: Final = Stage(

@@ -1,13 +1,14 @@
 """Features of a pixel of the ground, in groups: each is one idea of what tells road from the rest.
 
-A group is a function of the `Scene` and the names of what it returns, in `GROUPS`.
+A group is a function of the `Scene`, in `GROUPS`. It returns its features by name, each ``(h, w)``
+float32 or what NumPy spreads to that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
-from typing import Final, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, lru_cache, partial
+from typing import Final
 
 import cv2
 import numpy as np
@@ -17,9 +18,15 @@ from roadeval.data import Mask, Rgb
 from roadeval.data.arrays import Values
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond.scene import Scene, mean, slopes_of, steepness, tones_of
+from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import Opinion, TrainingSet
 
 Places = npt.NDArray[np.intp]
+Named = Mapping[str, Values]
+"""Features by name."""
+
+TONES: Final = ("light", "red_green", "blue_green")
+"""Names of the tones."""
 
 ANGLES: Final = (30, 45, 60)
 """Of the projections, in degrees from ``ln R - ln G`` towards ``ln B - ln G``."""
@@ -38,7 +45,7 @@ OFFSETS: Final = ((-14, 0), (14, 0), (28, 0), (-28, 0), (0, 20), (0, -20))
 _ACROSS, _DOWN = (max(abs(offset[way]) for offset in OFFSETS) for way in (0, 1))
 
 
-def colour(scene: Scene) -> Sequence[Values]:
+def colour(scene: Scene) -> Named:
     """Return red, green, blue, the tones, their projections, and the distances to the patch.
 
     A projection of the log-chromaticities on one direction keeps what a change between sunlight and
@@ -47,103 +54,120 @@ def colour(scene: Scene) -> Sequence[Values]:
     """
     _, red, blue = scene.tones
     _, own_red, own_blue = scene.middle
-    projected = [
-        (red - own_red) * np.float32(np.cos(angle)) + (blue - own_blue) * np.float32(np.sin(angle))
-        for angle in np.radians(ANGLES)
-    ]
-    channels = list(np.moveaxis(scene.image, 2, 0))
-    distances = scene.colour, scene.hue, mean(scene.colour, SMOOTH)
-    return [*channels, *scene.tones, *projected, *distances]
+    channels = np.moveaxis(scene.image.astype(np.float32), 2, 0)
+    found = dict(zip(("red", "green", "blue"), channels, strict=True))
+    found |= zip(TONES, scene.tones, strict=True)
+    for angle in ANGLES:
+        first, second = (np.float32(each(np.radians(angle))) for each in (np.cos, np.sin))
+        found[f"projection_{angle}"] = (red - own_red) * first + (blue - own_blue) * second
+    return {
+        **found,
+        "colour_distance": scene.colour,
+        "hue_distance": scene.hue,
+        "colour_distance_around": mean(scene.colour, SMOOTH),
+    }
 
 
-def light(scene: Scene) -> Sequence[Values]:
+def light(scene: Scene) -> Named:
     """Return log brightness less the lower half's, and the row's; and the row's median colour.
 
     A second exposure that does not trust the patch: where that lies in the shade of a lorry, the
     sunlit road is too bright for it, but not for the lower half of the image.
     """
     own = scene.tones[0]
-    row = own - own.mean(axis=1, keepdims=True)
-    return [*light_over(scene, *PERCENTILES), row, np.median(scene.colour, axis=1, keepdims=True)]
+    return {
+        **light_over(scene, *PERCENTILES),
+        "light_over_row": own - own.mean(axis=1, keepdims=True),
+        "colour_distance_of_row": np.median(scene.colour, axis=1, keepdims=True),
+    }
 
 
-def light_over(scene: Scene, *percentiles: float) -> Sequence[Values]:
+def light_over(scene: Scene, *percentiles: int) -> Named:
     """Return log brightness less each percentile of the lower half's, ``(h, w)`` float32."""
     light = scene.tones[0]
     levels = np.percentile(light[scene.shape[0] // 2 :], percentiles)
-    return [light - np.float32(level) for level in levels]
+    return {
+        f"light_over_{each}th_percentile": light - np.float32(level)
+        for each, level in zip(percentiles, levels, strict=True)
+    }
+
+
+def place(scene: Scene) -> Named:
+    """Return column (-1 to 1), its magnitude, and row (0 to 1) of each pixel's centre."""
+    return _coordinates(*scene.shape)
 
 
 @lru_cache(maxsize=8)
-def _coordinates(height: int, width: int) -> tuple[Values, Values, Values]:
-    """Return column (-1 to 1), its magnitude, and row (0 to 1) of each pixel's centre."""
+def _coordinates(height: int, width: int) -> Named:
     across = (np.arange(width, dtype=np.float32) + np.float32(0.5)) * np.float32(2 / width) - 1
     down = (np.arange(height, dtype=np.float32) + np.float32(0.5)) / np.float32(height)
-    return across[None], np.abs(across)[None], down[:, None]
+    return {"across": across[None], "from_middle": np.abs(across)[None], "down": down[:, None]}
 
 
-def texture(scene: Scene) -> Sequence[Values]:
+def texture(scene: Scene) -> Named:
     """Return the root of the mean absolute slope of the log brightness, and its deviation.
 
     In each window across and down: kerbs, wheels and house fronts have edges of one direction,
     leaves of both.
     """
-    slopes = [np.abs(slope) for slope in scene.slopes]
-    textures = [np.sqrt(mean(slope, side)) for side in TEXTURES for slope in slopes]
+    slopes = {"across": np.abs(scene.slopes[0]), "down": np.abs(scene.slopes[1])}
     own = scene.tones[0]
     variance = mean(own * own, DEVIATION) - np.square(mean(own, DEVIATION))
-    return [*textures, np.sqrt(np.maximum(variance, 0))]
+    return {
+        **{f"{w}_{side}": np.sqrt(mean(slopes[w], side)) for side in TEXTURES for w in slopes},
+        "deviation": np.sqrt(np.maximum(variance, 0)),
+    }
 
 
-def surroundings(scene: Scene) -> Sequence[Values]:
+def surroundings(scene: Scene) -> Named:
     """Return means of tones, and differences of means of light, blue-green and colour distance."""
-    means = [mean(tone, side) for side in WINDOWS for tone in scene.tones]
-    own, _, blue = means[:3]
-    compared = own, blue, mean(scene.colour, WINDOWS[0])
-    return [*means, *(change for plane in compared for change in _changes(plane))]
+    named = dict(zip(TONES, scene.tones, strict=True))
+    found = {f"{tone}_{side}": mean(named[tone], side) for side in WINDOWS for tone in TONES}
+    compared = {tone: found[f"{tone}_{WINDOWS[0]}"] for tone in ("light", "blue_green")}
+    compared["colour_distance"] = mean(scene.colour, WINDOWS[0])
+    height, width = scene.shape
+    for name, plane in compared.items():
+        wide = cv2.copyMakeBorder(plane, *(_DOWN,) * 2, *(_ACROSS,) * 2, cv2.BORDER_REPLICATE)
+        for across, down in OFFSETS:
+            there = wide[_DOWN + down :, _ACROSS + across :][:height, :width]
+            found[f"{name}_to_{across}_{down}"] = plane - there
+    return found
 
 
-def _changes(plane: Values) -> list[Values]:
-    """Return an ``(h, w)`` image less itself at each offset."""
-    height, width = plane.shape
-    border = _DOWN, _DOWN, _ACROSS, _ACROSS
-    wide = cv2.copyMakeBorder(plane, *border, cv2.BORDER_REPLICATE)
-    return [
-        plane - wide[_DOWN + down :, _ACROSS + across :][:height, :width]
-        for across, down in OFFSETS
-    ]
-
-
-def scans(scene: Scene) -> Sequence[Values]:
+def scans(scene: Scene) -> Named:
     """Return what `_column` finds below and above, and what is met from the middle outwards.
 
     In a row these are the root of the steepest slope across, and the furthest hue. Whoever drives
     up the column to the pixel meets no kerb and no shadow under a car as long as there is road.
     """
-    steep, far = _strips(np.abs(scene.slopes[0]), (3, 5)), mean(scene.hue, 3)
-    columns = [plane for upwards in (True, False) for plane in _column(scene, upwards)]
-    return [*columns, outwards(np.sqrt(steep)), outwards(far)]
+    steep = cv2.blur(np.abs(scene.slopes[0]), (3, 5))
+    columns = {
+        f"{name}_{way}": plane
+        for way, step in (("below", -1), ("above", 1))
+        for name, plane in _column(scene, step).items()
+    }
+    inside = {"edge_inside": np.sqrt(steep), "hue_inside": mean(scene.hue, 3)}
+    return columns | {name: outwards(plane) for name, plane in inside.items()}
 
 
-def _column(scene: Scene, upwards: bool) -> list[Values]:
-    """Return what is met along each column until a pixel is reached, from below or from above.
+def _column(scene: Scene, step: int) -> Named:
+    """Return what is met along each column until a pixel is reached, from below (-1) or above (1).
 
     The root of the steepest slope down, the least and the greatest log brightness, the mean
     distance of colours to the patch, the greatest of hues, and the sum of edges.
     """
-    step = -1 if upwards else 1
     light, colour = mean(scene.tones[0], 5)[::step], mean(scene.colour, 3)[::step]
-    steep = np.sqrt(_strips(np.abs(scene.slopes[1]), (5, 3)))[::step]
+    steep = np.sqrt(cv2.blur(np.abs(scene.slopes[1]), (5, 3)))[::step]
     count = np.arange(1, len(light) + 1, dtype=np.float32)[:, None]
-    met = [
-        np.maximum.accumulate(steep),
-        np.minimum.accumulate(light),
-        np.maximum.accumulate(light),
-        np.add.accumulate(colour) / count,
-        np.maximum.accumulate(mean(scene.hue, 3)[::step]),
-        np.add.accumulate(_strips(scene.edge, (5, 3))[::step]),
-    ]
-    return [plane[::step] for plane in met]
+    met = {
+        "edge": np.maximum.accumulate(steep),
+        "darkest": np.minimum.accumulate(light),
+        "brightest": np.maximum.accumulate(light),
+        "mean_colour": np.add.accumulate(colour) / count,
+        "furthest_hue": np.maximum.accumulate(mean(scene.hue, 3)[::step]),
+        "sum_of_edges": np.add.accumulate(cv2.blur(scene.edge, (5, 3))[::step]),
+    }
+    return {name: plane[::step] for name, plane in met.items()}
 
 
 def outwards(plane: Values) -> Values:
@@ -154,11 +178,6 @@ def outwards(plane: Values) -> Values:
     left = np.s_[:, half - 1 :: -1] if half else np.s_[:, :0]
     found[left] = np.maximum.accumulate(plane[left], axis=1)
     return found
-
-
-def _strips(plane: Values, size: tuple[int, int]) -> Values:
-    averaged: Values = cv2.blur(plane, size)
-    return averaged
 
 
 ROUNDS: Final = 3
@@ -173,7 +192,7 @@ GREATEST: Final = 6.5
 """Cost of a step over the hardest, which fits in 16 bit."""
 
 
-def paths(scene: Scene) -> Sequence[Values]:
+def paths(scene: Scene) -> Named:
     """Return the geodesic distances over edges, over edges and hues, and over colours.
 
     A kerb, a line of parked cars or a change of colour is crossed by every path from the ground in
@@ -186,7 +205,8 @@ def paths(scene: Scene) -> Sequence[Values]:
     hue: Values = np.float32(1 / 20) * np.minimum(scene.hue, np.float32(10))
     far: Values = np.float32(0.03) * np.minimum(scene.colour, np.float32(15))
     edge: Values = np.float32(1 / 2) * scene.edge
-    return [distance(cost, scene.patch) for cost in (scene.edge, edge + hue, far)]
+    costs = {"over_edges": scene.edge, "over_edges_and_hues": edge + hue, "over_colours": far}
+    return {name: distance(cost, scene.patch) for name, cost in costs.items()}
 
 
 def distance(cost: Values, patch: Mask) -> Values:
@@ -215,22 +235,25 @@ SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}
 faint before they cross anything steep: around the end of a kerb, not over it."""
 
 
-def barriers(scene: Scene) -> Sequence[Values]:
+def barriers(scene: Scene) -> Named:
     """Return each barrier at a pixel, on its path from the patch, and from the middle outwards.
 
     Kerbs, seams, yellow and dark lines; the greatest of each four pixels is kept, so that a line of
     one pixel is not averaged away. The distances over the squares of `SQUARED` come last. Each is
     ``(h, w)`` float32; distances are those of `distance`, in pixels.
     """
-    found = [greatest_of_four(plane) for plane in barriers_of(tones_of(scene.fine))]
-    named = dict(zip(WEIGHTS, found, strict=True))
-    costs = [
-        *(named[name] * np.float32(weight) for name, weight in WEIGHTS.items()),
-        *(np.square(named[name]) * np.float32(weight) for name, weight in SQUARED.items()),
-    ]
-    over = [distance(cost, scene.patch) for cost in costs]
-    direct, around = over[: len(found)], over[len(found) :]
-    return [*found, *direct, *(outwards(plane) for plane in found), *around]
+    fine = zip(WEIGHTS, barriers_of(tones_of(scene.fine)), strict=True)
+    found = {name: greatest_of_four(plane) for name, plane in fine}
+    far = partial(distance, patch=scene.patch)
+    return {
+        **found,
+        **{f"over_{name}": far(found[name] * np.float32(w)) for name, w in WEIGHTS.items()},
+        **{f"{name}_inside": outwards(plane) for name, plane in found.items()},
+        **{
+            f"around_{name}": far(np.square(found[name]) * np.float32(w))
+            for name, w in SQUARED.items()
+        },
+    }
 
 
 def barriers_of(tones: tuple[Values, Values, Values]) -> list[Values]:
@@ -259,79 +282,26 @@ def greatest_of_four(plane: Values) -> Values:
     return np.maximum(rows[:, ::2], rows[:, 1::2])
 
 
-class Group(NamedTuple):
-    """Features that are computed together."""
-
-    names: tuple[str, ...]
-    compute: Callable[[Scene], Sequence[Values]]
-    """Returns each of them, ``(h, w)`` float32 or what NumPy spreads to that."""
-
-
-_TONES: Final = ("light", "red_green", "blue_green")
-_MET: Final = ("edge", "darkest", "brightest", "mean_colour", "furthest_hue", "sum_of_edges")
-GROUPS: Final = {
-    "barriers": Group(
-        (
-            *WEIGHTS,
-            *(f"over_{name}" for name in WEIGHTS),
-            *(f"{name}_inside" for name in WEIGHTS),
-            *(f"around_{name}" for name in SQUARED),
-        ),
-        barriers,
-    ),
-    "colour": Group(
-        (
-            *("red", "green", "blue", *_TONES),
-            *(f"projection_{angle}" for angle in ANGLES),
-            *("colour_distance", "hue_distance", "colour_distance_around"),
-        ),
-        colour,
-    ),
-    "light": Group(
-        (
-            *(f"light_over_{each}th_percentile" for each in PERCENTILES),
-            *("light_over_row", "colour_distance_of_row"),
-        ),
-        light,
-    ),
-    "paths": Group(("over_edges", "over_edges_and_hues", "over_colours"), paths),
-    "place": Group(("across", "from_middle", "down"), lambda scene: _coordinates(*scene.shape)),
-    "scans": Group(
-        (
-            *(f"{met}_{way}" for way in ("below", "above") for met in _MET),
-            *("edge_inside", "hue_inside"),
-        ),
-        scans,
-    ),
-    "surroundings": Group(
-        (
-            *(f"{tone}_{side}" for side in WINDOWS for tone in _TONES),
-            *(
-                f"{plane}_to_{x}_{y}"
-                for plane in ("light", "blue_green", "colour_distance")
-                for x, y in OFFSETS
-            ),
-        ),
-        surroundings,
-    ),
-    "texture": Group(
-        (*(f"{way}_{side}" for side in TEXTURES for way in ("across", "down")), "deviation"),
-        texture,
-    ),
+GROUPS: Final[Mapping[str, Callable[[Scene], Named]]] = {
+    each.__name__: each
+    for each in (barriers, colour, light, paths, place, scans, surroundings, texture)
 }
 
 
-def names_of(groups: Iterable[str]) -> tuple[str, ...]:
+@cache
+def names_of(groups: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of the features of some groups, with the group's before them."""
-    return tuple(f"{name}.{each}" for name in groups for each in GROUPS[name].names)
+    grey = np.full((24, 32, 3), 128, np.uint8)
+    scene = Scene.of(grey, cv2.resize(grey, (64, 48)), ReferencePatch())
+    return tuple(f"{group}.{name}" for group in groups for name in GROUPS[group](scene))
 
 
-def features(scene: Scene, groups: Sequence[str]) -> Values:
+def features(scene: Scene, groups: tuple[str, ...]) -> Values:
     """Compute the features of some groups, ``(F, h, w)`` float32 in the order of `names_of`."""
     found: Values = np.empty((len(names_of(groups)), *scene.shape), np.float32)
-    planes = (plane for name in groups for plane in GROUPS[name].compute(scene))
-    for place, plane in zip(found, planes, strict=True):
-        place[...] = plane
+    planes = (plane for name in groups for plane in GROUPS[name](scene).values())
+    for place_, plane in zip(found, planes, strict=True):
+        place_[...] = plane
     return found
 
 
@@ -420,18 +390,15 @@ def reach(scene: Scene) -> Values:
     the same value, whatever the camera. Hue does not count: a verge as bright as the road is
     reached.
     """
-    return combined(*_distances(scene))
+    return combined(*reach_inputs(scene)[:2])
 
 
 def reach_inputs(scene: Scene) -> Sequence[Values]:
     """Compute the planes of `REACH`, ``(h, w)`` float32 each."""
-    return *_distances(scene), *light_over(scene, SUNLIT)
-
-
-def _distances(scene: Scene) -> tuple[Values, Values]:
     edge, *_ = barriers_of(tones_of(scene.fine))
     steep = np.square(greatest_of_four(edge)) * np.float32(SQUARED["edge"])
-    return distance(scene.edge, scene.patch), distance(steep, scene.patch)
+    over = (distance(cost, scene.patch) for cost in (scene.edge, steep))
+    return *over, *light_over(scene, SUNLIT).values()
 
 
 def combined(over: Values, around: Values) -> Values:

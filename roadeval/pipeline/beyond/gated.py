@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Packed, Rgb, Truth, colours
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Packed, Rgb, Truth, colours
 from roadeval.data.arrays import Floats, Values
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
@@ -45,6 +45,7 @@ from roadeval.pipeline.stage import (
     View,
     check_arrays,
     check_range,
+    per_view,
     stage_settings,
 )
 
@@ -94,6 +95,13 @@ SHADED: Final = LayerSpec(
     exact=False,
 )
 SHADOW: Final = _mask("shadow", "More likely road in the shade than not", "shadow")
+GAIN: Final = LayerSpec(
+    "gain",
+    LayerKind.SCALAR,
+    "Greatest gain of a channel",
+    value_range=(1.0, GREATEST_GAIN),
+    exact=False,
+)
 COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
 
 
@@ -187,7 +195,7 @@ def features_of(seen: Look) -> Values:
             np.maximum.accumulate(met[0][::-1])[::-1],
             np.minimum.accumulate(met[1][::-1])[::-1],
             *(np.sqrt(mean(slope, side)) for side in WINDOWS for slope in slopes),
-            *(np.log(far + np.float32(STEPS)) for far in paths(scene)),
+            *(np.log(far + np.float32(STEPS)) for far in paths(scene).values()),
             seen.place,
         ]
     )
@@ -368,34 +376,38 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
     return bright
 
 
-def bind(settings: GatedSettings, model: ShadedRoad) -> Callable[[View], Output]:
-    """Return the filter as a pure function of what it sees."""
-
-    def run(view: View) -> Output:
-        seen = look(reduced(view.image, settings.width), model.place, settings)
-        shaded = shade_of(seen, model, settings)
-        gain = gains(seen, shaded, settings)
-        image = brighten(view.image, gain) if (shaded > 0).any() else view.image
-        masks = {name: enlarged(m, view.image.shape) for name, m in _masks(seen, shaded).items()}
-        greatest = np.maximum.reduce(cv2.split(gain))
-        arrays: dict[str, Mask | Values] = {
-            **masks,
-            "shaded": stretched(shaded, view.image.shape),
-            "gain": stretched(greatest, view.image.shape),
-            "compensated": image,
-        }
-        return Output(
-            layers=tuple(Layer(spec, arrays[spec.name]) for spec in layers(settings)),
-            image=image,
-            regions={name: Packed.of(masks[name]) for name in ("shadow", "shadow_edge", "lit")},
-            facts={
-                "shadow_share": float(masks["shadow"].mean()),
-                "max_gain": float(greatest.max()),
-                "sunlit_level": seen.level / 3,
-            },
-        )
-
-    return run
+@per_view
+def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
+    """Filter what is seen."""
+    shape = view.image.shape
+    seen = look(reduced(view.image, settings.width), model.place, settings)
+    shaded = shade_of(seen, model, settings)
+    gain = gains(seen, shaded, settings)
+    image = brighten(view.image, gain) if (shaded > 0).any() else view.image
+    greatest = np.maximum.reduce(cv2.split(gain))
+    small = (shaded > 0.5).view(np.uint8)
+    edge = cv2.dilate(small, np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) - small
+    candidates, shadow, shadow_edge, lit = (
+        enlarged(mask, shape)
+        for mask in (seen.candidates.view(np.uint8), small, edge, 1 - (small | edge))
+    )
+    regions = {"shadow": shadow, "shadow_edge": shadow_edge, "lit": lit}
+    return Output(
+        layers=(
+            Layer(CANDIDATES, candidates),
+            Layer(SHADED, stretched(shaded, shape)),
+            Layer(SHADOW, shadow),
+            Layer(GAIN, stretched(greatest, shape)),
+            Layer(COMPENSATED, image),
+        ),
+        image=image,
+        regions={name: Packed.of(mask) for name, mask in regions.items()},
+        facts={
+            "shadow_share": float(shadow.mean()),
+            "max_gain": float(greatest.max()),
+            "sunlit_level": seen.level / 3,
+        },
+    )
 
 
 def oracle(settings: GatedSettings, model: ShadedRoad) -> Callable[[View, Truth], Output]:
@@ -412,36 +424,12 @@ def oracle(settings: GatedSettings, model: ShadedRoad) -> Callable[[View, Truth]
     return run
 
 
-def _masks(seen: Look, shaded: Values) -> dict[str, Mask]:
-    """Return masks and regions at the size of the working image, by name."""
-    shadow = (shaded > 0.5).view(np.uint8)
-    edge = cv2.dilate(shadow, np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) - shadow
-    return {
-        "candidates": seen.candidates.view(np.uint8),
-        "shadow": shadow,
-        "shadow_edge": edge,
-        "lit": 1 - (shadow | edge),
-    }
-
-
-def layers(_settings: GatedSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers of the filter, in the order of its steps."""
-    gain = LayerSpec(
-        "gain",
-        LayerKind.SCALAR,
-        "Greatest gain of a channel",
-        value_range=(1.0, GREATEST_GAIN),
-        exact=False,
-    )
-    return CANDIDATES, SHADED, SHADOW, gain, COMPENSATED
-
-
 STAGE: Final = Stage(
     name="gated",
     title="Phase 2: gated shadow filter",
     settings=GatedSettings,
     bind=bind,
-    layers=layers,
+    layers=(CANDIDATES, SHADED, SHADOW, GAIN, COMPENSATED),
     fit=fit,
     parameters=ShadedRoad,
     is_filter=True,

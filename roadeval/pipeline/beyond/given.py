@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 from roadeval.data import Layer, mask_spec
-from roadeval.pipeline.stage import AbsentError, Output, Stage, View, stage_settings
+from roadeval.pipeline.stage import AbsentError, Output, Stage, View, per_view, stage_settings
 
 GIVEN: Final = mask_spec("given", "Road by another method")
 
@@ -19,17 +18,14 @@ class GivenSettings:
     """The variant whose masks they are, one of ``[masks]`` or ``topics.masks``."""
 
 
-def bind(settings: GivenSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return the masks as a function of what is seen; an `AbsentError` for a frame without."""
-
-    def run(view: View) -> Output:
-        if (found := view.given.get(settings.name)) is None:
-            which = f"frame {view.moment.number}" if view.moment else "the image"
-            raise AbsentError(f"given: {which} has no mask of {settings.name}")
-        own = (Layer(GIVEN, found.mask),)
-        return Output(own, mask=found.mask, probability=found.probability)
-
-    return run
+@per_view
+def bind(settings: GivenSettings, _learnt: None, view: View) -> Output:
+    """Return the mask of what is seen; an `AbsentError` for a frame without."""
+    if (found := view.given.get(settings.name)) is None:
+        which = f"frame {view.moment.number}" if view.moment else "the image"
+        raise AbsentError(f"given: {which} has no mask of {settings.name}")
+    own = (Layer(GIVEN, found.mask),)
+    return Output(own, mask=found.mask, probability=found.probability)
 
 
 STAGE: Final = Stage(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,6 +16,7 @@ from roadeval.pipeline.stage import (
     TrainingSet,
     View,
     check_range,
+    per_view,
     stage_settings,
 )
 
@@ -53,15 +53,12 @@ def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
     return Threshold(best_code(np.sum(counts, axis=0)))
 
 
-def bind(_settings: ThresholdSettings, learnt: Threshold) -> Callable[[View], Output]:
-    """Return the threshold as a function of what the stage before says."""
-
-    def run(view: View) -> Output:
-        road = Packed.of(codes_of(view.opinion) > learnt.code)
-        facts = {"threshold": learnt.code / (CODES - 1)}
-        return Output((Layer(THRESHOLD, road),), mask=road, facts=facts)
-
-    return run
+@per_view
+def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
+    """Return where road is more probable than that by the stage before."""
+    road = Packed.of(codes_of(view.opinion) > learnt.code)
+    facts = {"threshold": learnt.code / (CODES - 1)}
+    return Output((Layer(THRESHOLD, road),), mask=road, facts=facts)
 
 
 STAGE: Final = Stage(

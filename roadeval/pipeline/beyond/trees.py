@@ -26,7 +26,7 @@ import numpy.typing as npt
 from pydantic import Field, field_validator
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, mask_spec
-from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values
+from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values, sigmoid
 from roadeval.kernels import KERNELS
 from roadeval.kernels.plain import LEAVES
 from roadeval.pipeline.beyond.features import (
@@ -412,12 +412,6 @@ def log_odds(planes: Values, learnt: Blend, settings: TreesSettings) -> Values:
     return learnt.log_odds(values, network_weight(values, settings)).reshape(planes.shape[1:])
 
 
-def probability(odds: Values) -> Values:
-    """Compute ``1 / (1 + exp(-x))``, in a form that cannot overflow."""
-    result: Values = np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * odds)
-    return result
-
-
 def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(learnt, settings)
@@ -440,7 +434,7 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
         if weight is None:
             weight = OWN_CAMERA if learnt.knows(view.original) else OTHERS
         odds = learnt_odds - np.float32(weight) * beyond(far, light)
-        share = np.clip(guided(probability(odds), scene.image, view.image), 0, 1)
+        share = np.clip(guided(sigmoid(odds), scene.image, view.image), 0, 1)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
         shown = (

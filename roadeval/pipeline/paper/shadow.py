@@ -29,7 +29,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Floats, Labels, Runs
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.stage import Output, Stage, View, stage_settings
+from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
 Codes = npt.NDArray[np.uint8]
 
@@ -400,30 +400,27 @@ def _saturation_value(rgb: npt.NDArray[np.uint8]) -> Floats:
     return np.stack([saturation(rgb), value(rgb)], axis=-1)
 
 
-def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return the filter as a pure function of what it sees."""
+@per_view
+def bind(settings: ShadowSettings, _learnt: None, view: View) -> Output:
+    """Filter what is seen."""
     threshold_of = otsu_threshold if settings.threshold == "otsu" else printed_threshold
-
-    def run(view: View) -> Output:
-        codes, histogram = KERNELS.look_up_sum_min(view.planes, NDI_CODES)
-        threshold = threshold_of(histogram)
-        mask = shadow_mask(codes, threshold, inclusive=settings.inclusive)
-        shadow = Packed.of(mask)
-        image, ring, count, change = lift(view, shadow, settings)
-        lit = everywhere(shadow.shape) & ~(shadow.bits | ring.bits)
-        return Output(
-            layers=(
-                Layer(NDI, codes),
-                Layer(SHADOW, shadow),
-                Layer(RINGS, mask + 2 * ring.pixels()),
-                Layer(COMPENSATED, image),
-            ),
-            image=image,
-            regions={"shadow": shadow, "shadow_edge": ring, "lit": Packed(lit, shadow.width)},
-            facts=_facts(threshold, shadow, count, change),
-        )
-
-    return run
+    codes, histogram = KERNELS.look_up_sum_min(view.planes, NDI_CODES)
+    threshold = threshold_of(histogram)
+    mask = shadow_mask(codes, threshold, inclusive=settings.inclusive)
+    shadow = Packed.of(mask)
+    image, ring, count, change = lift(view, shadow, settings)
+    lit = everywhere(shadow.shape) & ~(shadow.bits | ring.bits)
+    return Output(
+        layers=(
+            Layer(NDI, codes),
+            Layer(SHADOW, shadow),
+            Layer(RINGS, mask + 2 * ring.pixels()),
+            Layer(COMPENSATED, image),
+        ),
+        image=image,
+        regions={"shadow": shadow, "shadow_edge": ring, "lit": Packed(lit, shadow.width)},
+        facts=_facts(threshold, shadow, count, change),
+    )
 
 
 def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth], Output]:

@@ -23,6 +23,7 @@ from roadeval.pipeline.beyond.scene import from_patch, scene_of, steepness, tone
 from roadeval.pipeline.reference_patch import ReferencePatch
 
 PATCH = ReferencePatch()
+ALL = tuple(GROUPS)
 WIDTH, HEIGHT = 64, 48
 INNER = np.s_[24:-24, 30:-30]
 """Clear of the borders, where libraries differ."""
@@ -37,6 +38,10 @@ def picture(width=2 * WIDTH, height=2 * HEIGHT, seed=0):
 @pytest.fixture(scope="module")
 def scene():
     return scene_of(picture(), WIDTH, PATCH)
+
+
+def planes(group, scene):
+    return [*GROUPS[group](scene).values()]
 
 
 def close(found, expected, tolerance=1e-4):
@@ -92,11 +97,11 @@ def test_a_narrow_image_is_enlarged():
 
 def test_every_group_gives_the_features_that_it_names(scene):
     for name, group in GROUPS.items():
-        assert len(group.compute(scene)) == len(group.names), name
-    found = features(scene, tuple(GROUPS))
-    assert found.shape == (len(names_of(GROUPS)), HEIGHT, WIDTH)
+        assert names_of((name,)) == tuple(f"{name}.{each}" for each in group(scene))
+    found = features(scene, ALL)
+    assert found.shape == (len(names_of(ALL)), HEIGHT, WIDTH)
     assert np.isfinite(found).all()
-    assert len(set(names_of(GROUPS))) == len(found)
+    assert len(set(names_of(ALL))) == len(found)
 
 
 def test_features_come_in_the_order_that_is_asked_for(scene):
@@ -108,14 +113,14 @@ def test_features_come_in_the_order_that_is_asked_for(scene):
 def test_an_image_of_one_colour_has_no_feature_that_is_not_finite():
     for grey in (0, 255):
         flat = np.full((24, 32, 3), grey, np.uint8)
-        assert np.isfinite(features(scene_of(flat, 32, PATCH), tuple(GROUPS))).all()
+        assert np.isfinite(features(scene_of(flat, 32, PATCH), ALL)).all()
 
 
 def test_colour_is_projected_relative_to_the_patch(scene):
-    *channels, _, red, blue = GROUPS["colour"].compute(scene)[:6]
+    *channels, _, red, blue = planes("colour", scene)[:6]
     np.testing.assert_array_equal(np.stack(channels, axis=2), scene.image)
     inside = scene.patch > 0
-    for angle, found in zip((30, 45, 60), GROUPS["colour"].compute(scene)[6:9], strict=True):
+    for angle, found in zip((30, 45, 60), planes("colour", scene)[6:9], strict=True):
         way = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         own = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
         close(found, way[0] * red + way[1] * blue - own)
@@ -123,7 +128,7 @@ def test_colour_is_projected_relative_to_the_patch(scene):
 
 def test_light_is_held_against_the_lower_half_and_the_row(scene):
     own = scene.tones[0].astype(float)
-    half, bright, row, far = GROUPS["light"].compute(scene)
+    half, bright, row, far = planes("light", scene)
     lower = np.sort(own[HEIGHT // 2 :].ravel())
     close(own - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
     assert np.mean(own[HEIGHT // 2 :] < (own - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
@@ -132,14 +137,14 @@ def test_light_is_held_against_the_lower_half_and_the_row(scene):
 
 
 def test_place_is_the_pixels_centre(scene):
-    across, outer, down = GROUPS["place"].compute(scene)
+    across, outer, down = planes("place", scene)
     close(across[0, [0, 31, 32, 63]], [-63 / 64, -1 / 64, 1 / 64, 63 / 64])
     np.testing.assert_array_equal(outer, np.abs(across))
     close(down[[0, 47], 0], [0.5 / 48, 47.5 / 48])
 
 
 def test_texture_is_the_root_of_the_mean_slope(scene):
-    found = GROUPS["texture"].compute(scene)
+    found = planes("texture", scene)
     for place_, (side, way) in enumerate((side, way) for side in (3, 9, 21) for way in (0, 1)):
         mean = averaged(np.abs(slopes(scene.tones[0])[way]), side)
         close(found[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
@@ -148,7 +153,7 @@ def test_texture_is_the_root_of_the_mean_slope(scene):
 
 
 def test_surroundings_are_means_and_their_changes(scene):
-    found = GROUPS["surroundings"].compute(scene)
+    found = planes("surroundings", scene)
     for place_, (side, tone) in enumerate((s, t) for s in (7, 19, 41) for t in scene.tones):
         close(found[place_][INNER], averaged(tone, side)[INNER], 1e-3)
     mean = found[0]
@@ -158,7 +163,7 @@ def test_surroundings_are_means_and_their_changes(scene):
 
 
 def test_a_column_is_walked_from_below_and_from_above(scene):
-    found = GROUPS["scans"].compute(scene)
+    found = planes("scans", scene)
     steep = np.sqrt(averaged(np.abs(slopes(scene.tones[0])[1]), 3, 5))
     bright, colours = averaged(scene.tones[0], 5), averaged(scene.colour, 3)
     hue, edge = averaged(scene.hue, 3), averaged(np.hypot(*slopes(scene.tones[0])), 3, 5)
@@ -189,7 +194,7 @@ def test_paths_are_the_integrals_of_their_costs_along_the_cheapest_path(scene):
     edge = np.hypot(*slopes(scene.tones[0]))
     hue, distance = np.minimum(scene.hue, 10), np.minimum(scene.colour, 15)
     costs = edge, edge / 2 + hue / 20, 0.03 * distance
-    for cost, found in zip(costs, GROUPS["paths"].compute(scene), strict=True):
+    for cost, found in zip(costs, planes("paths", scene), strict=True):
         expected, _ = MCP_Geometric(0.005 + cost).find_costs(np.argwhere(scene.patch))
         # A step aslant is 1 % shorter than the root of 2, and a cost is rounded to 1e-4.
         close(found, expected, 0.02)
@@ -204,16 +209,14 @@ def street(kerb=74, height=48, width=96):
 
 @pytest.mark.parametrize("kind", range(3))
 def test_a_kerb_is_a_step_for_whatever_lies_beyond_it(kind):
-    found = GROUPS["paths"].compute(scene_of(street(), 96, PATCH))[kind]
+    found = planes("paths", scene_of(street(), 96, PATCH))[kind]
     assert found[:, 78:].min() > 1.5 * found[:, :72].max()
 
 
 def test_a_kerb_that_ends_is_walked_around():
     ends = street()
     ends[:28, 74:76] = 98
-    around, behind = (
-        GROUPS["paths"].compute(scene_of(s, 96, PATCH))[0][30, 84] for s in (ends, street())
-    )
+    around, behind = (planes("paths", scene_of(s, 96, PATCH))[0][30, 84] for s in (ends, street()))
     assert around < 0.75 * behind
 
 
@@ -229,7 +232,7 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
         np.maximum(averaged(yellow, 3) - averaged(yellow, 15), 0),
         np.maximum(averaged(tones[0], 15) - averaged(tones[0], 3), 0),
     ]
-    found = GROUPS["barriers"].compute(scene)
+    found = planes("barriers", scene)
     for mine, plane in zip(found, expected, strict=False):
         close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
     for mine, plane in zip(found[10:15], found[:5], strict=True):
@@ -237,7 +240,7 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
 
 
 def test_squared_barriers_are_costs_of_a_path(scene):
-    edge, relative, *_, around, relative_around = GROUPS["barriers"].compute(scene)
+    edge, relative, *_, around, relative_around = planes("barriers", scene)
     for cost, found in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
         expected, _ = MCP_Geometric(0.005 + np.minimum(cost, 6.5)).find_costs(
             np.argwhere(scene.patch)
@@ -248,19 +251,19 @@ def test_squared_barriers_are_costs_of_a_path(scene):
 def test_a_path_of_squares_would_rather_go_around_a_kerb():
     ends = street()
     ends[:20, 74:76] = 98
-    names, behind = GROUPS["barriers"].names, {}
+    names, behind = names_of(("barriers",)), {}
     for kind, image in (("ends", ends), ("whole", street())):
         large = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-        found = GROUPS["barriers"].compute(scene_of(large, 96, PATCH))
+        found = planes("barriers", scene_of(large, 96, PATCH))
         for way in ("over", "around"):
-            behind[way, kind] = found[names.index(f"{way}_edge")][30, 84]
+            behind[way, kind] = found[names.index(f"barriers.{way}_edge")][30, 84]
     share = {way: behind[way, "ends"] / behind[way, "whole"] for way in ("over", "around")}
     assert share["around"] < 0.5 * share["over"] < 0.5
 
 
 def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
-    found = features(scene, tuple(GROUPS))
-    names = names_of(GROUPS)
+    found = features(scene, ALL)
+    names = names_of(ALL)
     over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
     np.testing.assert_array_equal(reach(scene), combined(over, around))
     close(reach(scene), (over / 1.0 + around / 1.5) / 2)
@@ -277,7 +280,7 @@ def test_only_lit_ground_lies_beyond_the_end_of_the_road():
 def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
     image = np.full((96, 128, 3), 100, np.uint8)
     image[:, 100] = 40
-    dark = GROUPS["barriers"].compute(scene_of(image, 64, PATCH))[9]
+    dark = planes("barriers", scene_of(image, 64, PATCH))[9]
     assert dark[40, 60] > 2 * dark[40, 40]
 
 

@@ -281,7 +281,7 @@ def test_a_wide_image_is_judged_as_the_reduced_one_and_compensated_at_its_own_si
 
 def test_layers_are_the_ones_announced():
     output, _ = run(road(ROAD * SHADE))
-    assert tuple(layer.spec for layer in output.layers) == gated.layers(GatedSettings())
+    assert tuple(layer.spec for layer in output.layers) == gated.STAGE.layers
     for layer in output.layers:
         assert layer.array.dtype == {"scalar": np.float32}.get(layer.spec.kind, np.uint8)
         assert layer.array.shape[:2] == (HEIGHT, WIDTH)

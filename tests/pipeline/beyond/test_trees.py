@@ -133,12 +133,6 @@ def test_the_mask_is_where_road_is_more_probable_than_the_threshold(learnt):
         np.testing.assert_array_equal(output.mask.pixels(), expected)
 
 
-def test_probability_is_the_logistic_function_and_does_not_overflow():
-    odds = np.array([-1000, -2, 0, 2, 1000], np.float32)
-    expected = [0, 1 / (1 + np.exp(2)), 0.5, 1 / (1 + np.exp(-2)), 1]
-    np.testing.assert_allclose(trees.probability(odds), expected, atol=1e-6)
-
-
 def test_classes_weigh_what_the_frames_have_of_them():
     road = np.array([True, True, False, False])
     weights = balanced_back(road, 0.25)
