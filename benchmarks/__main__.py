@@ -151,11 +151,9 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 score = partial(run.board.score, frame, Role.EVALUATED, variants)
                 result, seconds = timed(score)
                 lap("score", seconds)
-                encoded, seconds = timed(
-                    partial(recorder.encode, result, position, lines_of(result))
-                )
+                encoded, seconds = timed(partial(recorder.encode, result, position))
                 lap("encode", seconds)
-                lap("write", timed(partial(recorder.write, encoded))[1])
+                lap("write", timed(partial(recorder.write, encoded, lines_of(result)))[1])
             recorder.finish({})
     return times
 

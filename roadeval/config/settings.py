@@ -42,8 +42,9 @@ class OutputSettings:
     """Masks, error maps and rates as a log, to open beside the drive. Default: none."""
     record: Annotated[str, Flag("--record", "WHAT")] = "all"
     """Whose pictures are recorded: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``. With
-    ``masks`` go labels and the camera's image; of the ``worst:K`` frames by ERR, and of
-    ``every:N``-th frame, all pictures are recorded; ``none`` means no recording."""
+    ``masks`` go labels and the camera's image; of the ``worst:K`` frames by ERR, in a
+    log without truth by how much the mask is in doubt, and of ``every:N``-th frame, all pictures
+    are recorded; ``none`` means no recording."""
     figures: bool = True
     """Whether the paper's figures are drawn; a fleet does not draw those of its drives."""
 

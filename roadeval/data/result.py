@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -197,6 +198,26 @@ class Health(StrEnum):
     FAILED = "failed"
 
 
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """How much a variant's final mask is in doubt on a frame without truth; never an error rate."""
+
+    variant: str
+    stage: str
+    entropy: float
+    """Mean over pixels of how unsure road is, in bits; NaN where no stage says how probable it is.
+    """
+    differs: Mapping[str, float] = field(default_factory=dict)
+    """The share of pixels on which each other variant's final mask differs."""
+    flicker: float = math.nan
+    """The share of pixels that change from the frame before; NaN where that was not seen."""
+
+    @property
+    def disagreement(self) -> float:
+        """The mean of ``differs``; NaN for a variant alone."""
+        return sum(self.differs.values()) / len(self.differs) if self.differs else math.nan
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
@@ -206,7 +227,7 @@ class FrameResult:
     the boundary F of each final mask by variant, ``histograms`` the labelled pixels by how probable
     road is, for each variant and stage that says so, and ``oracles`` the counts of what the stages
     made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
-    their seed. ``notes`` are sentences for a person.
+    their seed. ``notes`` are sentences for a person. ``doubts`` has each variant's, without truth.
     """
 
     frame: Frame
@@ -222,6 +243,7 @@ class FrameResult:
     histograms: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
     repeats: Mapping[int, tuple[Tally, ...]] = field(default_factory=dict)
+    doubts: tuple[Doubt, ...] = ()
 
     def without_layers(self) -> FrameResult:
         """Return the result without layers, which take most memory, for summing up."""

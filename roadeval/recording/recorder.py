@@ -34,7 +34,7 @@ from roadeval.runtime.files import NewFile, writing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncodedFrame:
-    """A frame ready to be written. Mappings are by entity path, ``tables`` by name."""
+    """A frame ready to be written. Mappings are by entity path."""
 
     when: When
     payloads: Mapping[str, bytes]
@@ -46,9 +46,8 @@ class EncodedFrame:
     """Every state, empty if undefined."""
     notes: tuple[tuple[str, str], ...] = ()
     """Sentences, each with its level."""
-    tables: Mapping[str, str] = field(default_factory=dict)
-    """Lines of CSV."""
     worst_error: float = -1.0
+    """By what frames are ranked, see `worst_error`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +62,9 @@ class _Camera:
 
 
 def encode_frame(
-    result: FrameResult,
-    lines: Mapping[str, str],
-    camera: _Camera,
-    kinds: Collection[LayerKind],
+    result: FrameResult, camera: _Camera, kinds: Collection[LayerKind]
 ) -> EncodedFrame:
-    """Encode a frame, with its lines of the tables by name.
+    """Encode a frame.
 
     Of its images only layers of some ``kinds`` are encoded, and without any kind no image at all.
     """
@@ -89,8 +85,7 @@ def encode_frame(
         counts={below + path: (c.tp, c.tn, c.fp, c.fn, c.n) for path, c in counts.items()},
         states={below + path: lane for path, lane in lanes.items()},
         notes=tuple((note, level) for note in result.notes),
-        tables=lines,
-        worst_error=worst_error(result),
+        worst_error=worst_error(result, layout),
     )
 
 
@@ -128,8 +123,14 @@ def _scalars(result: FrameResult, rates: Collection[str]) -> Iterator[tuple[str,
                 yield at.scalar_path("facts", *where, name), value
 
 
-def worst_error(result: FrameResult) -> float:
-    """Return the greatest ERR of any variant's final mask; -1 for a frame not evaluated."""
+def worst_error(result: FrameResult, layout: Layout) -> float:
+    """Return the greatest ERR of any variant's final mask; -1 for a frame not evaluated.
+
+    Where no frame has truth it is how much the first variant's mask is in doubt.
+    """
+    if not layout.has_truth:
+        signs = [(each.entropy, each.disagreement) for each in result.doubts[:1]]
+        return next((sign for each in signs for sign in each if not math.isnan(sign)), -1.0)
     finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
     return max((t.rates["ERR"] for t in finals), default=-1.0)
 
@@ -213,6 +214,7 @@ ALL: Final = RecordRule()
 Texts = Mapping[str, Mapping[str, str]]
 """Results by their name, of each camera by its name."""
 NO_TEXTS: Final[Texts] = {}
+NO_LINES: Final[Mapping[str, str]] = {}
 UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them, which has no limit itself."""
 
@@ -313,25 +315,26 @@ class Recorder:
             if error is not None and self.partial.exists():
                 error.add_note(f"the partial recording is {self.partial}")
 
-    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> EncodedFrame:
+    def encode(self, result: FrameResult, position: int) -> EncodedFrame:
         """Encode a frame; the heavy part of the work, in any thread.
 
-        ``position`` counts the frames read, from 0; ``lines`` are the frame's of the tables in
-        `Layout.tables`, by name.
+        ``position`` counts the frames read, from 0.
         """
+        own = self._cameras.get(result.frame.camera) or self._cameras[""]
         kinds: Collection[LayerKind] = tuple(LayerKind)
         match self._rule.kind:
             case RuleKind.MASKS:
                 kinds = (LayerKind.MASK, LayerKind.LABELS)
             case RuleKind.EVERY if position % self._rule.number:
                 kinds = ()
-            case RuleKind.WORST if worst_error(result) < self._worst.least:
+            case RuleKind.WORST if worst_error(result, own.layout) < self._worst.least:
                 kinds = ()
-        own = self._cameras.get(result.frame.camera) or self._cameras[""]
-        return encode_frame(result, lines, own, kinds)
+        return encode_frame(result, own, kinds)
 
-    def write(self, encoded: EncodedFrame) -> None:
-        """Append a frame. Frames come in order, from one thread.
+    def write(self, encoded: EncodedFrame, lines: Mapping[str, str] = NO_LINES) -> None:
+        """Append a frame, with its lines of the tables in `Layout.tables`, by name.
+
+        Frames come in order, from one thread.
 
         A `RecordingError` if the disk is full.
         """
@@ -343,6 +346,9 @@ class Recorder:
         put_aside = encoded.payloads and self._rule.kind is RuleKind.WORST
         self._add_images(replace(encoded, payloads={}) if put_aside else encoded)
         self._add_texts(encoded)
+        for name, text in lines.items():
+            where = encoded.camera + at.result_path(name)
+            self._rows.add(where, columns.texts, encoded.when, text)
         for path, number in encoded.scalars.items():
             self._numbers.add(path, columns.scalars, encoded.when, number)
         for path, numbers in encoded.counts.items():
@@ -466,8 +472,6 @@ class Recorder:
                 self._states[path] = state
         for note in encoded.notes:
             self._rows.add(below + at.NOTES, columns.notes, when, note)
-        for name, lines in encoded.tables.items():
-            self._rows.add(below + at.result_path(name), columns.texts, when, lines)
 
     def _log_static(self, data: Iterable[tuple[str, list[Any]]], below: str = "") -> None:
         stream = self._open_stream()
@@ -549,14 +553,14 @@ class NullRecorder:
     def __exit__(self, *error: Any) -> None:
         """Close nothing."""
 
-    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> None:
+    def encode(self, result: FrameResult, position: int) -> None:
         """Encode nothing."""
 
     def forecast(self, _encoded: None, _frames: int) -> str:
         """Return nothing to say."""
         return ""
 
-    def write(self, encoded: None) -> None:
+    def write(self, encoded: None, lines: Mapping[str, str] = NO_LINES) -> None:
         """Write nothing."""
 
     def flush(self) -> None:

@@ -34,7 +34,7 @@ def document(findings: Findings | FleetFindings) -> Document:
         return _of(findings, *RIG, provenance.section)
     # The frames, which fill pages, come last: what is short finds room before them.
     scored = SCORED if findings.totals else (drive.masks,)
-    gallery = (frames.worst_frames,) if findings.totals else ()
+    gallery = (frames.worst_frames,) if findings.totals or findings.worst else ()
     return _of(findings, *scored, provenance.section, *gallery)
 
 

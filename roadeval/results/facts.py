@@ -86,6 +86,20 @@ class TrainingFacts:
 
 
 @dataclass(frozen=True, slots=True)
+class UnlabelledFacts:
+    """The frames without truth: which to look at, and how far masks differ; no error rate."""
+
+    frames: int
+    variant: str
+    sign: str | None
+    """By which of `roadeval.evaluation.score.SIGNS` the variant's frames are ranked, if any."""
+    look_at: list[int]
+    """Numbers of frames, the first of the rank first, one a scene."""
+    differing: dict[str, dict[str, float]]
+    """The mean share of pixels on which two variants differ, by both names."""
+
+
+@dataclass(frozen=True, slots=True)
 class LogFacts:
     """The log's file, and what tells it from another (`roadeval.logs.Log.digest`)."""
 
@@ -216,6 +230,8 @@ class Facts(_Document):
     methods: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """What stages say of themselves, as networks do."""
     versions: dict[str, str] = field(default_factory=dict)
+    unlabelled: UnlabelledFacts | None = None
+    """None where every frame has truth."""
     log: LogFacts | None = None
     """None of a run that ended early."""
     masks: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -232,9 +248,12 @@ class Facts(_Document):
     RESULTS = (
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims"),
-        *("health", "warnings", "losses", "settings", "methods", "cameras"),
+        *("health", "warnings", "losses", "settings", "methods", "cameras", "unlabelled"),
     )
-    OPTIONAL = ("curves", "thresholds", "seeds", "methods", "masks", "files", "cameras")
+    OPTIONAL = (
+        *("curves", "thresholds", "seeds", "methods", "masks", "files", "cameras"),
+        "unlabelled",
+    )
 
     @cached_property
     def finals(self) -> dict[str, str]:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import Change, Counts, FrameResult, Rows, Transition
+from roadeval.data import Change, Counts, Doubt, Frame, FrameResult, Rows, Transition
 from roadeval.evaluation.regions import ALL
-from roadeval.evaluation.score import at_levels
+from roadeval.evaluation.score import SIGNS, at_levels
 from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind
 from roadeval.runtime.text import visible
 
@@ -49,8 +49,15 @@ class Key(NamedTuple):
         return "".join(f'"{own}",' if set(text) & {",", '"'} else f"{text}," for text, own in texts)
 
 
+def doubt_rows(frame: Frame, doubts: Iterable[Doubt]) -> dict[str, list[Row]]:
+    """Return the rows of ``unlabelled`` of a frame."""
+    when = frame.number, frame.stamp_ns
+    rows = [(*when, e.variant, e.stage, *(getattr(e, sign) for sign in SIGNS)) for e in doubts]
+    return {"unlabelled": rows}
+
+
 def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
-    """Return a frame's rows of each streamed table; empty unless the frame is evaluated."""
+    """Return a frame's rows of each table of evaluated frames; empty for others."""
     frame = result.frame
     return {
         "frames": [

@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.score import SIGNS
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -172,6 +173,16 @@ _OF_FRAMES: Final = (
             Column("repaired", Kind.COUNT, "pixels that only the second mask has right"),
             Column("spoiled", Kind.COUNT, "pixels that only the first mask has right"),
             LABELLED,
+        ),
+        streamed=True,
+    ),
+    TableSchema(
+        "unlabelled",
+        "A row per frame without truth and variant: how much its final mask is in doubt. By these "
+        "numbers frames are ranked; none is an error rate.",
+        (
+            *(*KEY, FRAME, STAMP, VARIANT, STAGE),
+            *(Column(sign, Kind.RATE, words) for sign, words in SIGNS.items()),
         ),
         streamed=True,
     ),

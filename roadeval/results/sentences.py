@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum, auto
+from operator import itemgetter
 from statistics import median
 from typing import Any, Final
 
@@ -23,7 +24,7 @@ from roadeval.data.words import (
 from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
 from roadeval.evaluation.stats import Difference
-from roadeval.results.facts import FrameAccount
+from roadeval.results.facts import FrameAccount, UnlabelledFacts
 
 PROBABLY: Final = 0.2
 """The greatest p-value of a difference that is called probable: without an effect, one drive in ten
@@ -37,6 +38,8 @@ ROUNDING: Final = 5e-4
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are stated together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
+NAMED: Final = 5
+"""Frames without truth that a verdict names."""
 _OF_FILTER: Final = "The filter "
 """Begins the note on what the filter did to a frame."""
 BLIND: Final = f"{BASELINE}, which never looks at the image"
@@ -249,6 +252,8 @@ def verdict(
     settings: EvaluationSettings,
     claims: Mapping[str, Mapping[str, int]] | None = None,
     thresholds: Mapping[str, Mapping[str, float]] | None = None,
+    *,
+    unlabelled: UnlabelledFacts | None = None,
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences.
 
@@ -256,10 +261,11 @@ def verdict(
     a method; what the filter changes; and which step adds most to the filtered variant's errors.
     ``totals`` are by variant and stage, empty where nothing was scored; ``effects`` are of final
     masks at least; ``claims`` says in how many windows of a drive each claim of the paper holds,
-    ``thresholds`` what other thresholds would bring on it, see `at_thresholds`.
+    ``thresholds`` what other thresholds would bring on it, see `at_thresholds`. Where nothing was
+    scored, ``unlabelled`` says which frames to look at.
     """
     if not totals:
-        return NOTHING_SCORED
+        return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
     stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     finals = {(each.base, each.variant): each for each in effects if each.final}
@@ -277,6 +283,31 @@ def verdict(
         rate = f"{TESTED} of {of_filter.stage}"
         parts.append(sentence(found, "the filter", rate, settings, levels=ends, **more))
     return " ".join(filter(None, [*parts, _costs_most(totals)]))
+
+
+RANKED_BY: Final = {
+    "entropy": "{variant} is least sure where road is (entropy of its probability)",
+    "disagreement": "{variant} and the other variants differ most",
+    "flicker": "the mask of {variant} changes most from the frame before",
+}
+"""Why frames without truth come first, by what ranks them."""
+
+
+def without_truth(found: UnlabelledFacts | None) -> Iterator[str]:
+    """Yield what is known without truth: a bound on the greater of two error rates, and a rank."""
+    if found is None:
+        return
+    pairs = [(e, one, other) for one, own in found.differing.items() for other, e in own.items()]
+    if pairs:
+        share, one, other = max(pairs, key=itemgetter(0))
+        yield (
+            f"{one} and {other} differ on {percent(share, 1)} % of the pixels, so one of the two "
+            f"is wrong on at least {math.floor(share * 500) / 10:.1f} %."
+        )
+    if found.look_at and found.sign:
+        why = RANKED_BY[found.sign].format(variant=found.variant)
+        frames = listing([str(each) for each in found.look_at[:NAMED]])
+        yield f"Look first at frames {frames}: there {why}. That is a rank, and no error rate."
 
 
 def at_thresholds(

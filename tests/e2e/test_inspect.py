@@ -6,9 +6,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-from roadeval import Recording
 from roadeval.cli.app import main
-from roadeval.errors import RoadevalError
 from roadeval.jobs.results import inspect as inspecting
 from roadeval.jobs.results.result import DriveResult
 from roadeval.recording import viewer
@@ -147,16 +145,22 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
     assert said.err == f"roadeval: warning: {sentence}\n"
 
 
-def test_the_worst_of_nothing_is_none_unless_a_variant_is_asked_for(unlabelled):
+def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
     opened = DriveResult(unlabelled.recording)
-    assert inspecting.worst(opened) is None
-    with pytest.raises(RoadevalError, match="nothing was scored"):
-        inspecting.worst(opened, "filtered")
+    rows = opened.table("unlabelled").of_variant("filtered")
+    first = int(rows["frame"][rows["disagreement"].argmax()])
+    assert inspecting.worst(opened).frame == first
+    assert inspecting.worst(opened, "unfiltered").by == "disagreement"
+    again = "the first to look at (--frame N or --worst K takes another)"
+    assert told(unlabelled.recording) == f"frame {first}, {again}\n"
 
 
-def test_where_nothing_was_scored_the_first_frame_is_drawn(unlabelled, told):
-    first = Recording(unlabelled.recording).layout.first_frame
-    assert told(unlabelled.recording) == f"frame {first}\n"
+def test_the_list_without_truth_names_its_rank_and_no_error_rate(unlabelled, capsys):
+    assert main(["inspect", str(unlabelled.recording), "--list"]) == 0
+    said = capsys.readouterr().out
+    assert "frames to look at of filtered by" in said
+    assert "disagreement of post" in said
+    assert "ERR" not in said
 
 
 @pytest.mark.parametrize(

@@ -368,7 +368,7 @@ def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
     def fail(self, result):
         if result.frame.number == 12:
             raise KeyboardInterrupt
-        add(self, result)
+        return add(self, result)
 
     monkeypatch.setattr(Scoreboard, "add", fail)
     with pytest.raises(KeyboardInterrupt):
@@ -622,7 +622,7 @@ def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
 
 def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
     class Seen:
-        def encode(self, result, position, lines):
+        def encode(self, result, position):
             return result
 
     options = settings(max_frames=14)

@@ -152,7 +152,7 @@ def record(path, results, known=None, texts=None):
     """Write a complete recording of these frames, and open it."""
     with Recorder(path, known or layout()) as recorder:
         for each in results:
-            recorder.write(recorder.encode(each, 0, lines(each)))
+            recorder.write(recorder.encode(each, 0), lines(each))
         recorder.finish(RESULTS if texts is None else texts)
     return Recording(path)
 

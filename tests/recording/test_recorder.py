@@ -37,7 +37,7 @@ pytestmark = pytest.mark.usefixtures("untried")
 
 def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
     with Recorder(tmp_path / "new" / "out.rrd", layout()) as recorder:
-        recorder.write(recorder.encode(drive[0], 0, lines(drive[0])))
+        recorder.write(recorder.encode(drive[0], 0), lines(drive[0]))
         assert not recorder.path.exists()
         assert recorder.partial.parent == recorder.path.parent
         recorder.finish(RESULTS)
@@ -48,7 +48,7 @@ def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
 
 def test_a_recording_without_its_results_does_not_take_its_name(drive, tmp_path):
     with Recorder(tmp_path / "out.rrd", layout()) as recorder:
-        recorder.write(recorder.encode(drive[0], 0, lines(drive[0])))
+        recorder.write(recorder.encode(drive[0], 0), lines(drive[0]))
     assert [path.name for path in tmp_path.iterdir()] == [recorder.partial.name]
 
 
@@ -99,7 +99,7 @@ def _slower(variant):
 def test_flushed_frames_wait_no_more(drive, tmp_path):
     with Recorder(tmp_path / "out.rrd", layout()) as recorder:
         for each in drive[:5]:
-            recorder.write(recorder.encode(each, 0, lines(each)))
+            recorder.write(recorder.encode(each, 0), lines(each))
         recorder.flush()
         partial = Recording(recorder.partial)
         assert partial.frame_numbers == (0, 1, 2, 3, 4)
@@ -125,7 +125,7 @@ def test_an_exception_leaves_a_partial_recording_with_every_frame_so_far(stop, d
 def _record_and_stop(recorder, results, stop):
     with recorder:
         for each in results:
-            recorder.write(recorder.encode(each, 0, lines(each)))
+            recorder.write(recorder.encode(each, 0), lines(each))
         raise stop
 
 
@@ -159,7 +159,7 @@ KILLED = """
     from tests.results.making import lines
     with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
         for number in range(int(sys.argv[2])):
-            recorder.write(recorder.encode(result(number), 0, lines(result(number))))
+            recorder.write(recorder.encode(result(number), 0), lines(result(number)))
         os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -206,7 +206,7 @@ def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_c
             for each in drive:
                 leave_free(monkeypatch, (1 << 30) if each.frame.number < 10 else (1 << 20))
                 given.append(each.frame.number)
-                recorder.write(recorder.encode(each, 0, lines(each)))
+                recorder.write(recorder.encode(each, 0), lines(each))
 
     recorder = _recorder(tmp_path / "out.rrd")
     with pytest.raises(RecordingError, match="the disk is full"):
@@ -220,7 +220,7 @@ def test_what_waits_has_its_room_on_the_disk_beside_the_least(drive, tmp_path, m
     with _recorder(tmp_path / "out.rrd") as recorder:
         leave_free(monkeypatch, LEAST_FREE + 1)
         recorder.check_disk_space()
-        recorder.write(recorder.encode(drive[3], 0, lines(drive[3])))
+        recorder.write(recorder.encode(drive[3], 0), lines(drive[3]))
         with pytest.raises(RecordingError, match="the disk is full"):
             recorder.check_disk_space()
 
@@ -235,7 +235,7 @@ def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Recorder, "_flush_stream", counted)
     with _recorder(tmp_path / "out.rrd") as recorder:
-        first = recorder.encode(result(0), 0, {})
+        first = recorder.encode(result(0), 0)
         large = replace(first, payloads=dict.fromkeys(first.payloads, bytes(CHUNK_BYTES - 1)))
         for number in range(2):
             recorder.write(replace(large, when=(number,) * 3))
@@ -250,7 +250,7 @@ def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
     for free, said in ((10**12, ""), (10**9, ", and only 1000 MB are free: `output.record` masks")):
         with Recorder(tmp_path / "out.rrd", layout(), RecordRule.parse(rule)) as recorder:
             leave_free(monkeypatch, free)
-            first = recorder.encode(result(0), 0, {})
+            first = recorder.encode(result(0), 0)
             assert recorder.forecast(replace(first, payloads={}), 1000) == ""
             large = replace(first, payloads={"/camera": bytes(24_000_000)})
             expected = f"the recording will take about {24 * shown} MB{said}"
@@ -261,7 +261,7 @@ def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
 
 def test_a_small_recording_that_fits_is_not_worth_a_word(tmp_path):
     with _recorder(tmp_path / "out.rrd") as recorder:
-        assert recorder.forecast(recorder.encode(result(0), 0, {}), 10) == ""
+        assert recorder.forecast(recorder.encode(result(0), 0), 10) == ""
 
 
 def leave_free(monkeypatch, size):
@@ -341,7 +341,7 @@ def _recorder(path):
 
 def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
     with NullRecorder() as recorder:
-        recorder.write(recorder.encode(drive[0], 0, {}))
+        recorder.write(recorder.encode(drive[0], 0))
         recorder.flush()
         recorder.finish(RESULTS)
 

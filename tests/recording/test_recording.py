@@ -76,7 +76,7 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
     with Recorder(tmp_path / "out.rrd", layout(), RecordRule.parse("every:2")) as recorder:
         for each in drive:
             position = 0 if each.frame.number in pictured else 1
-            recorder.write(recorder.encode(each, position, lines(each)))
+            recorder.write(recorder.encode(each, position), lines(each))
         recorder.finish(RESULTS)
     recording = Recording(recorder.path)
     assert recording.frame_numbers == tuple(pictured)

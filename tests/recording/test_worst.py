@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from roadeval.data import Doubt
 from roadeval.recording import EncodedFrame, Recorder, Recording, RecordingError, RecordRule
 from roadeval.recording.recorder import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
@@ -23,7 +24,7 @@ def selective(path, rule):
 def write(recorder):
     for number, err in enumerate(ERRORS):
         each = result(number, err=err)
-        recorder.write(recorder.encode(each, number, lines(each)))
+        recorder.write(recorder.encode(each, number), lines(each))
 
 
 def keep(path, rule):
@@ -49,6 +50,18 @@ def test_the_worst_frames_pictures_are_kept_and_of_equals_the_earlier(rule, fram
     for number in frames:
         mask = next(result(number).variants[0].masks())[1].pixels()
         np.testing.assert_array_equal(recording.layer("filtered", "post", number), mask)
+
+
+def test_without_truth_the_most_doubtful_frames_are_kept(tmp_path):
+    rule, without = RecordRule.parse("worst:2"), replace(layout(), has_truth=False)
+    with Recorder(tmp_path / "out.rrd", without, rule) as recorder:
+        for number, entropy in enumerate([0.1, 0.4, 0.2, 0.3]):
+            doubts = (Doubt("filtered", "post", entropy), Doubt("unfiltered", "post", 1 - entropy))
+            each = replace(result(number), tallies=(), errors={}, doubts=doubts)
+            each = replace(each, frame=replace(each.frame, truth=None))
+            recorder.write(recorder.encode(each, number))
+        recorder.finish(RESULTS)
+    assert list(Recording(recorder.path).frame_numbers) == [1, 3]
 
 
 def test_flushed_pictures_are_the_worst(tmp_path):
@@ -124,7 +137,7 @@ def test_a_name_that_is_too_long_for_the_folder_alone_will_do_where_no_image_wai
 def test_memory_holds_few_pictures_however_many_are_kept(tmp_path):
     size, count = 1 << 20, 40
     with selective(tmp_path / "out.rrd", "worst:40") as recorder:
-        plain = recorder.encode(result(0), 0, {})
+        plain = recorder.encode(result(0), 0)
         tracemalloc.start()
         for number in range(count):
             large = {path: payload.ljust(size, b"0") for path, payload in plain.payloads.items()}
@@ -137,7 +150,7 @@ def test_memory_holds_few_pictures_however_many_are_kept(tmp_path):
 
 def test_frames_that_are_dropped_take_no_room(tmp_path):
     with selective(tmp_path / "out.rrd", "worst:2") as recorder:
-        plain = recorder.encode(result(0), 0, {})
+        plain = recorder.encode(result(0), 0)
         for number in range(50):
             large = {"/camera": bytes(1 << 20)}
             recorder.write(
@@ -152,9 +165,9 @@ def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp
 
     def fill(recorder):
         with recorder:
-            recorder.write(recorder.encode(result(0), 0, {}))
+            recorder.write(recorder.encode(result(0), 0))
             monkeypatch.setattr(WorstFrames, "offer", fail)
-            recorder.write(recorder.encode(result(1), 1, {}))
+            recorder.write(recorder.encode(result(1), 1))
 
     recorder = selective(tmp_path / "out.rrd", "worst:3")
     with pytest.raises(RecordingError, match="the disk is full"):

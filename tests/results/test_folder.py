@@ -17,7 +17,7 @@ from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.facts import Facts, FrameAccount, digest_of
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
-from roadeval.results.schema import OF_A_DRIVE
+from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
 from roadeval.results.tables import ResultsError
 from tests.evaluation.making import a_frame, a_variant, pixels
 from tests.results.making import facts_of, lines, sum_lines
@@ -25,6 +25,8 @@ from tests.results.making import facts_of, lines, sum_lines
 TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
 MASK = pixels("#.#.", "##..")
 RUN_TOML = 'preset = "paper"\n'
+OF_A_DRIVE = [name for name in ALL_TABLES if name != "unlabelled"]
+"""Those of a drive whose every frame has truth."""
 
 
 def a_board() -> Scoreboard:

@@ -143,7 +143,8 @@ def _show(
     assert drive is not None
     if file and frame is None and not of and (bad := job.worst(drive, variant)):
         is_worst = bad.frame == job.of_rank(opened, 1, variant).frame
-        which = "the worst" if is_worst else "the worst that has pictures"
+        which = "the worst" if bad.by == "ERR" else "the first to look at"
+        which += "" if is_worst else " that has pictures"
         frame, why = bad.frame, f", {which} (--frame N or --worst K takes another)"
     if frame is not None and (sentence := job.without_pictures(drive, frame)):
         messages.warning(sentence)

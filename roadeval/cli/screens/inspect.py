@@ -22,9 +22,12 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
     Of a drive with the parts of ERR and the notes; of a fleet with the light, and whether the
     drive's recording was kept.
     """
-    mask = f"{found[0].variant} by ERR of {found[0].stage}"
-    of_fleet = bool(found[0].light)
-    out.print(f"{name}: worst frames of {mask} (of neighbours only the worst)")
+    mask = f"{found[0].variant} by {found[0].by} of {found[0].stage}"
+    of_fleet, scored = bool(found[0].light), found[0].by == "ERR"
+    what, rule = "worst frames", "of neighbours only the worst"
+    if not scored:
+        what, rule = "without truth, frames to look at", "one a scene; a rank, and no error rate"
+    out.print(f"{name}: {what} of {mask} ({rule})")
     out.print()
     rates = [*found[0].rates]
     titles = ["frame", *(f"{rate} %" for rate in rates)]
@@ -40,12 +43,14 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
         rig = any(each.camera for each in found)
         names = short_names([*{each.camera: None for each in found}])
         rows = [
-            [str(e.rank), *([names[e.camera]] if rig else []), *own, _why(e)]
+            [str(e.rank), *([names[e.camera]] if rig else []), *own, *([_why(e)] if scored else [])]
             for e, own in zip(found, cells, strict=True)
         ]
-        titles = ["", *(["camera"] if rig else []), *titles, "why"]
-        words = [*([1] if rig else []), len(titles) - 1]
-        show_table(Table(titles, rows, text_columns=words, breaks=range(1, len(rows))), out)
+        titles = ["", *(["camera"] if rig else []), *titles, *(["why"] if scored else [])]
+        words = [*([1] if rig else []), *([len(titles) - 1] if scored else [])]
+        show_table(
+            Table(titles, rows, text_columns=words, breaks=range(1, len(rows) * scored)), out
+        )
     if of_fleet and not all(each.recording for each in found):
         out.print()
         out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")

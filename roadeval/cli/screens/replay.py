@@ -24,6 +24,7 @@ from roadeval.results.sentences import (
     of_seeds,
     seeds_in_words,
     spread,
+    without_truth,
 )
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ def show(outcome: Outcome, out: Console) -> None:
         _show_scores(facts, out)
     else:
         out.print(f"Nothing to score: {_why_nothing(facts.frames)}.")
+        for sentence in without_truth(facts.unlabelled):
+            out.print(sentence)
     out.print()
     _show_files(outcome, out)
 
@@ -168,7 +171,7 @@ def _next(outcome: Outcome, place: Path) -> Iterator[str]:
         yield f"rerun {place}"
     elif outcome.recording and scored:
         yield f"roadeval inspect {place} --worst 1 --screenshot worst.png"
-    if scored:
+    if scored or outcome.facts.unlabelled:
         yield f"roadeval inspect {place} --list"
     elif not outcome.facts.frames.labelled and log is not None:
         yield f"roadeval replay {log.path} --truth LABELS"

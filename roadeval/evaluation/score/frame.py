@@ -34,6 +34,7 @@ from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.score.counts import Name, boundary_f, count, error_map
 from roadeval.evaluation.score.thresholds import changes
+from roadeval.evaluation.score.unlabelled import doubts_of
 from roadeval.evaluation.settings import (
     DEGRADED_ERR,
     DEGRADED_MARGIN,
@@ -60,13 +61,16 @@ def score_frame(
 ) -> FrameResult:
     """Score one frame; one that is not `EVALUATED` is passed on without counts.
 
-    Of a training frame it counts alone how probable its road and the rest are.
+    Of a training frame it counts alone how probable its road and the rest are, of one without truth
+    how much each mask is in doubt.
 
     A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
     stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on.
     """
     if role is Role.TRAINING and frame.truth is not None:
         return FrameResult(frame, role, variants, histograms=_histograms(frame.truth, variants))
+    if role is Role.UNLABELLED:
+        return FrameResult(frame, role, variants, doubts=doubts_of(variants))
     if role is not Role.EVALUATED:
         return FrameResult(frame, role, variants)
     if frame.truth is None:

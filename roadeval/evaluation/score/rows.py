@@ -180,15 +180,19 @@ def scene_ns(stamps: Ints) -> int:
     return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
 
 
-def worst(rows: Rows, variant: str, count: int, apart_ns: int | None = None) -> Rows:
+def worst(
+    rows: Rows, variant: str, count: int, apart_ns: int | None = None, by: str = "ERR"
+) -> Rows:
     """Pick at most ``count`` frames with the highest final ERR of a variant, the worst first.
+
+    Or with the highest value of another column, as of ``unlabelled``.
 
     Neighbours fail alike, so of frames less than ``apart_ns`` apart only the worst is picked: by
     default a thirtieth of the drive, and at most a second.
     """
     own = finals(rows.of_variant(variant))
-    own = own.take(~np.isnan(own["ERR"]))
-    ranked = np.argsort(-own["ERR"], kind="stable")
+    own = own.take(~np.isnan(own[by]))
+    ranked = np.argsort(-own[by], kind="stable")
     return own.take(_apart(own["stamp_ns"], ranked, count, apart_ns))
 
 

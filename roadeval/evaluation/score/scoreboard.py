@@ -24,6 +24,7 @@ from roadeval.data import (
     FINAL_STAGE,
     UNFILTERED,
     Change,
+    Doubt,
     Frame,
     FrameResult,
     Role,
@@ -46,6 +47,7 @@ from roadeval.evaluation.score.counts import (
 )
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
+from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import CameraRates, Difference, holm, within_drive
 
@@ -181,6 +183,8 @@ class Scoreboard:
         self.changes: Final[defaultdict[Transition, Change]] = defaultdict(Change)
         """Every change between masks."""
         self.curves: Final = Curves()
+        self.unlabelled: Final = Unlabelled()
+        """The frames without truth."""
         self._training: Final = Curves()
         self._edges: Final = EdgesAndFlicker(settings.boundary_width)
         self._seconds: Final[defaultdict[Name, list[float]]] = defaultdict(lambda: [0.0, 0])
@@ -189,8 +193,12 @@ class Scoreboard:
         """Score one frame; changes nothing, so any thread may call it at any time."""
         return score_frame(frame, role, variants, self._settings, self._prior)
 
-    def add(self, result: FrameResult) -> None:
-        """Add a scored frame: in the drive's order, from one thread."""
+    def add(self, result: FrameResult) -> tuple[Doubt, ...]:
+        """Add a scored frame: in the drive's order, from one thread.
+
+        Returned are the doubts on a frame without truth.
+        """
+        doubts = self.unlabelled.add(result)
         self._roles[result.role] += 1
         self._edges.add(result)
         for variant in result.variants:
@@ -200,7 +208,7 @@ class Scoreboard:
                 spent[1] += 1
         if not result.tallies:
             self._training.add(result.frame.number, result.histograms)
-            return
+            return doubts
         for name, health in result.health.items():
             self._health[name][health] += 1
         position = len(self._frames)
@@ -217,10 +225,12 @@ class Scoreboard:
         self.curves.add(result.frame.number, result.histograms)
         self._frames.append(result.frame.number)
         self._stamps.append(result.frame.stamp_ns)
+        return doubts
 
     def lose(self) -> None:
         """Note that a frame was read here and could not be decoded."""
         self._edges.interrupt()
+        self.unlabelled.interrupt()
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
@@ -121,9 +122,15 @@ class FramePicker:
         return [self._outcome(self._recording, n) for n in numbers] if self._recording else []
 
     def worst(self) -> list[NotableFrame]:
-        """Return the worst frames of the first variant, one a scene, all worse than the mean."""
+        """Return the worst frames of the first variant, one a scene, all worse than the mean.
+
+        Without truth those that are most in doubt, as far as they have pictures.
+        """
         if not self._variants:
-            return []
+            unlabelled = self._result.facts.unlabelled
+            look_at = unlabelled.look_at if unlabelled else []
+            there = [frame for frame in look_at if frame in self._result.pictured]
+            return [self._pictured(frame) for frame in there[:WORST]]
         table = self._result.rows
         rows = score.worst(table, self._variants[0], WORST, score.scene_ns(table["stamp_ns"]))
         mean = np.nanmean(self._finals.of_variant(self._variants[0])["ERR"]) if len(rows) else 0
@@ -257,14 +264,17 @@ class FramePicker:
 
 def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> FrameBrowser:
     """Collect the frames of a result for a page, without their pictures."""
-    frames = result.rows
-    variants = frames.distinct("variant")
+    frames, names = result.rows, [*SHORT]
+    if not len(frames):
+        frames = result.table("unlabelled")
+        names = [sign for sign in score.SIGNS if np.isfinite(frames[sign]).any()]
     there = result.recording.variants if result.recording else ()
     return FrameBrowser(
         rows=[*facts_of(result)],
-        variants=variants,
+        variants=frames.distinct("variant"),
+        titles=names,
         served=frozenset(result.pictured),
-        charts=over_frames(frames, [*SHORT]) if len(frames) else [],
+        charts=over_frames(frames, names) if len(frames) else [],
         inspect=inspect if result.recording is not None else None,
         masks=[f"{each.name}: {each.stages[-1]}" for each in there],
     )
@@ -274,8 +284,11 @@ def facts_of(result: DriveResult) -> Iterator[FrameRow]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames = result.rows
     if not len(frames):
+        doubts = [*rates_by_frame(result.table("unlabelled"), [*score.SIGNS])]
+        seen = {frame for frame, _, _ in doubts}
         stamps = result.recording.stamps if result.recording else {}
-        yield from (FrameRow(number, stamps[number], {}) for number in result.pictured)
+        doubts += [(each, stamps[each], {}) for each in result.pictured if each not in seen]
+        yield from (FrameRow(*each) for each in sorted(doubts, key=itemgetter(0)))
         return
     dark = _much_shadow(result)
     for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):

@@ -34,6 +34,9 @@ class WorstFrame:
     variant: str
     stage: str
     rates: Mapping[str, float | None]
+    """Of a frame without truth its doubt, see `roadeval.results.schema.TABLES`."""
+    by: str = "ERR"
+    """By which of these it is ranked."""
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of ERR by stage, see `roadeval.evaluation.score.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()
@@ -53,6 +56,7 @@ def worst_frames(
 ) -> list[WorstFrame]:
     """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
 
+    Where nothing was scored, they are ranked by how much the mask is in doubt, one a scene.
     Of a fleet the frames of all drives are ranked together, all that are known by default, and
     always of the first variant. A `RoadevalError` if nothing was scored, or ERR is undefined on
     every frame, or there is no such variant.
@@ -64,7 +68,7 @@ def worst_frames(
         return [_of_fleet(fleet, row) for row in rows[:count]]
     cameras = result.rig.cameras if result.rig else [each for each in [result.drive] if each]
     found = [frame for each in cameras for frame in _ranked(each, count or LISTED, variant)]
-    found = sorted(found, key=lambda each: -(each.rates["ERR"] or 0.0))[: count or LISTED]
+    found = sorted(found, key=lambda each: -(each.rates[each.by] or 0.0))[: count or LISTED]
     found = [replace(each, rank=rank) for rank, each in enumerate(found, 1)]
     if not found:
         (path,) = result.paths
@@ -91,21 +95,29 @@ def _ranked(
     drive: DriveResult, count: int, variant: str | None, among: Collection[int] | None = None
 ) -> list[WorstFrame]:
     """Rank a drive's frames, or those ``among`` them; none where ERR is undefined on all."""
-    rows, names = drive.rows, _scored(drive)
+    rows, names, rates = drive.rows, _scored(drive), tuple(SHORT)
+    if not names:
+        rows = drive.table("unlabelled")
+        names, rates = rows.distinct("variant"), tuple(score.SIGNS)
     if not names:
         raise _nothing_scored(drive.path)
     chosen = variant or names[0]
     if chosen not in names:
         raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
+    by = "ERR" if "ERR" in rates else score.sign_of(rows, chosen)
+    if by is None:
+        return []
     looked_at = rows if among is None else rows.take(np.isin(rows["frame"], [*among]))
-    ranked = score.worst(looked_at, chosen, count)
-    causes = score.causes(rows, chosen)
+    apart = None if by == "ERR" else score.scene_ns(rows["stamp_ns"])
+    ranked = score.worst(looked_at, chosen, count, apart, by)
+    causes = score.causes(rows, chosen) if by == "ERR" else None
     frames, stamps = ranked["frame"].tolist(), ranked["stamp_ns"].tolist()
     return [
         WorstFrame(
             *(place + 1, drive.name, frame, stamp, chosen, str(ranked["stage"][place])),
-            rates={rate: float(ranked[rate][place]) for rate in SHORT},
-            parts=causes.of(frame),
+            rates={rate: float(ranked[rate][place]) for rate in rates},
+            by=by,
+            parts=causes.of(frame) if causes else {},
             notes=drive.notes(frame, chosen),
             recording=drive.path if drive.recording else None,
             camera=drive.camera,
@@ -139,7 +151,7 @@ def worst(drive: DriveResult, variant: str | None = None) -> WorstFrame | None:
 
     None if no frame with pictures was scored. A `RoadevalError` if the variant was not scored.
     """
-    if variant is None and not _scored(drive):
+    if variant is None and not _scored(drive) and not len(drive.table("unlabelled")):
         return None
     return next(iter(_ranked(drive, 1, variant, among=drive.pictured)), None)
 

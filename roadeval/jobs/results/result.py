@@ -147,7 +147,7 @@ class DriveResult:
         """
         if name not in self._read:
             rows = self._tables.rows(name)
-            cut = not self.complete and len(rows)
+            cut = not self.complete and len(rows) and name != "unlabelled"
             self._read[name] = rows.take(np.isin(rows["frame"], self._both)) if cut else rows
         return self._read[name]
 

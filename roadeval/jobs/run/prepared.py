@@ -27,7 +27,7 @@ from roadeval.jobs.run.frame import bind, external_layout, external_variant, run
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
 from roadeval.recording import Layout
-from roadeval.results.rows import Key, csv_lines, frame_rows
+from roadeval.results.rows import Key, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
@@ -138,12 +138,14 @@ class Run:
         known, size = self.selection.calibration, self.selection.size
         return known.scaled(*size) if known and size else None
 
-    def add(self, done: ProcessedFrame) -> None:
-        """Add a frame, in the camera's order."""
-        self.board.add(done.result)
+    def add(self, done: ProcessedFrame) -> ProcessedFrame:
+        """Add a frame, in the camera's order; return it with the lines that take that order."""
+        doubts = self.board.add(done.result)
         self.beside.update(done.beside)
         if done.result.role in TRIED:
             self.failures.first = None
+        lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
+        return replace(done, lines={**done.lines, **lines})
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""
@@ -353,8 +355,8 @@ def content_of(path: Path, config: RunConfig, model: str) -> str | None:
 class Encoder(Protocol):
     """The part of a recorder that encodes a frame; called from any thread."""
 
-    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
-        """Encode the frame at ``position`` among those read, from 0, with its table lines."""
+    def encode(self, result: FrameResult, position: int) -> Any:
+        """Encode the frame at ``position`` among those read, from 0."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -387,8 +389,7 @@ def process(
         if position % TRIM_EVERY == 0:
             trim()
         if isinstance(done, ProcessedFrame):
-            run.add(done)
-            yield run, done
+            yield run, run.add(done)
             continue
         run.board.lose()
         if done is not None:
@@ -451,6 +452,6 @@ def _process(
     result = run.board.score(frame, use.role, tuple(variants))
     result = replace(result, notes=notes_of(result.tallies))
     own = csv_lines(run.key, frame_rows(result))
-    encoded = encoder.encode(result, position - 1, own)
+    encoded = encoder.encode(result, position - 1)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
     return run, ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)

@@ -239,7 +239,7 @@ def _record(
     for position, (run, done) in enumerate(process(runs, recorder, on_progress), 1):
         if forecast := recorder.forecast(done.encoded, total):
             on_progress(Progress(position, total, "replaying", forecast))
-        recorder.write(done.encoded)
+        recorder.write(done.encoded, done.lines)
         results.append(done.lines)
         sidecar.write(done.result, run.selection.image.frame_id, run.camera)
         examples[run.camera].offer(done.position, done.result)

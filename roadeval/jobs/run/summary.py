@@ -11,7 +11,15 @@ from typing import Any, Final
 
 from roadeval.config import AS_IT_IS, TUNED
 from roadeval.data import BASELINE, FINAL_STAGE, Role
-from roadeval.evaluation.score import Scoreboard, drive_effects, over_cameras
+from roadeval.evaluation.score import (
+    Scoreboard,
+    Unlabelled,
+    drive_effects,
+    over_cameras,
+    scene_ns,
+    sign_of,
+    worst,
+)
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.results.facts import (
     DriveFacts,
@@ -19,14 +27,19 @@ from roadeval.results.facts import (
     FrameAccount,
     LogFacts,
     TrainingFacts,
+    UnlabelledFacts,
     as_parts,
 )
 from roadeval.results.sentences import verdict
 from roadeval.results.tables import TableFacts
 from roadeval.version import VERSION
 
+LOOKED_AT: Final = 10
+"""Frames without truth that are named as worth a look."""
 JOURNEY: Final = 3
 """With so many training frames that show places of a drive it is taken for the same journey."""
+RANKS_AT_ONCE: Final = ("entropy", "disagreement")
+"""Signs that a frame has by itself, without the one before."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
@@ -36,13 +49,16 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     repeats = run.board.repeats()
     settings = run.config.training
     given = settings.model is not None and not settings.adapt
+    unlabelled = _unlabelled(run.board.unlabelled)
     thresholds = dict(_thresholds(run))
     return Facts(
         **found,
         **as_parts(effects),
         verdict=verdict(
-            *(found["totals"], effects, run.config.evaluation, found["claims"], thresholds)
+            *(found["totals"], effects, run.config.evaluation, found["claims"], thresholds),
+            unlabelled=unlabelled,
         ),
+        unlabelled=unlabelled,
         thresholds=thresholds,
         drive=DriveFacts(
             run.log.name,
@@ -73,6 +89,23 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         masks=_masks(run),
         tables=tables,
     )
+
+
+def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
+    """Return which frames without truth to look at, by the first variant."""
+    rows = frames.rows()
+    if not len(rows):
+        return None
+    first = str(rows["variant"][0])
+    own = rows.of_variant(first)
+    sign, look_at = sign_of(rows, first), []
+    if sign is not None:
+        apart = scene_ns(own["stamp_ns"])
+        look_at = worst(rows, first, LOOKED_AT, apart, by=sign)["frame"].tolist()
+    differing: defaultdict[str, dict[str, float]] = defaultdict(dict)
+    for (one, other), share in frames.differing().items():
+        differing[one][other] = share
+    return UnlabelledFacts(len(own), first, sign, look_at, dict(differing))
 
 
 def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, float]]]:
@@ -183,7 +216,7 @@ def warnings(run: Run) -> tuple[str, ...]:
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
     return (
-        *((unlabelled,) if missing else ()),
+        *((unlabelled, *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
         *run.frames.oddities,
         *tuple(warned),
@@ -193,6 +226,16 @@ def warnings(run: Run) -> tuple[str, ...]:
         *_constant(run),
         *run.model.warnings,
     )
+
+
+def _most_doubtful(run: Run) -> Iterator[str]:
+    """Yield by what ``worst:K`` ranked the frames of a log without truth."""
+    rule, found = run.config.output.record, _unlabelled(run.board.unlabelled)
+    if rule.startswith("worst:") and found:
+        kept = f"kept the frames that are most in doubt, by {found.sign} of {found.variant}"
+        if found.sign not in RANKS_AT_ONCE:
+            kept = "kept no pictures: one method alone says nothing by which a frame could rank"
+        yield f"without truth `output.record` {rule} {kept}"
 
 
 def _tuned(run: Run) -> Iterator[str]:

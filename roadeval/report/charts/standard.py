@@ -123,7 +123,7 @@ def _along(
     drawn = drawn or looks(names)
     return [
         Chart(
-            f"{rate}: {METRICS[rate].in_words}",
+            f"{rate}: {score.SIGNS[rate] if rate in score.SIGNS else METRICS[rate].in_words}",
             ChartKind.LINES,
             [
                 thinned(series(name, look, own["x"], 100 * own[rate]))
@@ -131,7 +131,7 @@ def _along(
                 if name in names
                 for own in [rows.of_variant(name)]
             ],
-            from_zero=not METRICS[rate].higher_is_better,
+            from_zero=rate in score.SIGNS or not METRICS[rate].higher_is_better,
         )
         for rate in rates
     ]

@@ -14,6 +14,7 @@ from roadeval.data import BASELINE, ERRORS
 from roadeval.data.arrays import FN, FP
 from roadeval.data.words import defined, in_percent, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score import SIGNS
 from roadeval.report.blocks import (
     CELLS,
     Block,
@@ -49,7 +50,13 @@ NO_COMMAND: Final = (
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, then those that the filter changed most."""
-    first = next(iter(findings.finals))
+    first = next(iter(findings.finals), None)
+    if first is None:
+        if (found := findings.facts.unlabelled) and found.sign:
+            rule = f"Highest {found.sign} of {found.variant}: {SIGNS[found.sign]}. One a scene."
+            head = [Heading("Frames to look at"), Text(f"{rule} No error rate is known.", "note")]
+            yield from _frames(findings, head, findings.worst)
+        return
     if not findings.worst:
         yield Heading("The worst frames")
         yield Text(f"ERR of {first} is undefined on every frame, so no frame is the worst.")
@@ -84,8 +91,12 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     elif notes := _notes(frame):
         facts[-len(notes) :] = [" ".join(notes)]
     sentences = [Text(sentence, "note") for sentence in (stamp, *facts)]
-    rates = rates_of(frame, [*findings.finals])
-    yield TwoColumns([Text(f"Frame {frame.frame}", "title"), *sentences], [rates], 0.55)
+    title = Text(f"Frame {frame.frame}", "title")
+    if frame.rates:
+        rates = rates_of(frame, [*findings.finals])
+        yield TwoColumns([title, *sentences], [rates], 0.55)
+    else:
+        yield from (title, *sentences)
     if frame.images:
         pictures = [(image.title, jpeg(image, LARGE)) for image in frame.images]
         lines = -(-len(pictures) // MOST)
@@ -136,7 +147,7 @@ class FrameRow:
     stamp_ns: int
     """Which."""
     rates: Mapping[str, Mapping[str, float]]
-    """Of each variant's final mask, as short tables show them; none without truth."""
+    """Of each variant's final mask, as short tables show them; without truth its doubts."""
     conditions: Sequence[str] = ()
     """Its conditions in words, as ``much shadow``."""
     notes: Sequence[str] = ()
@@ -144,9 +155,9 @@ class FrameRow:
 
     @property
     def error(self) -> float:
-        """The ERR of the first variant; below 0 where it is undefined."""
-        error = next(iter(self.rates.values()), {}).get("ERR")
-        return error if defined(error) else -1.0
+        """The ERR of the first variant, or its first doubt; below 0 where none is defined."""
+        rates = next(iter(self.rates.values()), {})
+        return next((rates[by] for by in ("ERR", *SIGNS) if defined(rates.get(by))), -1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +167,7 @@ class FrameBrowser(Block):
     rows: Sequence[FrameRow]
     """The frames of the drive, in order."""
     variants: Sequence[str]
-    """Those that were scored."""
+    """Those that were scored, or without truth are in doubt."""
     charts: Sequence[Chart]
     """Rates along the drive."""
     inspect: Callable[[int], str] | None = None
@@ -169,6 +180,8 @@ class FrameBrowser(Block):
     """Names of the pictures of final masks, which are compared where there is no truth."""
     left_out: Sequence[str] = ()
     """Variants whose layers had no room."""
+    titles: Sequence[str] = tuple(SHORT)
+    """What each variant has a column of."""
 
     @property
     def pictured(self) -> frozenset[int]:
@@ -187,7 +200,7 @@ class FrameBrowser(Block):
     @property
     def rates(self) -> list[str]:
         """Titles of groups of columns, each of which has a column a variant."""
-        return [*SHORT] if self.variants else []
+        return [*self.titles] if self.variants else []
 
     def cells(self, row: FrameRow) -> Iterator[str]:
         """Yield a frame's seconds from the first one, and a number for each column of rates."""
@@ -211,7 +224,8 @@ class FrameBrowser(Block):
     @property
     def compared(self) -> tuple[str, str]:
         """The pictures that are laid over each other: errors of two variants, or their masks."""
-        errors = [f"{name}: errors" for name in self.variants if name != BASELINE]
+        scored = self.variants if "ERR" in self.titles else ()
+        errors = [f"{name}: errors" for name in scored if name != BASELINE]
         first, *others = errors or [*self.masks] or ["camera"]
         return first, next(iter(others), "camera")
 
@@ -226,7 +240,8 @@ class FrameBrowser(Block):
         told, of = [], number(len(self.rows))
         if (shown := len(self.shown)) < len(self.rows):
             told.append(
-                f"The {number(shown)} of {of} frames with the highest ERR; frames.csv has them all."
+                f"The {number(shown)} of {of} frames with the highest {next(iter(self.titles))}; "
+                f"{'frames' if 'ERR' in self.titles else 'unlabelled'}.csv has them all."
             )
         if self.variants:
             told.append("Percent.")

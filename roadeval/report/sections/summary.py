@@ -77,8 +77,10 @@ def _next(findings: Findings) -> Iterator[LinkList]:
     """Yield what to look at first: the worst frame, and the command that opens it."""
     if findings.worst:
         frame = findings.worst[0]
-        wrong = percent(frame.rates[frame.variant]["ERR"], 1)
-        title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
+        title = f"First frame to look at: {frame.frame}"
+        if frame.rates:
+            wrong = percent(frame.rates[frame.variant]["ERR"], 1)
+            title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
         command = findings.commands.inspect(frame.frame) if findings.commands else ""
         links = [(title, f"#frame-{frame.frame}")]
         yield LinkList(links, command if findings.viewable else "")

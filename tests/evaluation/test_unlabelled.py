@@ -1,0 +1,99 @@
+"""What is known of frames without truth: entropy, disagreement, flicker; and the rank by them."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from roadeval.data import Output, Packed, Role, StageResult, VariantResult
+from roadeval.evaluation import score
+from roadeval.evaluation.score import Scoreboard, sign_of
+from roadeval.evaluation.score.unlabelled import Unlabelled, doubts_of, entropy
+from roadeval.evaluation.settings import EvaluationSettings
+from tests.evaluation.making import a_frame, pixels
+
+
+def variant(name, mask, codes=None):
+    output = Output(mask=Packed.of(mask), probability=codes)
+    return VariantResult(name, (StageResult("post", output, 0.0),))
+
+
+def a_board(*names):
+    return Scoreboard(EvaluationSettings(), names, None)
+
+
+def seen(board, number, *variants, truth=None):
+    """Score and add a frame; return its doubts."""
+    frame = a_frame(truth, number=number)
+    role = Role.UNLABELLED if truth is None else Role.EVALUATED
+    return board.add(board.score(frame, role, variants))
+
+
+def test_entropy_is_scipy_s_on_every_fourth_pixel():
+    codes = np.random.default_rng(0).integers(0, 65536, (64, 96)).astype(np.uint16)
+    p = codes[::4, ::4].ravel() / 65535
+    assert entropy(codes) == pytest.approx(stats.entropy([p, 1 - p], base=2).mean(), abs=1e-6)
+
+
+def test_a_sure_mask_has_no_entropy_and_a_coin_toss_a_bit():
+    assert entropy(np.array([[0, 65535]], np.uint16)) == 0
+    assert entropy(np.full((8, 8), 32768, np.uint16)) == pytest.approx(1)
+
+
+def test_disagreement_is_the_mean_share_of_differing_pixels_over_the_others():
+    a, b, c = pixels("##.."), pixels("#..."), pixels("....")
+    first, second, third = doubts_of([variant("a", a), variant("b", b), variant("c", c)])
+    assert first.differs == {"b": 0.25, "c": 0.5}
+    assert [e.disagreement for e in (first, second, third)] == [0.375, 0.25, 0.375]
+    assert np.isnan([first.entropy, doubts_of([variant("a", a)])[0].disagreement]).all()
+
+
+def test_flicker_counts_pixels_that_change_and_begins_anew_after_a_gap():
+    board = a_board("a")
+    flicker = [
+        seen(board, 0, variant("a", pixels("##.."))),
+        seen(board, 1, variant("a", pixels("#.#."))),
+    ]
+    board.lose()
+    flicker += [seen(board, 3, variant("a", pixels("....")))]
+    seen(board, 4, variant("a", pixels("....")), truth=pixels("...."))
+    flicker += [seen(board, 5, variant("a", pixels("####")))]
+    found = [own[0].flicker for own in flicker]
+    assert found == pytest.approx([np.nan, 0.5, np.nan, np.nan], nan_ok=True)
+
+
+def test_frames_with_truth_and_training_frames_have_no_doubt():
+    board = a_board("a")
+    assert seen(board, 0, variant("a", pixels("#...")), truth=pixels("#...")) == ()
+    found = board.score(a_frame(None, number=1), Role.TRAINING, (variant("a", pixels("#...")),))
+    assert found.doubts == ()
+
+
+def test_rows_are_by_variant_and_pairs_are_counted_once():
+    board = a_board("a", "b")
+    seen(board, 0, variant("a", pixels("##..")), variant("b", pixels("#...")))
+    seen(board, 1, variant("a", pixels("##..")), variant("b", pixels("....")))
+    rows = board.unlabelled.rows()
+    assert rows["variant"].tolist() == ["a", "a", "b", "b"]
+    assert rows["frame"].tolist() == [0, 1, 0, 1]
+    assert rows["disagreement"].tolist() == [0.25, 0.5, 0.25, 0.5]
+    assert board.unlabelled.differing() == {("a", "b"): 0.375}
+
+
+def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
+    board = a_board("sure", "plain")
+    codes = np.full((1, 4), 20000, np.uint16)
+    for number in range(2):
+        seen(
+            board, number, variant("sure", pixels("#..."), codes), variant("plain", pixels("...."))
+        )
+    rows = board.unlabelled.rows()
+    assert (sign_of(rows, "sure"), sign_of(rows, "plain")) == ("entropy", "disagreement")
+    assert sign_of(Unlabelled().rows(), "nobody") is None
+
+
+def test_the_rank_is_that_of_the_worst_frames_by_another_column():
+    board = a_board("a")
+    for number, level in enumerate([0, 30000, 10000]):
+        seen(board, number, variant("a", pixels("#..."), np.full((1, 4), level, np.uint16)))
+    rows = board.unlabelled.rows()
+    assert score.worst(rows, "a", 3, 0, by="entropy")["frame"].tolist() == [1, 2, 0]
