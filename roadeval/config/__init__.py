@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from roadeval.config.variants import (
         AS_IT_IS,
         PRESETS,
-        TUNED,
         Variant,
         check_variant_name,
         network_variant,

@@ -18,6 +18,7 @@ from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
     RESERVED,
+    TUNED,
     UNFILTERED,
     VariantLayout,
     is_plain,
@@ -251,8 +252,6 @@ def thresholded(name: str) -> Variant:
 
 TRAINED: Final = "trained"
 """The value of ``decide`` with which the training frames choose the threshold."""
-TUNED: Final = "_tuned"
-"""Ends the name of a tuned variant."""
 
 
 def tuned_variant(name: str, method: Pipeline | None) -> Variant:

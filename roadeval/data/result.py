@@ -19,6 +19,8 @@ from roadeval.data.layer import Layer, LayerSpec
 CAMERA: Final = "camera"
 FILTERED: Final = "filtered"
 UNFILTERED: Final = "unfiltered"
+TUNED: Final = "_tuned"
+"""Ends the name of a tuned variant; before it stands that of its method."""
 """The names of the two variants that come by default: with the chain's filters, and without."""
 BASELINE: Final = "blind"
 """The variant name of the baseline that never looks at the image."""

@@ -17,7 +17,7 @@ from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Calibration
+from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
 from roadeval.evaluation.score import Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
@@ -207,6 +207,8 @@ class Facts(_Document):
     against_unfiltered: Differences = field(default_factory=dict)
     against_blind: Differences = field(default_factory=dict)
     """Each other variant's final mask minus that of ``unfiltered`` or ``blind``, by variant."""
+    against_method: Differences = field(default_factory=dict)
+    """Each tuned variant's minus that of the method that was tuned, by variant."""
     seeds: dict[str, Any] = field(default_factory=dict)
     """The rates with each further seed of the training; empty with one."""
     oracles: dict[str, Totals] = field(default_factory=dict)
@@ -247,12 +249,13 @@ class Facts(_Document):
     VALUES = 200_000  # a run with two variants writes some two thousand
     RESULTS = (
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
-        *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims"),
-        *("health", "warnings", "losses", "settings", "methods", "cameras", "unlabelled"),
+        *("against_unfiltered", "against_blind", "against_method", "seeds", "oracles"),
+        *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
+        *("cameras", "unlabelled"),
     )
     OPTIONAL = (
-        *("curves", "thresholds", "seeds", "methods", "masks", "files", "cameras"),
-        "unlabelled",
+        *("against_method", "curves", "thresholds", "seeds", "methods", "masks", "files"),
+        *("cameras", "unlabelled"),
     )
 
     @cached_property
@@ -273,6 +276,9 @@ class Facts(_Document):
                 Effect(base, finals[base], name, finals[name], final=True, rates=rates)
                 for name, rates in own.items()
             ]
+        for name, rates in self.against_method.items():
+            base = name.removesuffix(TUNED)
+            found.append(Effect(base, finals[base], name, finals[name], final=True, rates=rates))
         return found
 
     @property
@@ -284,11 +290,13 @@ class Facts(_Document):
 def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
     """Return a drive's differences as the parts of `Facts` that hold them."""
     parts: dict[str, Differences] = {
-        part: {} for part in ("difference", "against_unfiltered", "against_blind")
+        part: {} for part in ("difference", "against_unfiltered", "against_blind", "against_method")
     }
     for each in effects:
         if each.base == BASELINE:
             parts["against_blind"][each.variant] = dict(each.rates)
+        elif each.variant == each.base + TUNED:
+            parts["against_method"][each.variant] = dict(each.rates)
         elif each.variant == FILTERED:
             parts["difference"][each.stage] = dict(each.rates)
         else:

@@ -10,7 +10,7 @@ from operator import itemgetter
 from statistics import median
 from typing import Any, Final
 
-from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED, Tally
+from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, TUNED, UNFILTERED, Tally
 from roadeval.data.words import (
     counted,
     defined,
@@ -258,7 +258,8 @@ def verdict(
     """Return the verdict on a drive or a fleet, a few sentences.
 
     Which variant is best, and whether it beats the baseline; what another threshold would bring to
-    a method; what the filter changes; and which step adds most to the filtered variant's errors.
+    a method; what tuning and the filter change; and which step adds most to the filtered
+    variant's errors.
     ``totals`` are by variant and stage, empty where nothing was scored; ``effects`` are of final
     masks at least; ``claims`` says in how many windows of a drive each claim of the paper holds,
     ``thresholds`` what other thresholds would bring on it, see `at_thresholds`. Where nothing was
@@ -275,6 +276,10 @@ def verdict(
     against = finals.get((BASELINE, best))
     blind = None if against is None else against.rates[TESTED]
     parts = [_best(best, rates, blind, settings), *at_thresholds(thresholds or {}, rates)]
+    for base, variant in (pair for pair in finals if pair[1] == pair[0] + TUNED):
+        found = finals[base, variant].rates[TESTED]
+        ends, rate = levels(found, rates[base], rates[variant]), f"{TESTED} of {stages[variant]}"
+        parts.append(sentence(found, f"tuning {base}", rate, settings, levels=ends))
     of_filter = finals.get((UNFILTERED, FILTERED))
     if of_filter is not None and of_filter.rates[TESTED].units:
         found = of_filter.rates[TESTED]

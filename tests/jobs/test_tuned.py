@@ -109,6 +109,16 @@ def test_it_says_where_it_has_learnt(once):
     )
 
 
+def test_the_verdict_says_what_tuning_brings_to_its_method(once):
+    outcome, rows = once
+    change = outcome.summary["against_method"]["mine_tuned"]["ERR"]
+    assert {*outcome.summary["against_method"]} == {"mine_tuned"}
+    assert change["mean"] == pytest.approx(err(rows, "mine_tuned") - err(rows, "mine"))
+    assert change["high"] < 0
+    assert change["comparisons"] == 1
+    assert "frames tuning mine lowers ERR of post" in outcome.summary["verdict"]
+
+
 def shares(number):
     return picture(number)[0][..., 0].astype(np.float32) / 255
 

@@ -13,7 +13,7 @@ from roadeval.results.tables import ResultsError
 from tests.evaluation.test_effects import a_mask, effects_of
 from tests.results.making import facts_of
 
-NAMES = ("filtered", "unfiltered", "net", "blind")
+NAMES = ("filtered", "unfiltered", "net", "net_tuned", "blind")
 TOTALS = {name: {"post": {"ERR": 0.1, "frames": 100}} for name in NAMES}
 EFFECTS = effects_of([a_mask(n, "post", [3] * 12) for n in NAMES])
 WRITTEN = facts_of(
@@ -44,8 +44,9 @@ def test_differences_are_written_by_their_base():
     parts = as_parts(EFFECTS)
     assert {name: [*part] for name, part in parts.items()} == {
         "difference": ["post"],
-        "against_unfiltered": ["net"],
-        "against_blind": ["filtered", "unfiltered", "net"],
+        "against_unfiltered": ["net", "net_tuned"],
+        "against_blind": ["filtered", "unfiltered", "net", "net_tuned"],
+        "against_method": ["net_tuned"],
     }
 
 

@@ -1,6 +1,7 @@
 """The scoreboard of a drive: frames are scored one by one, added in order and summed up.
 
-Its differences are every variant minus ``unfiltered`` and minus ``blind``. The paper gives no
+Its differences are every variant minus ``unfiltered`` and minus ``blind``, and what was tuned minus
+its method. The paper gives no
 number for figures 3a and 3b, and their curves are lost. What is left are claims that one mask is
 wrong less often than another; each window of ten frames bears one out or does not.
 """
@@ -22,6 +23,7 @@ from roadeval.data import (
     BASELINE,
     FILTERED,
     FINAL_STAGE,
+    TUNED,
     UNFILTERED,
     Change,
     Doubt,
@@ -62,7 +64,7 @@ class Effect:
     """The paired differences of two masks of a drive, on the frames that both have."""
 
     base: str
-    """The variant that is subtracted, one of `BASES`."""
+    """The variant that is subtracted: one of `BASES`, or the method that was tuned."""
     base_stage: str
     variant: str
     stage: str
@@ -77,11 +79,12 @@ def drive_effects(cameras: Sequence[CameraMasks], settings: EvaluationSettings) 
     masks = [{(mask.variant, mask.stage): mask for mask in each.masks} for each in cameras]
     by_name = dict.fromkeys(name for own in masks for name in own)
     finals = final_stages(by_name)
+    tuned = {name.removesuffix(TUNED): name for name in finals if name.endswith(TUNED)}
     found = []
-    for base in (base for base in BASES if base in finals):
+    for base in (base for base in (*BASES, *tuned) if base in finals):
         family = []
         for variant, last in finals.items():
-            if variant in (base, BASELINE):
+            if variant in (base, BASELINE) or variant != tuned.get(base, variant):
                 continue
             for stage in (stage for name, stage in by_name if name == variant):
                 final = stage == last

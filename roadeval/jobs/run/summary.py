@@ -9,8 +9,8 @@ from dataclasses import asdict, replace
 from importlib.metadata import version
 from typing import Any, Final
 
-from roadeval.config import AS_IT_IS, TUNED
-from roadeval.data import BASELINE, FINAL_STAGE, Role
+from roadeval.config import AS_IT_IS
+from roadeval.data import BASELINE, FINAL_STAGE, TUNED, Role
 from roadeval.evaluation.score import (
     Scoreboard,
     Unlabelled,
