@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data.arrays import Packed, TruthBits
+from roadeval.data.arrays import Packed, Sums, TruthBits
 from roadeval.data.frame import Frame, Histogram, Mask, Probability, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
 
@@ -111,6 +111,8 @@ class Change:
         )
 
 
+Contour = tuple[float, float, Sums]
+"""A final mask's boundary F and boundary IoU, NaN where undefined, and its trimap, ``(w, 2)``."""
 Transition = tuple[str, str, str, str]
 """From one mask to another: variant and stage before, variant and stage after."""
 
@@ -226,8 +228,8 @@ class FrameResult:
 
     ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
     against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
-    the boundary F of each final mask by variant, ``histograms`` the labelled pixels by how probable
-    road is, for each variant and stage that says so, and ``oracles`` the counts of what the stages
+    those of the final masks by variant, ``histograms`` the labelled pixels by how probable road is,
+    for each variant and stage that says so, and ``oracles`` the counts of what the stages
     made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
     their seed. ``notes`` are sentences for a person. ``doubts`` has each variant's, without truth.
     """
@@ -241,7 +243,7 @@ class FrameResult:
     notes: tuple[str, ...] = ()
     truth_bits: TruthBits | None = None
     changes: Mapping[Transition, Change] = field(default_factory=dict)
-    contours: Mapping[str, float] = field(default_factory=dict)
+    contours: Mapping[str, Contour] = field(default_factory=dict)
     histograms: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
     repeats: Mapping[int, tuple[Tally, ...]] = field(default_factory=dict)

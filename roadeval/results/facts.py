@@ -195,7 +195,7 @@ class Facts(_Document):
     totals: Totals
     """Empty where nothing was scored."""
     beyond: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Boundary F and flicker of each final mask."""
+    """Of each final mask: how well it follows the edge, how much it flickers, error episodes."""
     curves: Totals = field(default_factory=dict)
     """Over all thresholds, by variant and stage that says how probable road is."""
     thresholds: dict[str, dict[str, float]] = field(default_factory=dict)

@@ -205,6 +205,9 @@ def score_rows(
             mask = {"variant": variant, "stage": stage, "final": final}
             further = {
                 "boundary_f": beyond.get("boundary_F"),
+                "boundary_iou": beyond.get("boundary_IoU"),
+                "episodes": beyond.get("episodes", {}).get("episodes"),
+                "episode_seconds": beyond.get("episodes", {}).get("seconds"),
                 "flicker": beyond.get("flicker"),
                 "truth_flicker": beyond.get("truth_flicker"),
             }

@@ -1,15 +1,19 @@
-"""Boundary F of a mask, and what a drive's masks do from frame to frame."""
+"""How well masks follow the edge of the road, and what they do from frame to frame."""
 
 import math
 
+import cv2
 import numpy as np
 import pytest
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_cdt, distance_transform_edt
+from skimage.segmentation import find_boundaries
 
-from roadeval.data import IGNORE, FrameResult, Role, TruthBits, pack
+from roadeval.data import IGNORE, FrameResult, Role, TruthBits, ones, pack
 from roadeval.evaluation import score
 from roadeval.evaluation.region import disk
+from roadeval.evaluation.regions.standard import boundary
 from roadeval.evaluation.score import EdgesAndFlicker
+from roadeval.evaluation.score.counts import TRIMAP, boundary_iou, trimap
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 
 TRUTH = pixels("##..", "##.?")
@@ -96,13 +100,160 @@ def test_equals_distance_transforms(width):
     assert found == pytest.approx(plain(mask, truth, width), rel=1e-12)
 
 
+# --- Boundary IoU
+
+
+def rims_overlap(mask, truth):
+    return boundary_iou({"net": pack(mask)}, TruthBits.of(truth))["net"]
+
+
+def wavy(seed, shape=(120, 160), ignored=True):
+    """A truth and a mask, each with a wavy upper edge and some noise."""
+    draw = np.random.default_rng(seed)
+    rows, columns = np.arange(shape[0])[:, None], np.arange(shape[1])
+    truth, mask = (
+        (rows > shape[0] / 3 + draw.uniform(3, 9) * np.sin(columns / draw.uniform(6, 12))).astype(
+            np.uint8
+        )
+        for _ in range(2)
+    )
+    mask[draw.random(shape) < 0.003] ^= 1
+    if ignored:
+        truth[draw.random(shape) < 0.05] = IGNORE
+        truth[60:90, 40:70] = IGNORE
+    return truth, mask
+
+
+def authors_rim(mask, dilation_ratio=0.02):
+    """The band of a mask as the authors of boundary IoU compute it."""
+    height, width = mask.shape
+    steps = max(1, round(dilation_ratio * np.sqrt(height**2 + width**2)))
+    padded = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    kept = cv2.erode(padded, np.ones((3, 3), np.uint8), iterations=steps)
+    return (mask - kept[1:-1, 1:-1]).astype(bool)
+
+
+@pytest.mark.parametrize("shape", [(120, 160), (97, 65), (480, 640), (3, 200)])
+def test_boundary_iou_is_the_authors_own_where_everything_is_labelled(shape):
+    truth, mask = wavy(7, shape, ignored=False)
+    ours, theirs = authors_rim(mask), authors_rim(truth)
+    expected = (ours & theirs).sum() / (ours | theirs).sum()
+    assert 0 < expected < 1
+    assert rims_overlap(mask, truth) == expected
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_boundary_iou_with_ignored_pixels_equals_distance_transforms(seed):
+    truth, mask = wavy(seed)
+    labelled, width = truth != IGNORE, 4  # 2 % of the diagonal of 200 pixels
+
+    def rim(road):
+        not_road = np.pad(labelled & ~road, 1, constant_values=True)
+        far = distance_transform_cdt(~not_road, "chessboard")[1:-1, 1:-1]
+        return labelled & road & (far <= width)
+
+    ours, theirs = rim(mask == 1), rim(truth == 1)
+    expected = (ours & theirs).sum() / (ours | theirs).sum()
+    assert rims_overlap(mask, truth) == expected
+
+
+def test_boundary_iou_of_small_masks_equals_a_plain_loop():
+    draw, defined = np.random.default_rng(0), 0
+    for _ in range(300):
+        values = draw.choice([[0, 1, IGNORE], [0, 0, IGNORE], [0, 1, 1]])
+        truth = draw.choice(np.array(values, np.uint8), (8, 8))
+        mask = draw.integers(0, 2, (8, 8), np.uint8)
+        both = either = 0
+        for pixel in np.ndindex(8, 8):
+            own = [in_rim(labels, truth, *pixel) for labels in (mask, truth)]
+            both, either = both + all(own), either + any(own)
+        found = rims_overlap(mask, truth)
+        assert found == both / either if either else math.isnan(found)
+        defined += either > 0
+    assert defined > 200
+
+
+def in_rim(labels, truth, row, column):
+    """Whether a pixel is labelled road, and beside it is non-road or the end of the image."""
+    if truth[row, column] == IGNORE or labels[row, column] != 1:
+        return False
+    around = [(row + y, column + x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
+    if any(not (0 <= y < 8 and 0 <= x < 8) for y, x in around):
+        return True
+    return any(truth[place] != IGNORE and labels[place] == 0 for place in around)
+
+
+def test_boundary_iou_is_undefined_without_road():
+    truth = pixels("..?.", "....")
+    assert math.isnan(rims_overlap(pixels("..#.", "...."), truth))
+    assert rims_overlap(pixels("#...", "...."), truth) == 0
+
+
+def test_an_edge_is_scikit_images_inner_boundary():
+    truth, _ = wavy(3, ignored=False)
+    inner = find_boundaries(truth, connectivity=2, mode="inner", background=0)
+    assert inner.any()
+    np.testing.assert_array_equal(edge_of(truth), inner)
+
+
+# --- Trimap
+
+
+def near_edge(mask, truth, widths=TRIMAP):
+    return trimap([pack(mask)], TruthBits.of(truth), widths)[0].tolist()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_trimap_equals_distance_transforms(seed):
+    truth, mask = wavy(seed)
+    to_road, to_other = (distance_transform_cdt(truth != value, "chessboard") for value in (1, 0))
+    expected = []
+    for width in TRIMAP:
+        near = (to_road <= width) & (to_other <= width) & (truth != IGNORE)
+        expected.append([int((near & (mask != truth)).sum()), int(near.sum())])
+    assert expected[0][0] > 0
+    assert near_edge(mask, truth) == expected
+
+
+def test_the_trimap_of_small_masks_equals_a_plain_loop():
+    draw = np.random.default_rng(1)
+    for _ in range(100):
+        truth = draw.choice(np.array([0, 1, IGNORE], np.uint8), (8, 8), p=[0.2, 0.1, 0.7])
+        mask = draw.integers(0, 2, (8, 8), np.uint8)
+        expected = []
+        for width in (1, 3, 4):
+            wrong = labelled = 0
+            for row, column in np.ndindex(8, 8):
+                top, left = max(row - width, 0), max(column - width, 0)
+                around = truth[top : row + width + 1, left : column + width + 1]
+                if truth[row, column] != IGNORE and {0, 1} <= set(around.ravel().tolist()):
+                    labelled += 1
+                    wrong += mask[row, column] != truth[row, column]
+            expected.append([wrong, labelled])
+        assert near_edge(mask, truth, (1, 3, 4)) == expected
+
+
+def test_a_width_of_the_trimap_is_the_region_of_that_width():
+    truth, mask = wavy(5)
+    packed = TruthBits.of(truth)
+    region, wrong = boundary(packed, 8) & packed.labelled, pack(mask) ^ packed.road
+    assert near_edge(mask, truth)[TRIMAP.index(8)] == [ones(wrong & region), ones(region)]
+
+
+def test_a_truth_without_an_edge_has_no_pixel_near_it():
+    assert near_edge(pixels("##", ".#"), pixels("##", "##")) == [[0, 0]] * len(TRIMAP)
+
+
 # --- Over a drive
 
 
 def shown(truth, mask, score=1.0, role=Role.EVALUATED):
     variant = a_variant("net", {"svm": 1 - truth % 2, "post": mask})
     bits = TruthBits.of(truth)
-    return FrameResult(a_frame(truth), role, (variant,), truth_bits=bits, contours={"net": score})
+    contour = score, score / 2, np.tile([3, 10], (len(TRIMAP), 1))
+    return FrameResult(
+        *(a_frame(truth), role, (variant,)), truth_bits=bits, contours={"net": contour}
+    )
 
 
 def told(*results):
@@ -164,6 +315,12 @@ def test_boundary_f_is_averaged_over_the_frames_that_have_one():
     found = told(*(shown(TRUTH, TRUTH % 2, score) for score in (0.5, float("nan"), 1.0)))
     assert found["boundary_F"] == pytest.approx(0.75)
     assert (found["frames"], found["width"], found["pairs"]) == (2, 5, 2)
+    assert found["boundary_IoU"] == pytest.approx(0.375)
+
+
+def test_each_width_of_the_trimap_sums_up_the_pixels_of_all_frames():
+    found = told(*(shown(TRUTH, TRUTH % 2, score) for score in (0.5, float("nan"))))
+    assert found["trimap"] == {str(width): [6, 20] for width in TRIMAP}
 
 
 @pytest.mark.parametrize("role", [Role.TRAINING, Role.GAP, Role.UNLABELLED])

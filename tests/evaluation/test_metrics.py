@@ -38,7 +38,7 @@ def test_the_papers_six_by_hand() -> None:
 
 def test_the_columns_keep_the_papers_order() -> None:
     assert list(METRICS) == ["ACC", "ERR", "TPR", "FNR", "TNR", "FPR"]
-    assert list(OVERLAP) == ["IoU", "F1", "precision"]
+    assert list(OVERLAP) == ["IoU", "mIoU", "F1", "precision"]
 
 
 def test_people_read_errors_first_and_no_metric_beside_its_mirror_but_accuracy() -> None:
@@ -110,6 +110,7 @@ def test_rates_equal_scikit_learns(tp: int, tn: int, fp: int, fn: int) -> None:
         "TNR": theirs.recall_score(truth, mask, pos_label=0),
         "FPR": 1 - theirs.recall_score(truth, mask, pos_label=0),
         "IoU": theirs.jaccard_score(truth, mask),
+        "mIoU": theirs.jaccard_score(truth, mask, average="macro"),
         "F1": theirs.f1_score(truth, mask),
         "precision": theirs.precision_score(truth, mask),
     }

@@ -6,10 +6,8 @@ from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.facts import DriveFacts, FrameAccount
-from tests.report.making import VARIANTS, some_findings
+from tests.report.making import OVERLAP, VARIANTS, some_findings
 from tests.report.sections.test_thresholds import findings as thresholded
-
-OVERLAP = {"F1": 0.81, "precision": 0.82, "IoU": 0.7}
 
 
 def sections(findings):

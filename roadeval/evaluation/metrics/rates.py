@@ -1,6 +1,7 @@
-"""The rates of a mask: the paper's six (Eq. 24-29), and three of today (IoU, F1, precision).
+"""The rates of a mask: the paper's six (Eq. 24-29), and four of today (IoU, mIoU, F1, precision).
 
-IoU is Jaccard's index of mask and truth [1]_; F1 the harmonic mean of precision and TPR [2]_ [3]_.
+IoU is Jaccard's index of mask and truth [1]_, mIoU its mean over road and non-road; F1 the
+harmonic mean of precision and TPR [2]_ [3]_.
 
 References
 ----------
@@ -87,12 +88,22 @@ METRICS: Final = (
         tabled=False,
     ),
     Metric(
+        name="mIoU",
+        title="mean IoU of road and non-road",
+        formula="(TP / (TP + FP + FN) + TN / (TN + FP + FN)) / 2",
+        function=lambda c: (ratio(c.tp, c.tp + c.fp + c.fn) + ratio(c.tn, c.tn + c.fp + c.fn)) / 2,
+        higher_is_better=True,
+        order=102,
+        shown=Shown.IN_FULL,
+        tabled=False,
+    ),
+    Metric(
         name="F1",
         title="F1",
         formula="2 TP / (2 TP + FP + FN)",
         function=lambda c: ratio(2 * c.tp, 2 * c.tp + c.fp + c.fn),
         higher_is_better=True,
-        order=102,
+        order=103,
         shown=Shown.IN_FULL,
         tabled=False,
     ),
@@ -102,7 +113,7 @@ METRICS: Final = (
         formula="TP / (TP + FP)",
         function=lambda c: ratio(c.tp, c.tp + c.fp),
         higher_is_better=True,
-        order=103,
+        order=104,
         shown=Shown.IN_FULL,
         tabled=False,
     ),

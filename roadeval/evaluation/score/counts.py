@@ -1,4 +1,4 @@
-"""Pixels by outcome (section 5), counted and summed over frames; boundary F and flicker."""
+"""Pixels by outcome (section 5), counted and summed over frames; edges, flicker and episodes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import math
 from array import array
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
+from itertools import zip_longest
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from roadeval.data import (
     ERRORS,
     FINAL_STAGE,
     OUTCOMES,
+    Contour,
     Counts,
     FrameResult,
     Layer,
@@ -240,13 +242,51 @@ def cut(mask: FrameCounts, frame_numbers: Sequence[int], size: int) -> Iterator[
         )
 
 
+def episodes(stamps: Sums, errors: Floats, limit: float) -> dict[str, Any]:
+    """Return for how long a drive's ERR was at or above a limit, and when it recovered.
+
+    ``stamps`` are ``(n,)`` nanoseconds of evaluated frames, ``errors`` their ERR; one that is NaN
+    says nothing. An episode lasts from its first frame to the first one below the limit, where it
+    has ``recovered``. Where the drive's end or a gap comes before, of more than a second and three
+    usual steps, it has not, and lasts to its last frame. Times are in seconds, those of gaps in
+    none; ``share`` is of the drive, ``recovery`` the median of the episodes that recovered.
+    """
+    known = np.flatnonzero(~np.isnan(errors))
+    known = known[np.argsort(stamps[known], kind="stable")]
+    steps = np.diff(stamps[known])
+    gap = max(1_000_000_000, 3 * np.median(steps)) if len(steps) else 0
+    lasting, times, recovered = False, [0.0] * 0, [0.0] * 0
+    for error, step in zip_longest(errors[known].tolist(), steps.tolist(), fillvalue=math.inf):
+        if error >= limit and not lasting:
+            times.append(0)
+        elif error < limit and lasting:
+            recovered.append(times[-1])
+        lasting = error >= limit and step <= gap
+        if lasting:
+            times[-1] += step
+    return {
+        "limit": limit,
+        "episodes": len(times),
+        "recovered": len(recovered),
+        "seconds": sum(times) / 1e9,
+        "share": sum(times) / (int(steps[steps <= gap].sum()) or math.nan),
+        "longest": max(times, default=0) / 1e9,
+        "recovery": float(np.median(recovered)) / 1e9 if recovered else None,
+    }
+
+
+TRIMAP: Final = (1, 2, 4, 8, 16, 32)
+"""Widths around the truth's edge, in pixels, in which errors are counted."""
+
+
 @dataclass(slots=True)
 class _Sums:
     """Of one variant."""
 
-    score: float = 0.0
-    frames: int = 0
-    """Boundary F, and the frames that have it."""
+    scores: Floats = field(default_factory=lambda: np.zeros(2))
+    frames: Sums = field(default_factory=lambda: np.zeros(2, np.int64))
+    """Boundary F and boundary IoU, and the frames that have each."""
+    trimap: Sums = field(default_factory=lambda: np.zeros((len(TRIMAP), 2), np.int64))
     pairs: int = 0
     labelled: int = 0
     changed: int = 0
@@ -255,7 +295,7 @@ class _Sums:
 
 
 class EdgesAndFlicker:
-    """Sums up boundary F and flicker of every final mask.
+    """Sums up boundary F, boundary IoU, trimap and flicker of every final mask.
 
     ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
     ``L_t`` are the pixels that both truths label. ``truth_flicker`` is the truth's own: moving
@@ -279,11 +319,11 @@ class EdgesAndFlicker:
         if result.role is not Role.EVALUATED or now is None:
             self.interrupt()
             return
-        for name, score in result.contours.items():
+        for name, (*scores, counts) in result.contours.items():
             own = self._sums[name]
-            if not math.isnan(score):
-                own.score += score
-                own.frames += 1
+            own.scores += np.nan_to_num(scores)
+            own.frames += ~np.isnan(scores)
+            own.trimap += counts
         masks = {v.variant: mask for v in result.variants for _, mask in v.masks()}
         before, self._before = self._before, (now, masks)
         if before is None or before[0].shape != now.shape:
@@ -304,13 +344,16 @@ class EdgesAndFlicker:
     def totals(self) -> dict[str, dict[str, Any]]:
         """Return by variant: mean ``boundary_F`` over the ``frames`` that have it, and the flicker.
 
-        Undefined is None. The baseline, whose mask is always the same, has no flicker.
+        So too ``boundary_IoU``; ``trimap`` has the pixels of all frames. Undefined is None. The
+        baseline, whose mask is always the same, has no flicker.
         """
         return {
             name: {
-                "boundary_F": own.score / own.frames if own.frames else None,
-                "frames": own.frames,
+                "boundary_F": float(own.scores[0] / own.frames[0]) if own.frames[0] else None,
+                "frames": int(own.frames[0]),
                 "width": self._width,
+                "boundary_IoU": float(own.scores[1] / own.frames[1]) if own.frames[1] else None,
+                "trimap": dict(zip(map(str, TRIMAP), own.trimap.tolist(), strict=True)),
                 "flicker": own.changed / own.labelled if own.labelled else None,
                 "truth_flicker": own.moved / own.labelled if own.labelled else None,
                 "pairs": own.pairs,
@@ -348,6 +391,50 @@ def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[
         both = precision + recall
         scores[name] = 2 * precision * recall / both if both else 0.0
     return scores
+
+
+def boundary_iou(masks: Mapping[str, Bits], truth: TruthBits) -> dict[str, float]:
+    """Compute the boundary IoU of some masks: that of the bands of road along the two edges.
+
+    After B. Cheng et al., Boundary IoU, CVPR 2021. A band is as wide as 2 % of the diagonal, in
+    chessboard distance; as in the authors' code the image's border is an edge. Ignored pixels make
+    none, and are in no count. NaN where both bands are empty.
+    """
+    element = square(max(1, round(0.02 * math.hypot(*truth.shape))))
+
+    def band(road: Bits, other: Bits) -> Bits:
+        inside = KERNELS.erode(everywhere(truth.shape) ^ other, element, truth.shape[1])
+        return road & ~inside
+
+    true_band, labelled, scores = band(truth.road, truth.other), truth.labelled, {}
+    for name, mask in masks.items():
+        own = band(mask & labelled, labelled & ~mask)
+        union = ones(own | true_band)
+        scores[name] = ones(own & true_band) / union if union else math.nan
+    return scores
+
+
+def trimap(masks: Iterable[Bits], truth: TruthBits, widths: Sequence[int] = TRIMAP) -> Sums:
+    """Count each mask's wrong pixels, and all labelled ones, within widths of the truth's edge.
+
+    After P. Kohli et al., IJCV 82, 2009. A pixel is within a width if the square of side
+    ``2 * width + 1`` around it holds both road and non-road. ``masks`` are K of ``(H, words)``,
+    ``widths`` rise; returned are ``(K, w, 2)``.
+    """
+    road, other, near = truth.road, truth.other, []
+    for step in np.diff(widths, prepend=0).tolist():
+        # A square grown by a square is the square of both widths.
+        road, other = (grow(each, square(step), truth) for each in (road, other))
+        near.append(road & other)
+    counted = flat([*(mask ^ truth.road for mask in masks), truth.labelled])
+    counts = KERNELS.count_bits(counted, flat([truth.labelled]), flat(near))[:, 0]
+    return np.stack([counts[:-1], np.broadcast_to(counts[-1], counts[:-1].shape)], axis=2)
+
+
+def contours(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, Contour]:
+    """Compute the boundary F, with its ``width``, the boundary IoU and the trimap of some masks."""
+    scores = boundary_f(masks, truth, width).values(), boundary_iou(masks, truth).values()
+    return dict(zip(masks, zip(*scores, trimap(masks.values(), truth), strict=True), strict=True))
 
 
 def edge_of(labels: TruthBits) -> Bits:

@@ -32,7 +32,7 @@ from roadeval.data import (
 from roadeval.data.arrays import Bits, Sums
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.region import LabelledFrame
-from roadeval.evaluation.score.counts import Name, boundary_f, count, error_map
+from roadeval.evaluation.score.counts import Name, contours, count, error_map
 from roadeval.evaluation.score.thresholds import changes
 from roadeval.evaluation.score.unlabelled import doubts_of
 from roadeval.evaluation.settings import (
@@ -95,7 +95,7 @@ def score_frame(
         health={name: judge(own, blind) for name, own in finals.items()},
         truth_bits=truth,
         changes=changes(names, bits, truth),
-        contours=boundary_f(final_bits, truth, settings.boundary_width),
+        contours=contours(final_bits, truth, settings.boundary_width),
         histograms=_histograms(frame.truth, variants),
         oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
         repeats=_tallies({v.variant: v.repeats for v in variants}, truth),

@@ -44,13 +44,14 @@ from roadeval.evaluation.score.counts import (
     Total,
     Window,
     cut,
+    episodes,
     final_stages,
     sum_up,
 )
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
-from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
 from roadeval.evaluation.stats import CameraRates, Difference, holm, within_drive
 
 TESTED: Final = "ERR"
@@ -303,10 +304,13 @@ class Scoreboard:
         seconds: dict[str, dict[str, float]] = {}
         for (variant, stage), (total, runs) in self._seconds.items():
             seconds.setdefault(variant, {})[stage] = total / runs
-        curves = self.curves.totals()
+        curves, beyond, masks = self.curves.totals(), self._edges.totals(), self.masks()
+        for mask in {each.variant: each for each in masks.masks}.values():  # the final ones
+            stamps, errors = masks.stamps[mask.positions], mask.rates[:, [*METRICS].index(TESTED)]
+            beyond[mask.variant]["episodes"] = episodes(stamps, errors, DEGRADED_ERR)
         return {
             "totals": self.totals(),
-            "beyond": self._edges.totals(),
+            "beyond": beyond,
             **({"curves": curves} if curves else {}),
             "oracles": self.oracles(),
             "windows": -(-len(self._frames) // self._settings.window),

@@ -226,6 +226,16 @@ def regions(
     ]
 
 
+def trimap(found: Mapping[str, Mapping[str, Sequence[int]]]) -> Chart:
+    """Return ERR by width around the edge: ``found`` are wrong and labelled pixels, by variant."""
+    drawn = []
+    for name, look in looks([*found]).items():
+        shares = [100 * wrong / (labelled or math.nan) for wrong, labelled in found[name].values()]
+        drawn.append(series(name, look, range(len(shares)), shares))
+    names = [*next(iter(found.values()))]
+    return Chart("ERR within so many pixels of the edge", ChartKind.LINES, drawn, names)
+
+
 def heat(maps: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[HeatMap]:
     """Yield where each variant has false positives and negatives; equal shades are equal shares.
 

@@ -99,7 +99,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         columns = pair.frames["frame"], pair.frames["ERR"]
         drawn = difference(*columns, pair.treated, pair.control, change)
         yield Figure([drawn], f"ERR of {pair.treated} minus {pair.control}, frame by frame.")
-    yield from _flicker(findings)
+    yield from _over_time(findings)
 
 
 def _differences(findings: Findings) -> Table:
@@ -166,28 +166,43 @@ def pixels_changed(pair: PairedComparison) -> str:
     )
 
 
-def _flicker(findings: Findings) -> Iterator[Block]:
-    """Tabulate how much of each final mask changes from frame to frame, beside the truth's own."""
-    known = {name: each for name, each in findings.facts.beyond.items() if defined(each["flicker"])}
+def _over_time(findings: Findings) -> Iterator[Block]:
+    """Tabulate how much each final mask changes, beside the truth's own, and how long it errs."""
+    beyond = findings.facts.beyond.items()
+    known = {name: own | own["episodes"] for name, own in beyond if "episodes" in own}
     if not known:
         return
     table = Table(
-        ["final mask", "flicker, %", "the truth's own, %", "beyond it, pp", "pairs of frames"],
+        [
+            *("final mask", "flicker, %", "the truth's, %", "beyond it, pp", "pairs"),
+            *("number", "seconds", "longest", "share, %", "recovered", "median recovery"),
+        ],
         [
             [
                 variant_cell(name, [*findings.finals]),
                 Cell(percent(each["flicker"]), bold=True),
                 percent(each["truth_flicker"]),
-                points(each["flicker"] - each["truth_flicker"]),
+                points(each["flicker"] - each["truth_flicker"])
+                if defined(each["flicker"])
+                else DASH,
                 number(each["pairs"]),
+                number(each["episodes"]),
+                *(f"{each[time]:.1f}" for time in ("seconds", "longest")),
+                percent(each["share"]),
+                number(each["recovered"]),
+                f"{each['recovery']:.1f}" if each["recovered"] else DASH,
             ]
             for name, each in known.items()
         ],
+        groups=[("", 1), ("from frame to frame", 4), ("error episodes, seconds", 6)],
+        small=True,
     )
     meaning = Text(
         "Flicker: the share of pixels, labelled in both of two frames read one after the other, "
         "whose mask differs. What moves must change, as the truth does; only what goes beyond it "
-        "is unrest.",
+        "is unrest. Error episode: from a frame with an ERR of at least "
+        f"{percent(next(iter(known.values()))['limit'], 0)} % to the first one below, by header "
+        "stamps; one that the drive's end or a gap between frames cuts off has not recovered.",
         "note",
     )
     yield Details("From one frame to the next", [table, meaning])
@@ -208,7 +223,16 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
     yield Text(_regions_note(findings, names), "note")
-    if isinstance(findings, Findings) and findings.heatmaps:
+    if not isinstance(findings, Findings):
+        return
+    beyond = findings.facts.beyond.items()
+    if near := {name: own["trimap"] for name, own in beyond if "trimap" in own}:
+        yield Figure(
+            [charts.trimap(near)],
+            "Trimap: ERR of the final masks within 1 to 32 pixels of the true edge of the road, of "
+            "all frames together. The steeper a curve falls, the closer to the edge errors lie.",
+        )
+    if findings.heatmaps:
         yield Figure(
             [*charts.heat(findings.heatmaps)],
             "Where the final masks go wrong, over all evaluated frames. FP: non-road called "

@@ -131,16 +131,18 @@ def rates_table(findings: Findings) -> Table:
     counts = [number(findings.total(name)["frames"]) for name in names]
     alike = len(set(counts)) == 1
     widths = {each["width"] for each in findings.facts.beyond.values()}
-    edge = f" Boundary F: the road's edge within {widths.pop()} pixels." if widths else ""
+    edge = f" Boundary F: the road's edge within {widths.pop()} pixels;" if widths else ""
+    edge += " boundary IoU: bands along it of 2 % of the diagonal." if edge else ""
     return Table(
         ["final mask", *([] if alike else ["frames"]), *columns],
         [
             [variant_cell(name, names), *([] if alike else [count]), *row]
             for name, count, row in zip(names, counts, rows, strict=True)
         ],
+        small=True,
         caption=(
             f"Percent: means over {counts[0] if alike else 'the evaluated'} frames; pooled ERR, "
-            f"IoU, F1 and precision are of all pixels together.{edge} Bold: the best."
+            f"{listing([*OVERLAP])} are of all pixels together.{edge} Bold: the best."
         ),
     )
 
@@ -157,8 +159,9 @@ def _columns(findings: Findings) -> Iterator[tuple[str, Iterator[Cell]]]:
     for rate, metric in OVERLAP.items():
         yield rate, best_bold([each[rate] for each in overlap], higher=metric.higher_is_better)
     if beyond := findings.facts.beyond:
-        boundary = [beyond.get(name, {}).get("boundary_F") for name in finals]
-        yield "boundary F", best_bold(boundary, higher=True)
+        for name in ("boundary_F", "boundary_IoU"):
+            values = [beyond.get(variant, {}).get(name) for variant in finals]
+            yield name.replace("_", " "), best_bold(values, higher=True)
 
 
 def fleet_rates_table(facts: FleetFacts) -> Table:

@@ -61,13 +61,24 @@ def test_where_err_is_undefined_nothing_is_said_about_frames():
     assert text.startswith("ERR is undefined on every frame")
 
 
-def test_flicker_stands_beside_the_truths_own():
-    each = {"boundary_F": 0.5, "width": 5, "flicker": 0.05, "truth_flicker": 0.02, "pairs": 1199}
-    unknown = each | {"flicker": None, "truth_flicker": None}
-    blocks = list(filter_effect(some_findings(beyond={"filtered": each, "unfiltered": unknown})))
-    hidden = the(Details, blocks)
-    assert plain_rows(the(Table, hidden.blocks)) == [["filtered", "5.00", "2.00", "+3.00", "1,199"]]
+def test_flicker_stands_beside_the_truths_own_and_how_long_a_mask_errs():
+    each = {"width": 5, "flicker": 0.05, "truth_flicker": 0.02, "pairs": 1199}
+    times = {"limit": 0.15, "seconds": 15.5, "longest": 3.04, "share": 0.25, "recovery": 1.0}
+    none = times | {"seconds": 0.0, "longest": 0.0, "share": None, "recovery": None}
+    still = {"flicker": None, "truth_flicker": None, "pairs": 0}
+    beyond = {
+        "filtered": each | {"episodes": times | {"episodes": 1300, "recovered": 12}},
+        "blind": each | still | {"episodes": none | {"episodes": 0, "recovered": 0}},
+    }
+    hidden = the(Details, filter_effect(some_findings(beyond=beyond)))
+    table, end = the(Table, hidden.blocks), ("12", "1.0")
+    assert plain_rows(table) == [
+        ["filtered", *("5.00", "2.00", "+3.00", "1,199"), *("1,300", "15.5", "3.0", "25.00", *end)],
+        ["blind", *(DASH, DASH, DASH, "0"), "0", "0.0", "0.0", DASH, "0", DASH],
+    ]
+    assert sum(columns for _, columns in table.groups) == len(table.columns)
     assert hidden.title == "From one frame to the next"
+    assert "an ERR of at least 15 % to the first one below" in the(Text, hidden.blocks).text
 
 
 def test_an_unknown_number_of_effective_frames_is_a_dash():

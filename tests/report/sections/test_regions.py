@@ -54,6 +54,16 @@ def test_the_width_of_the_edge_is_told_where_it_is_known():
     assert "within 7 pixels of the border" in note
 
 
+def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near():
+    beyond = {name: {"trimap": {"1": [0, 0], "8": [3, 12]}} for name in VARIANTS[:2]}
+    findings = some_findings(regions=table_of("boundary", "interior"), beyond=beyond)
+    _, figure = (block for block in regions(findings) if isinstance(block, Figure))
+    (chart,) = figure.charts
+    assert chart.names == ["1", "8"]
+    assert [each.name for each in chart.series] == ["filtered", "unfiltered"]
+    assert [*chart.series[0].points()] == [(1, 25)]
+
+
 def test_shadow_is_explained_where_it_is_a_region():
     for names, told in ((("shadow", "boundary"), True), (("boundary", "interior"), False)):
         blocks = regions(some_findings(regions=table_of(*names)))

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from roadeval.data.words import DASH
 from roadeval.report.blocks import BulletList, LinkList, Table, Text
 from roadeval.report.findings import Commands, NotableFrame
 from roadeval.report.sections.summary import rates_table, section, warnings
@@ -31,12 +32,16 @@ def test_the_best_of_each_column_is_bold_the_lowest_error_and_the_highest_accura
     assert bold(rates_table(some_findings()), title) == [best]
 
 
-def test_boundary_f_is_best_where_it_is_highest_and_may_be_unknown():
+def test_boundaries_are_best_where_they_are_highest_and_may_be_unknown():
     each = {"width": 5, "flicker": None}
-    known = {"filtered": each | {"boundary_F": 0.4}, "unfiltered": each | {"boundary_F": 0.8}}
+    known = {
+        "filtered": each | {"boundary_F": 0.4, "boundary_IoU": 0.3},
+        "unfiltered": each | {"boundary_F": 0.8, "boundary_IoU": 0.2},
+    }
     table = rates_table(some_findings(beyond=known))
     assert bold(table, "boundary F") == ["80.00"]
-    assert plain_rows(table)[2][-1] == "–"  # noqa: RUF001
+    assert bold(table, "boundary IoU") == ["30.00"]
+    assert plain_rows(table)[2][-2:] == [DASH, DASH]
     assert "within 5 pixels" in table.caption
 
 
@@ -76,7 +81,7 @@ def test_every_final_mask_has_its_row():
     rows = plain_rows(rates_table(some_findings()))
     assert rows[1] == [
         *("unfiltered", "15.00", "16.00", "17.00", "85.00", "16.00"),
-        *("60.00", "60.00", "70.00"),
+        *("60.00", "65.00", "60.00", "70.00"),
     ]
 
 
