@@ -247,10 +247,10 @@ def test_a_truth_without_an_edge_has_no_pixel_near_it():
 # --- Over a drive
 
 
-def shown(truth, mask, score=1.0, role=Role.EVALUATED):
+def shown(truth, mask, score=1.0, role=Role.EVALUATED, overlap=0.5):
     variant = a_variant("net", {"svm": 1 - truth % 2, "post": mask})
     bits = TruthBits.of(truth)
-    contour = score, score / 2, np.tile([3, 10], (len(TRIMAP), 1))
+    contour = score, overlap, np.tile([3, 10], (len(TRIMAP), 1))
     return FrameResult(
         *(a_frame(truth), role, (variant,)), truth_bits=bits, contours={"net": contour}
     )
@@ -315,7 +315,13 @@ def test_boundary_f_is_averaged_over_the_frames_that_have_one():
     found = told(*(shown(TRUTH, TRUTH % 2, score) for score in (0.5, float("nan"), 1.0)))
     assert found["boundary_F"] == pytest.approx(0.75)
     assert (found["frames"], found["width"], found["pairs"]) == (2, 5, 2)
-    assert found["boundary_IoU"] == pytest.approx(0.375)
+
+
+def test_boundary_iou_is_averaged_over_its_own_frames():
+    scores = [(0.5, float("nan")), (float("nan"), 0.25), (float("nan"), 0.75), (0.7, 0.5)]
+    found = told(*(shown(TRUTH, TRUTH % 2, f, overlap=each) for f, each in scores))
+    assert found["boundary_IoU"] == pytest.approx(0.5)
+    assert found["boundary_F"] == pytest.approx(0.6)
 
 
 def test_each_width_of_the_trimap_sums_up_the_pixels_of_all_frames():

@@ -42,6 +42,11 @@ def test_a_lost_frame_lasts_as_long_as_its_stamps_say():
     assert own["share"] == pytest.approx(0.3 / 0.5)
 
 
+def test_a_few_lost_frames_are_no_gap_within_a_second():
+    own = found([0, 0.1, 0.2, 1.2, 1.3], [0, 0.2, 0.2, 0, 0])
+    assert (own["seconds"], own["recovered"]) == (1.1, 1)
+
+
 @pytest.mark.parametrize("after", [0.2, 0.0])
 def test_a_gap_ends_an_episode_without_recovery_and_is_in_no_time(after):
     own = found([0, 0.1, 0.2, 60.2, 60.3, 60.4], [0, 0.2, 0.2, after, 0, 0])

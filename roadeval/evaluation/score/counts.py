@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -321,7 +321,7 @@ class EdgesAndFlicker:
             return
         for name, (*scores, counts) in result.contours.items():
             own = self._sums[name]
-            own.scores += np.nan_to_num(scores)
+            own.scores += [0.0 if math.isnan(each) else each for each in scores]
             own.frames += ~np.isnan(scores)
             own.trimap += counts
         masks = {v.variant: mask for v in result.variants for _, mask in v.masks()}
@@ -422,9 +422,9 @@ def trimap(masks: Iterable[Bits], truth: TruthBits, widths: Sequence[int] = TRIM
     ``widths`` rise; returned are ``(K, w, 2)``.
     """
     road, other, near = truth.road, truth.other, []
-    for step in np.diff(widths, prepend=0).tolist():
+    for before, width in pairwise((0, *widths)):
         # A square grown by a square is the square of both widths.
-        road, other = (grow(each, square(step), truth) for each in (road, other))
+        road, other = (grow(each, square(width - before), truth) for each in (road, other))
         near.append(road & other)
     counted = flat([*(mask ^ truth.road for mask in masks), truth.labelled])
     counts = KERNELS.count_bits(counted, flat([truth.labelled]), flat(near))[:, 0]
