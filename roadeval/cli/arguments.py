@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,7 +95,14 @@ def configuration(given: Given) -> RunConfig:
     A `typer.BadParameter` for a value that can be seen to be wrong without opening a file, or
     options that do not go together; a `RoadevalError` for a file that cannot be used.
     """
-    from roadeval.config import ConfigError, DriveSettings, configure, network_variant, read_tables
+    from roadeval.config import (
+        ConfigError,
+        DriveSettings,
+        configure,
+        in_file,
+        network_variant,
+        read_tables,
+    )
 
     preset = {"preset": given["preset"]} if "preset" in given else {}
     with usage():
@@ -117,6 +125,8 @@ def configuration(given: Given) -> RunConfig:
         config = config.with_tuned(given.get("tunes", ()))
         if "only" in given:
             config = config.override({"only": given["only"]})
+    with in_file(ground := str(given.get("ground", ""))):
+        config = config.override({"ground": read_tables(ground) if ground else {}})
     config = config.with_drives(
         DriveSettings.of({**read_tables(file), "path": drive}, file)
         for drive, file in given.get("drives", ())
@@ -132,11 +142,15 @@ def configuration(given: Given) -> RunConfig:
 
 def of_a_log(given: Given) -> LogConfig:
     """Return what options ask of a log; wrong usage as in `configuration`."""
-    from roadeval.config import log_config
+    from roadeval.config import in_file, log_config, read_tables
 
     with usage():
         _check_names(given, "topics.masks")
-        return log_config({**_tables(given), **_cameras(given)})
+        found = log_config({**_tables(given), **_cameras(given)})
+    if path := given.get("ground"):
+        with in_file(str(path)):
+            return replace(found, ground=log_config({"ground": read_tables(path)}).ground)
+    return found
 
 
 def _variant(name: str, path: str | None) -> Variant:

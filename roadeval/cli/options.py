@@ -66,11 +66,14 @@ class MethodSettings:
     cameras: Annotated[tuple[str, ...], Flag("--image-topic", "T", "Input")] = ()
     """The camera's topic, where the log has several. Given again, each camera is replayed, scored
     apart, and recorded beside the others."""
+    ground: Annotated[Path | None, Flag("--camera", "FILE.toml", "Input")] = None
+    """Where the camera is over the ground, as its height and pitch, where the log does not say so:
+    with it errors are counted in metres, too."""
     drives: Annotated[Mapping[str, str], Flag("--drive", "DRIVE=FILE.toml", "Input")] = (
         dataclasses.field(default_factory=dict)
     )
-    """A file with the [topics], [labels] or [frames] of one drive, by its path or its file's name,
-    or of several, as 'monday*.mcap'."""
+    """A file with the [topics], [labels], [frames] or [ground] of one drive, by its path or its
+    file's name, or of several, as 'monday*.mcap'."""
 
 
 GROUPS: Final = ("Output", "Methods", "Training", "Truth", "Range", "Input", "Execution", "Fleet")

@@ -20,7 +20,7 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
     name = "front"
     image = "/front/image"
 
-    [[drives]]              # what differs in some drives: [topics], [labels], [frames], [masks.*]
+    [[drives]]              # what differs in some drives: [topics], [frames], [ground], ...
     path = "monday/*.mcap"
     labels = { road = [3], ignore = [11] }
 """
@@ -65,7 +65,7 @@ from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import public_url, visible, visible_lines
 from roadeval.training.settings import TrainingSettings
 
-OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks")
+OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks", "ground")
 """The tables that may differ from drive to drive."""
 
 
@@ -76,7 +76,7 @@ class DriveSettings:
     path: str
     """A path, or the end of one, as a file's name; ``*`` and ``?`` match any text in a name."""
     tables: Mapping[str, Mapping[str, Any]]
-    """``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels replace
+    """Those of `OF_A_LOG` in the shape of a TOML file. Labels replace
     the run's as a whole, the others key by key."""
     where: str = field(default="", compare=False)
     """Begins a message about them."""
@@ -178,6 +178,10 @@ class RunConfig(LogConfig):
             raise ConfigError(
                 f"`topics.{own[0]}`: which camera's? Name it under [[cameras]], beside its image"
             )
+        if names and self.ground.given:
+            raise ConfigError(
+                "`ground`: which camera's? Name it under [[cameras]], beside its image"
+            )
         if names and (self.truth.path or self.masks):
             raise ConfigError(
                 "labels that do not lie in the log belong to one camera: replay that one alone"
@@ -198,6 +202,7 @@ class RunConfig(LogConfig):
             visible(each.name or each.image): replace(
                 self,
                 cameras=(),
+                ground=each.ground,
                 topics=replace(self.topics, **{name: getattr(each, name) for name in fields}),
             )
             for each in self.cameras
@@ -447,7 +452,7 @@ def log_config(tables: Mapping[str, Any]) -> LogConfig:
     asked = LogConfig()
     found = {
         name: override(getattr(asked, name), tables.get(name, {}), name)
-        for name in ("topics", "truth", "labels", "frames")
+        for name in ("topics", "truth", "labels", "frames", "ground")
     }
     return replace(asked, **found)
 

@@ -11,7 +11,8 @@ from annotated_types import Interval
 from roadeval.runtime.settings import Checked, Flag
 
 SECTIONS: Final = (
-    *("topics", "truth", "labels", "frames", "training", "evaluation", "output", "run", "fleet"),
+    *("topics", "truth", "labels", "frames", "ground", "training", "evaluation", "output"),
+    *("run", "fleet"),
 )
 """The tables that hold for the whole run, by the names of the fields of
 `roadeval.config.RunConfig`."""

@@ -38,6 +38,8 @@ class Calibration:
     def scaled(self, width: int, height: int) -> Calibration:
         """Return the calibration of the same image in another size, in pixels."""
         across, down = width / self.width, height / self.height
-        factors = (*[across] * 3, *[down] * 3, 1.0, 1.0, 1.0)
-        matrix = tuple(k * factor for k, factor in zip(self.matrix, factors, strict=True))
+        k = self.matrix
+        # The centre of the first pixel is at (0, 0), so that its corner is at half a pixel less.
+        right, below = ((c + 0.5) * s - 0.5 for c, s in ((k[2], across), (k[5], down)))
+        matrix = (k[0] * across, k[1] * across, right, k[3] * down, k[4] * down, below, *k[6:])
         return replace(self, width=width, height=height, matrix=matrix)

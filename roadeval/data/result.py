@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data.arrays import Packed, Sums, TruthBits
+from roadeval.data.arrays import Floats, Packed, Sums, TruthBits
 from roadeval.data.frame import Frame, Histogram, Mask, Probability, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
 
@@ -29,7 +29,7 @@ FINAL_STAGE: Final = "post"
 
 RESERVED: Final = frozenset(
     {
-        *("blind", "camera", "counts", "facts", "frame", "metrics", "notes", "results"),
+        *("blind", "camera", "counts", "facts", "frame", "ground", "metrics", "notes", "results"),
         *("roadeval", "state", "timing", "true_shadow", "truth"),
     }
 )
@@ -223,6 +223,23 @@ class Doubt:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FrameMetres:
+    """The measures of a final mask of a frame in metres.
+
+    Of S stances of the camera the first is as it is said to stand.
+    """
+
+    measures: Sequence[tuple[str, int]]
+    """M names, and the metres ahead at which each is taken; 0 of one that is not."""
+    ends: Floats
+    """``(S, M, 2)``: where the mask and where the truth ends, in metres; NaN where none is seen."""
+    regions: Sequence[str]
+    """R names: the bands of distance, then the ground seen from above."""
+    counts: Sums
+    """``(S, R, 4)``: TP, TN, FP and FN."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
 
@@ -231,7 +248,10 @@ class FrameResult:
     those of the final masks by variant, ``histograms`` the labelled pixels by how probable road is,
     for each variant and stage that says so, and ``oracles`` the counts of what the stages
     made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
-    their seed. ``notes`` are sentences for a person. ``doubts`` has each variant's, without truth.
+    their seed. ``metres`` are the measures of each final mask by variant where the camera is known,
+    and ``above`` the histograms of the ground seen from above. ``doubts`` has each variant's,
+    without truth.
+    ``notes`` are sentences for a person.
     """
 
     frame: Frame
@@ -248,6 +268,8 @@ class FrameResult:
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
     repeats: Mapping[int, tuple[Tally, ...]] = field(default_factory=dict)
     doubts: tuple[Doubt, ...] = ()
+    metres: Mapping[str, FrameMetres] = field(default_factory=dict)
+    above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
 
     def without_layers(self) -> FrameResult:
         """Return the result without layers, which take most memory, for summing up."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from roadeval.data import Frame, TruthBits, VariantResult
 from roadeval.data.arrays import Bits, Reach
+from roadeval.evaluation.metres import Survey
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.kernels import KERNELS
 
@@ -23,6 +24,8 @@ class LabelledFrame:
     truth: TruthBits
     variants: tuple[VariantResult, ...]
     settings: EvaluationSettings
+    survey: Survey | None = None
+    """What of it lies where on the ground, where the camera is known."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Every choice of the evaluation that is not fixed by the paper, with its reason."""
 
+from itertools import pairwise
 from typing import Annotated, Final
 
 from pydantic import ConfigDict, Field
@@ -18,6 +19,9 @@ DEGRADED_MARGIN: Final = 0.02
 at the image would have been better."""
 NOTEWORTHY: Final = 0.05
 """The least change of ERR by the filter, or excess over ``blind``, that is noted."""
+
+
+Metres = Annotated[int, Field(ge=0, le=500)]
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -39,3 +43,25 @@ class EvaluationSettings:
     negligible: Annotated[float, Field(gt=0, le=1)] = 0.01
     """A change of a drive's mean rate by no more than this does not matter: an interval that ends
     within it is the answer that there is no larger effect."""
+    distances: Annotated[tuple[Metres, ...], Field(min_length=2, max_length=20)] = (
+        0,
+        10,
+        20,
+        40,
+        80,
+    )
+    """Metres ahead between which errors are counted apart, of a camera that is known."""
+    edges_at: Annotated[tuple[Metres, ...], Field(max_length=20)] = (5, 10, 20, 40)
+    """Metres ahead at which the road's left and right edges are measured."""
+    plan: tuple[Metres, Metres] = (6, 46)
+    """Metres ahead of the ground that is seen from above, as in KITTI's road benchmark."""
+    plan_width: Annotated[float, Field(gt=0, le=200)] = 20.0
+    """Metres across of it; edges farther to the side than half of it are not looked for."""
+    plan_cell: Annotated[float, Field(ge=0.01, le=1)] = 0.05
+    """Metres of its cells' sides, each of which counts once."""
+
+    def __post_init__(self) -> None:
+        for name in ("distances", "plan"):
+            steps = getattr(self, name)
+            if any(far <= near for near, far in pairwise(steps)):
+                raise ValueError(f"{name} must rise")

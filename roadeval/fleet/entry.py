@@ -7,7 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -217,14 +217,16 @@ def cameras_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
 def with_cameras(
     entries: Iterable[DriveEntry], cameras: Sequence[CameraSettings]
 ) -> list[DriveEntry]:
-    """Return an entry for each camera of each drive, with its topics as settings of it alone."""
+    """Return an entry for each camera of each drive, with what is its own as settings of it."""
     found = []
     for entry in entries:
         tables = entry.settings.tables if entry.settings else {}
         for camera in cameras:
-            given = {**vars(camera), "name": None}
+            given = {**vars(camera), "name": None, "ground": None}
             known = {name: value for name, value in given.items() if value}
             own = {**tables, "topics": {**tables.get("topics", {}), **known}}
+            if camera.ground.given:
+                own["ground"] = asdict(camera.ground)
             settings = DriveSettings(entry.source, own, "[[cameras]]")
             found.append(replace(entry, settings=settings))
     return cameras_apart(found)

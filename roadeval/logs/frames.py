@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import ROAD, Calibration, Frame, Rgb
+from roadeval.geometry.ground import Ground, ground_of
 from roadeval.images import Limits, format_of
 from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError, LogError
 from roadeval.logs.messages.encoding import TopicKind
@@ -58,6 +59,10 @@ class Selection:
     """The camera's, of the size in which it was logged."""
     no_calibration: str = ""
     """Why there is none although the log has some; else empty."""
+    ground: Ground | None = None
+    """The ground before the camera, for images of the size in which it was logged."""
+    ground_why: str = ""
+    """How it is known, or what is missing of a camera of which something is known."""
 
     @property
     def image(self) -> TopicInfo:
@@ -93,6 +98,11 @@ class Selection:
         return None if self.image.size is None else scaled_size(self.image.size, self.scale)
 
     @property
+    def ground_as_read(self) -> Ground | None:
+        """The ground, for images of the size in which they are read."""
+        return self.ground.scaled(*self.size) if self.ground and self.size else None
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Which topics were chosen and why, a sentence each."""
         lines = [f"image: {self.image.name} ({self.image_why})"]
@@ -107,6 +117,8 @@ class Selection:
             lines.append(f"calibration: {known.topic} ({known.model or 'no distortion'}{place})")
         elif self.no_calibration:
             lines.append(f"no calibration: {self.no_calibration}")
+        if self.ground_why:
+            lines.append(self.ground_why)
         if self.no_truth:
             lines.append(f"no truth: {self.no_truth}")
         if (clock := self.camera.clock) is not Clock.STAMP:
@@ -159,8 +171,9 @@ def settle(
             reader = readers[chosen.name]
             labels[name] = in_log(reader, own, camera, reason, several=several)
     no_truth = "" if truth.topic else truth.why
-    known = calibration_of(image, topics, readers)
-    return Selection(camera, why, labels, config.frames.scale, no_truth, *known)
+    known, unknown = calibration_of(image, topics, readers)
+    ground = ground_of(known, config.ground, image.size)
+    return Selection(*(camera, why, labels, config.frames.scale, no_truth, known, unknown), *ground)
 
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval, Len
 
+from roadeval.geometry.settings import GroundSettings
 from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.runtime.settings import Checked, Flag
@@ -111,6 +112,8 @@ class CameraSettings:
     """The topic of its true shadow."""
     masks: Mapping[str, str] = field(default_factory=dict)
     """Topics of masks to score as one more variant, by the variant's name."""
+    ground: GroundSettings = field(default_factory=GroundSettings)
+    """What the log does not know of the camera over the ground."""
 
 
 @dataclass(frozen=True)
@@ -240,6 +243,7 @@ class LogConfig:
     truth: LabelPlace = field(default_factory=LabelPlace)
     labels: LabelSettings = field(default_factory=LabelSettings)
     frames: FrameSettings = field(default_factory=FrameSettings)
+    ground: GroundSettings = field(default_factory=GroundSettings)
 
     def __post_init__(self) -> None:
         if self.truth.path and self.topics.truth:

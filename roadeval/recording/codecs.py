@@ -47,7 +47,7 @@ from roadeval.data import LayerKind, LayerSpec, Packed
 from roadeval.data.colours import ColourWithOpacity
 from roadeval.images import MAX_PIXELS, Limits
 from roadeval.kernels import KERNELS
-from roadeval.recording.layout import CAMERA, Layout
+from roadeval.recording.layout import CAMERA, GROUND, Layout
 
 Array = npt.NDArray[Any]
 JPEG_QUALITY: Final = 90
@@ -65,7 +65,12 @@ def codecs_of(layout: Layout) -> dict[str, Codec]:
     """Return the codec of every image, by its entity path."""
     width, height = layout.width, layout.height
     codecs: dict[str, Codec] = {CAMERA: Codec(width, height)}
-    return codecs | {path: codec(spec, width, height) for path, spec in layout.images()}
+    codecs |= {path: codec(spec, width, height) for path, spec in layout.images()}
+    if (plan := layout.plan()) is not None:
+        rows, columns = plan.cells.shape
+        codecs[GROUND] = Codec(columns, rows)
+        codecs |= {path: codec(spec, columns, rows) for path, spec in layout.from_above()}
+    return codecs
 
 
 def codec(spec: LayerSpec, width: int, height: int) -> Codec:

@@ -29,6 +29,8 @@ from roadeval.data import (
 from roadeval.data.colours import CLEAR, SHADOW, with_opacity
 from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
+from roadeval.geometry.ground import Ground
+from roadeval.geometry.plan import Plan
 from roadeval.runtime.documents import read_json
 
 APPLICATION: Final = "roadeval"
@@ -46,6 +48,11 @@ and the log time. With them both recordings are in step in one viewer."""
 CAMERA: Final = "/camera"
 TRUTH_PATH: Final = "/truth"
 TRUE_SHADOW: Final = "/true_shadow"
+GROUND: Final = "/ground"
+"""The camera's image as the ground looks from above; below it the truth, and each variant's errors.
+"""
+CELL: Final = 0.16
+"""Metres of a cell's side there."""
 NOTES: Final = "/notes"
 GUIDE: Final = "/results/guide"
 LAYOUT: Final = "/results/layout"
@@ -116,6 +123,10 @@ class Layout:
     """Frames a second, if known: the speed at which the viewer plays."""
     calibration: Calibration | None = None
     """Of images of this size, where it is known."""
+    ground: Ground | None = None
+    """Before the camera, where it is known."""
+    extent: tuple[float, float, float] = (6, 46, 20)
+    """Metres ahead between which the ground is shown from above, and metres across."""
     tables: Mapping[str, str] = field(default_factory=dict)
     """Header line of each table that grows with the frames, by the table's name."""
     properties: Mapping[str, str | int | float] = field(default_factory=dict)
@@ -140,6 +151,16 @@ class Layout:
                 yield layer_path(variant.name, spec.name), spec
             if self.has_truth:
                 yield layer_path(variant.name, ERRORS.name), ERRORS
+
+    def plan(self) -> Plan | None:
+        """Return the ground as it is shown from above."""
+        return Plan(self.ground, *self.extent, CELL) if self.ground else None
+
+    def from_above(self) -> Iterator[tuple[str, LayerSpec]]:
+        """Yield the entity path and description of what lies on the ground seen from above."""
+        if self.ground and self.has_truth:
+            yield ground_path(TRUTH.name), TRUTH
+            yield from ((ground_path(each.name), ERRORS) for each in self.variants)
 
     def scored(self) -> Iterator[tuple[str, str]]:
         """Yield the variant and stage of every counted mask, the baseline last."""
@@ -190,6 +211,11 @@ def prefixes(cameras: Iterable[str]) -> dict[str, str]:
 def layer_path(variant: str, layer: str) -> str:
     """Return the entity path of a variant's layer."""
     return f"/{variant}/{layer}"
+
+
+def ground_path(name: str) -> str:
+    """Return the entity path of the truth, or of a variant's errors, on the ground."""
+    return f"{GROUND}/{name}"
 
 
 def guide_path(variant: str) -> str:

@@ -18,10 +18,23 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, Self
 
+import numpy as np
+import numpy.typing as npt
 import rerun as rr
 
-from roadeval.data import BASELINE, ERRORS, FINAL_STAGE, FrameResult, Health, LayerKind
+from roadeval.data import (
+    BASELINE,
+    ERRORS,
+    FINAL_STAGE,
+    IGNORE,
+    TRUTH,
+    FrameResult,
+    Health,
+    LayerKind,
+)
+from roadeval.data.arrays import IGNORED
 from roadeval.data.words import short_names
+from roadeval.geometry.plan import Plan
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
 from roadeval.recording import views
@@ -59,6 +72,8 @@ class _Camera:
     layout: Layout
     codecs: Mapping[str, Codec]
     """By paths without the prefix."""
+    plan: Plan | None
+    """The ground as it is shown from above, where it is known."""
 
 
 def encode_frame(
@@ -76,7 +91,7 @@ def encode_frame(
         at.scalar_path("counts", tally.variant, tally.stage): tally.counts
         for tally in result.tallies
     }
-    payloads = _payloads(result, camera.codecs, kinds) if kinds else ()
+    payloads = _payloads(result, camera.codecs, camera.plan, kinds) if kinds else ()
     return EncodedFrame(
         (frame.number, frame.stamp_ns, frame.log_time_ns),
         {below + path: payload for path, payload in payloads},
@@ -90,7 +105,10 @@ def encode_frame(
 
 
 def _payloads(
-    result: FrameResult, codecs: Mapping[str, Codec], kinds: Collection[LayerKind]
+    result: FrameResult,
+    codecs: Mapping[str, Codec],
+    plan: Plan | None,
+    kinds: Collection[LayerKind],
 ) -> Iterator[tuple[str, bytes]]:
     frame = result.frame
     if frame.media_type in ("image/jpeg", "image/png"):
@@ -108,6 +126,19 @@ def _payloads(
     for name, layer in result.errors.items():
         path = at.layer_path(name, ERRORS.name)
         yield path, codecs[path].encode(layer.array)
+    if plan is not None and frame.image.shape[:2] == (plan.ground.height, plan.ground.width):
+        for path, picture in _from_above(result, plan):
+            yield path, codecs[path].encode(picture)
+
+
+def _from_above(result: FrameResult, plan: Plan) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
+    """Yield the image, the truth and the errors as they look from above, by entity path."""
+    frame = result.frame
+    yield at.GROUND, plan.picture(frame.image)
+    if frame.truth is not None:
+        yield at.ground_path(TRUTH.name), plan.picture(frame.truth, IGNORE)
+    for name, layer in result.errors.items():
+        yield at.ground_path(name), plan.picture(layer.array, IGNORED)
 
 
 def _scalars(result: FrameResult, rates: Collection[str]) -> Iterator[tuple[str, float]]:
@@ -248,7 +279,7 @@ class Recorder:
         self.partial = self._file.partial
         layouts = {"": layout} if isinstance(layout, Layout) else dict(layout)
         self._cameras = {
-            name: _Camera(prefix, layouts[name], codecs_of(layouts[name]))
+            name: _Camera(prefix, layouts[name], codecs_of(layouts[name]), layouts[name].plan())
             for name, prefix in at.prefixes(layouts).items()
         }
         self._layouts = {each.prefix: each.layout for each in self._cameras.values()}

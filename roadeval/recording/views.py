@@ -22,6 +22,7 @@ from roadeval.data import (
     ERRORS,
     FILTERED,
     FINAL_STAGE,
+    TRUTH,
     UNFILTERED,
     Calibration,
     Health,
@@ -34,6 +35,7 @@ from roadeval.data import (
 from roadeval.data.colours import Colour
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT
+from roadeval.geometry.ground import Ground
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
 from roadeval.recording.layout import Layout
@@ -101,6 +103,8 @@ def _below(prefix: str, parts: Iterable[BlueprintPart]) -> list[BlueprintPart]:
         if isinstance(part, rrb.View):
             part.origin = prefix + (part.origin if part.origin != "/" else "")
             part.contents = [prefix + path for path in part.contents]
+            own = part.visualizer_overrides
+            part.visualizer_overrides = {prefix + str(path): each for path, each in own.items()}
         else:
             _below(prefix, part.contents)
         made.append(part)
@@ -140,6 +144,8 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
                 plots.append(plot(f"{rate} of {stage}", paths))
         tabs += [rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage"), _counts(layout)]
     tabs.append(rrb.Vertical(*map(stage_times, layout.variants), name="Timing"))
+    if layout.ground:
+        tabs.insert(1, _on_the_ground(layout, layout.ground))
     results = (
         (at.OVERVIEW, "Results"),
         ("windows", "Windows (CSV)"),
@@ -157,6 +163,34 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     if layout.has_truth:
         views += [truth(), outcome(layout, variant)]
     return rrb.Grid(*views, grid_columns=4, name=f"{variant.name}: every layer")
+
+
+def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
+    """Return the ground in space, below the camera, and from above with each variant's errors."""
+    names = [each.name for each in layout.variants[:_OUTCOMES]] if layout.has_truth else []
+    flat = [picture("The ground from above", at.GROUND)]
+    if layout.has_truth:
+        flat.append(picture("Truth: road", at.GROUND, at.ground_path(TRUTH.name)))
+    flat += [picture(f"{name}: errors", at.GROUND, at.ground_path(name)) for name in names]
+    if not ground.is_posed or not layout.calibration:
+        return rrb.Grid(*flat, grid_columns=len(flat), name="On the ground")
+    near, far, _ = layout.extent
+    paths = [at.GROUND, *(at.ground_path(name) for name in names[:1]), at.CAMERA]
+    space = rrb.Spatial3DView(
+        origin="/",
+        contents=paths,
+        name=f"In space: {names[0]}" if names else "In space",
+        spatial_information=rrb.SpatialInformation(target_frame=_frame_of(layout.calibration)),
+        eye_controls=rrb.EyeControls3D(
+            position=(0, -far / 5, -near * 2),
+            look_target=(0, 2, (near + far) / 2.5),
+            eye_up=(0, -1, 0),
+        ),
+        # Its picture has no place in space here: it is on the ground.
+        overrides={at.CAMERA: rr.Pinhole.from_fields().visualizer()},
+    )
+    grid = rrb.Grid(*flat, grid_columns=len(flat))
+    return rrb.Horizontal(space, grid, column_shares=[2, 3], name="On the ground")
 
 
 def _counts(layout: Layout) -> BlueprintPart:
@@ -367,6 +401,8 @@ def before_the_first_frame(
         yield path, list(codec.style())
     if layout.calibration:
         yield at.CAMERA, list(_lens(layout.calibration))
+    if layout.ground:
+        yield from _plane(layout, layout.ground)
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
     yield at.GUIDE, [_markdown(guide(layout))]
     for variant in layout.variants:
@@ -388,7 +424,7 @@ def _lens(known: Calibration) -> Iterator[Any]:
     By frames with names, as Rerun's own loader of MCAP files gives them: a pinhole of the entity
     itself would take its pictures out of every two-dimensional view.
     """
-    frame = known.frame_id or at.CAMERA.strip("/")
+    frame = _frame_of(known)
     yield rr.Pinhole(
         image_from_camera=np.array(known.matrix).reshape(3, 3),
         resolution=[known.width, known.height],
@@ -402,6 +438,42 @@ def _lens(known: Calibration) -> Iterator[Any]:
             child_frame=frame,
             parent_frame=mounting.parent,
         )
+
+
+def _frame_of(known: Calibration) -> str:
+    return known.frame_id or at.CAMERA.strip("/")
+
+
+_ABOVE: Final = 20.0
+"""Metres above the ground of a camera that looks straight down: its picture lies on the ground."""
+_DOWN: Final = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""From its right, down and forward to ahead, left and up."""
+
+
+def _plane(layout: Layout, ground: Ground) -> StaticData:
+    """Yield where the pictures of the ground lie in space: as those of a camera above it."""
+    frame = _frame_of(layout.calibration) if layout.calibration else at.CAMERA.strip("/")
+    if ground.is_posed and layout.calibration:
+        near, far, width = layout.extent
+        turn, at_camera = ground.axes()
+        above = np.array([(near + far) / 2, 0.0, _ABOVE])
+        across, along, focal = width / at.CELL, (far - near) / at.CELL, _ABOVE / at.CELL
+        pinhole = rr.Pinhole(
+            image_from_camera=[[focal, 0, across / 2], [0, focal, along / 2], [0, 0, 1]],
+            resolution=[across, along],
+            image_plane_distance=_ABOVE,
+            child_frame=f"{frame}_ground_image",
+            parent_frame=f"{frame}_above",
+        )
+        place = rr.Transform3D(
+            translation=turn @ above + at_camera,
+            mat3x3=turn @ _DOWN,
+            child_frame=f"{frame}_above",
+            parent_frame=frame,
+        )
+        yield at.GROUND, [pinhole, place]
+    for path in (at.GROUND, *(path for path, _ in layout.from_above())):
+        yield path, [rr.CoordinateFrame(f"{frame}_ground_image")]
 
 
 def of_a_rig(prefixes: Mapping[str, str], first: Layout) -> StaticData:

@@ -9,14 +9,15 @@ from typing import Any, Final
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Document
 from roadeval.report.findings import Findings, FleetFindings
-from roadeval.report.sections import drive, drives, frames, provenance, rig, summary
+from roadeval.report.sections import drive, drives, frames, ground, provenance, rig, summary
 from roadeval.report.sections.frames import FrameBrowser
 
 ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
 Section = Callable[[Any], Iterable[Block]]
 SCORED: Final = (
-    *(drive.over_drive, drive.filter_effect, drive.regions, drive.stages, drive.thresholds),
+    *(drive.over_drive, drive.filter_effect, drive.regions, ground.on_the_ground),
+    *(drive.stages, drive.thresholds),
 )
 """The sections of a drive with truth; without it there is one on its masks."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from roadeval.data import BASELINE, Rows
 from roadeval.data.words import defined
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import ImageFile
-from roadeval.report.charts.standard import Behind
+from roadeval.report.charts.standard import Behind, Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, FleetFacts, Totals
+from roadeval.results.rows import as_arrays
 from roadeval.results.schema import FAILED
 
 
@@ -124,6 +126,10 @@ class Findings:
     differences, then."""
     camera: str = ""
     """Of a rig: which camera this is."""
+    metres: Rows = field(default_factory=partial(as_arrays, "metres", ()))
+    """As ``metres.csv``; empty where the camera is not known."""
+    by_distance: Mapping[tuple[str, str], Interval] = field(default_factory=dict)
+    """Mean ERR with its interval, by band of distance and variant."""
 
     @property
     def name(self) -> str:

@@ -21,6 +21,7 @@ from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
 from roadeval.evaluation.score import Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
+from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
 from roadeval.runtime.documents import LONGEST, VALUES, read_bounded, read_json
 from roadeval.runtime.text import elided, visible, visible_lines
@@ -55,6 +56,8 @@ class DriveFacts:
     topics: list[str] = field(default_factory=list)
     calibration: Calibration | None = None
     """The camera's, for images of this size."""
+    ground: Ground | None = None
+    """The ground before it, too."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import astuple
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -84,7 +85,18 @@ def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
             (frame.number, one, other, change.repaired, change.spoiled, change.labelled)
             for one, other, change in _pairs(result.changes)
         ],
+        "edges": [*_edges(result)],
     }
+
+
+def _edges(result: FrameResult) -> Iterator[Row]:
+    """Yield the rows of ``edges``: where masks end, and where the truth does."""
+    stages = {tally.variant: tally.stage for tally in result.tallies}
+    for variant, own in result.metres.items():
+        for (measure, at), (mask, truth) in zip(own.measures, own.ends[0].tolist(), strict=True):
+            where = f"{at}m" if at else "ahead"
+            ends = round(mask, 3), round(truth, 3)
+            yield (result.frame.number, variant, stages[variant], measure, where, *ends)
 
 
 def _pairs(changes: Mapping[Transition, Change]) -> Iterator[tuple[str, str, Change]]:
@@ -126,6 +138,7 @@ def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
         ],
         "heat": heat,
         "probabilities": probabilities,
+        "metres": [astuple(each) for each in board.metres()],
     }
 
 

@@ -131,6 +131,10 @@ LIGHT: Final = (
 )
 """The light, measured from the images: see `roadeval.evaluation.score.light_of`."""
 
+MEASURE: Final = Column("measure", Kind.NAME, "`left_edge`, `right_edge`, `free_distance`, a rate")
+WHERE: Final = Column("where", Kind.NAME, "as `10m`, `ahead`, `0-10m`, `from_above`")
+"""Measures of a camera that is known: metres to the left, or ahead, on flat ground."""
+
 _OF_FRAMES: Final = (
     TableSchema(
         "frames",
@@ -186,6 +190,17 @@ _OF_FRAMES: Final = (
         ),
         streamed=True,
     ),
+    TableSchema(
+        "edges",
+        "A row per evaluated frame, final mask and place where the road ends, in metres.",
+        (
+            *(*KEY, FRAME, VARIANT, STAGE),
+            *(MEASURE, WHERE),
+            Column("mask_m", Kind.NUMBER, "where the mask's road ends; empty if it does not"),
+            Column("truth_m", Kind.NUMBER, "where the truth's does"),
+        ),
+        streamed=True,
+    ),
 )
 _OF_SUMS: Final = (
     TableSchema(
@@ -236,6 +251,19 @@ _OF_SUMS: Final = (
             Column("road", Kind.COUNT, "labelled road pixels of the drive at this level"),
             Column("other", Kind.COUNT, "labelled non-road pixels"),
             Column("worst_frame", Kind.COUNT, "most wrong if this level were the threshold"),
+        ),
+    ),
+    TableSchema(
+        "metres",
+        "A row per final mask and measure on the ground; see the how-to on metres.",
+        (
+            *(*KEY, VARIANT, MEASURE, WHERE),
+            Column("frames", Kind.COUNT, "evaluated frames on which the truth has it; 0 of a sum"),
+            Column("missing", Kind.COUNT, "of these, frames on which the mask has not"),
+            Column("value", Kind.NUMBER, "median of mask minus truth, outwards or ahead; or rate"),
+            Column("p95", Kind.NUMBER, "95th percentile of the size of the difference"),
+            Column("low", Kind.NUMBER, "least value as the camera might stand"),
+            Column("high", Kind.NUMBER, "greatest value as it might stand"),
         ),
     ),
 )

@@ -166,7 +166,7 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     if missing := [name for name in table.names if name not in parsed.column_names]:
         raise ValueError(f"no column {', '.join(missing)}")
     for column in table.columns:
-        if column.kind is not Kind.RATE:
+        if column.kind not in (Kind.RATE, Kind.NUMBER):
             _check_cells(column, parsed[column.name])
     return parsed
 

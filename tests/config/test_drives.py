@@ -71,7 +71,7 @@ def test_a_later_entry_overrides_an_earlier_one():
         ("[[drives]]\npath = ''", "[[drives]]: path must name a log, or several as *.mcap"),
         (
             "[[drives]]\npath = 'a'\ntraining = {}",
-            "[[drives]] a: [training] is no table here; choose frames, labels, masks, topics",
+            "[[drives]] a: [training] is no table here; choose frames, ground, labels, masks",
         ),
         ("[[drives]]\npath = 'a'\nroad = 3", "[[drives]] a: road is in no table"),
         ("[[drives]]\npath = 'a'\nlabels = 3", "[[drives]] a: labels: must be a table"),

@@ -62,6 +62,7 @@ OTHER = {
     "frames.scale": 0.5,
     "frames.keep_corrupt": True,
     "frames.max_pixels": 1_000_000,
+    "ground": {"height": 1.4, "pitch": 1.2, "focal": [485.0]},
     "run.jobs": 1,
     "fleet.folds": 5,
     "fleet.keep": "worst:3",

@@ -36,7 +36,8 @@ def drive(tmp_path_factory) -> Path:
 
 def run(drive: Path, folder: Path, **options):
     save = None if options.get("record") == "none" else folder / "out.rrd"
-    return roadeval.replay(drive, settings(**options), save=save, reports=folder / "reports")
+    config = settings(**{"ground": {"height": 1.4, "pitch": 3, "fov": 60}, **options})
+    return roadeval.replay(drive, config, save=save, reports=folder / "reports")
 
 
 def identity_of(recording: Path) -> str:

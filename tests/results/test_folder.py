@@ -15,6 +15,8 @@ import pytest
 from roadeval.data import FrameResult, Packed, Role
 from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.geometry.ground import ground_of
+from roadeval.geometry.settings import GroundSettings
 from roadeval.results.facts import Facts, FrameAccount, digest_of
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
@@ -31,7 +33,8 @@ OF_A_DRIVE = [name for name in ALL_TABLES if name != "unlabelled"]
 
 def a_board() -> Scoreboard:
     settings = EvaluationSettings(window=2, boundary_width=1, bands=2)
-    return Scoreboard(settings, ["filtered"], BlindPrior.of_truths(TRUTHS))
+    ground, _ = ground_of(None, GroundSettings(height=1.5, pitch=30, fov=60), (4, 2))
+    return Scoreboard(settings, ["filtered"], BlindPrior.of_truths(TRUTHS), ground)
 
 
 def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResult]:
@@ -70,6 +73,8 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
     write(tmp_path)
     first = {path.stem: path.read_text().splitlines()[0] for path in tmp_path.glob("*.csv")}
     assert first == {
+        "edges": "drive,camera,frame,variant,stage,measure,where,mask_m,truth_m",
+        "metres": "drive,camera,variant,measure,where,frames,missing,value,p95,low,high",
         "frames": "drive,camera,frame,stamp_ns,log_time_ns,variant,stage,TP,TN,FP,FN,N,"
         "ACC,ERR,TPR,FNR,TNR,FPR",
         "windows": "drive,camera,window,first_frame,last_frame,frames,variant,stage,"
@@ -171,8 +176,11 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
 def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -> None:
     write(tmp_path)
     regions = ResultsFolder(tmp_path).table("regions")
-    assert len(regions) == 3 * 2 * 5
-    assert set(regions["region"]) == {"shadow", "boundary", "interior", "band_0", "band_1"}
+    assert len(regions) == 3 * 2 * 11
+    assert set(regions["region"]) == {
+        *("shadow", "boundary", "interior", "band_0", "band_1"),
+        *("0-10m", "10-20m", "20-40m", "40-80m", "no_ground", "from_above"),
+    }
     whole = ResultsFolder(tmp_path).table("frames")
     bands = regions[regions["region"].str.startswith("band_")]
     summed = bands.groupby(["frame", "variant"])["FP"].sum().to_dict()

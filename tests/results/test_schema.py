@@ -7,7 +7,8 @@ from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, STREAMED, TABLES, Kin
 
 
 def test_the_tables_that_grow_frame_by_frame():
-    assert list(STREAMED) == ["frames", "regions", "oracles", "disagreements", "unlabelled"]
+    streamed = ["frames", "regions", "oracles", "disagreements", "unlabelled", "edges"]
+    assert list(STREAMED) == streamed
 
 
 @pytest.mark.parametrize("name", ["frames", "oracles", "windows"])

@@ -23,7 +23,8 @@ Drives = Annotated[
 
 
 @takes(
-    *("preset", "config", "variants", "nets", "masks", "tunes", "only", "cameras", "drives"),
+    *("preset", "config", "variants", "nets", "masks", "tunes", "only", "cameras", "ground"),
+    *("drives",),
     *("training", "truth", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )

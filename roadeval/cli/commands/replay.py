@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @takes(
     *("output", "preset", "config", "variants", "nets", "masks", "tunes", "only"),
-    *("training", "truth", "topics", "cameras", "labels", "frames", "run"),
+    *("training", "truth", "topics", "cameras", "ground", "labels", "frames", "run"),
 )
 def replay(
     drive: arguments.Drive,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +11,9 @@ from roadeval.cli import console
 from roadeval.cli.screens import tables
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import counted, interval, percent, points, short_names
+from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import FULL, SHORT
+from roadeval.evaluation.score import Measured
 from roadeval.evaluation.stats import Difference
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Cell, Table, Text
@@ -50,6 +52,9 @@ def show(outcome: Outcome, out: Console) -> None:
         out.print(facts.verdict)
         out.print()
         _show_scores(facts, out)
+        if outcome.metres:
+            out.print()
+            tables.show_table(by_distance(outcome.metres), out)
     else:
         out.print(f"Nothing to score: {_why_nothing(facts.frames)}.")
         for sentence in without_truth(facts.unlabelled):
@@ -103,6 +108,19 @@ def scores(totals: Totals) -> Table:
             rows.append([Cell(text, bold=best) for text in texts])
     titles = ["variant", "stage", "frames", *RATES.values()]
     return Table(titles, rows, text_columns=(0, 1), breaks=breaks)
+
+
+def by_distance(metres: Sequence[Measured]) -> Table:
+    """Tabulate ERR of final masks by distance ahead, and by area of the ground seen from above."""
+    errors = [each for each in metres if each.measure == "ERR"]
+    found = {(each.variant, each.where): each.value for each in errors}
+    places = list(dict.fromkeys(each.where for each in errors))
+    rows = [
+        [variant, *(percent(found[variant, place]) for place in places)]
+        for variant in dict.fromkeys(each.variant for each in errors)
+    ]
+    heads = ["by area" if place == ABOVE else place for place in places]
+    return Table(["ERR %, on the ground", *heads], rows)
 
 
 def over_thresholds(curves: Totals) -> Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from functools import lru_cache
 from typing import Final
@@ -10,6 +11,7 @@ import numpy as np
 
 from roadeval.data import Packed, TruthBits, everywhere
 from roadeval.data.arrays import Bits
+from roadeval.evaluation.metres import ABOVE, UNPLACED
 from roadeval.evaluation.region import LabelledFrame, Region, grow, square
 
 SHADOW_TITLES: Final = {
@@ -82,6 +84,15 @@ def _titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
     return titles
 
 
+def _titles_of_distances(names: Collection[str], _height: int) -> dict[str, str]:
+    found = {name: match for name in names if (match := _DISTANCE.fullmatch(name))}
+    titles = {name: f"{match[1]} to {match[2]} m ahead" for name, match in found.items()}
+    if UNPLACED in names:
+        titles[UNPLACED] = "farther away, or above the horizon"
+    return titles
+
+
+_DISTANCE: Final = re.compile(r"(\d+)-(\d+)m")
 REGIONS: Final = (
     Region(SHADOW_TITLES, order=10, find=detected),
     Region({"true_shadow": "inside true shadow"}, order=20, find=true_shadow),
@@ -97,4 +108,11 @@ REGIONS: Final = (
         find=lambda frame: row_bands(frame.truth.shape, frame.settings.bands),
         whole=True,
     ),
+    Region(
+        _titles_of_distances,
+        order=50,
+        find=lambda frame: frame.survey.regions if frame.survey else {},
+        whole=True,
+    ),
+    Region({ABOVE: "the ground seen from above"}, order=51, find=lambda _: {}),
 )

@@ -26,6 +26,7 @@ from roadeval.evaluation.score.frame import (
     judge,
     light_of,
 )
+from roadeval.evaluation.score.metres import Measured, differences_of
 from roadeval.evaluation.score.rows import (
     FILTER,
     by_region,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from roadeval.data import (
     ROAD,
     Counts,
     Frame,
+    FrameMetres,
     FrameResult,
     Health,
     Histogram,
@@ -31,8 +32,10 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Bits, Sums
 from roadeval.evaluation import metrics, regions
+from roadeval.evaluation.metres import ABOVE, Surveys
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.score.counts import Name, contours, count, error_map
+from roadeval.evaluation.score.metres import measure
 from roadeval.evaluation.score.thresholds import changes
 from roadeval.evaluation.score.unlabelled import doubts_of
 from roadeval.evaluation.settings import (
@@ -58,6 +61,8 @@ def score_frame(
     variants: tuple[VariantResult, ...],
     settings: EvaluationSettings,
     prior: BlindPrior | None,
+    *,
+    surveys: Surveys | None = None,
 ) -> FrameResult:
     """Score one frame; one that is not `EVALUATED` is passed on without counts.
 
@@ -65,7 +70,8 @@ def score_frame(
     how much each mask is in doubt.
 
     A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
-    stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on.
+    stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on;
+    ``surveys`` are those of the ground, where the camera is known.
     """
     if role is Role.TRAINING and frame.truth is not None:
         return FrameResult(frame, role, variants, histograms=_histograms(frame.truth, variants))
@@ -80,18 +86,20 @@ def score_frame(
     if prior is not None:
         masks[BASELINE, FINAL_STAGE] = prior.mask(truth.shape)
     names, bits = list(masks), truth.bits_of(masks.values())
-    tallies = tally(
-        names, bits, truth, regions.of_frame(LabelledFrame(frame, truth, variants, settings))
-    )
+    survey = surveys.of(truth.shape) if surveys else None
+    labelled = LabelledFrame(frame, truth, variants, settings, survey)
+    tallies = tally(names, bits, truth, regions.of_frame(labelled))
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
     final_bits = {variant: mask for (variant, _), mask in zip(names, bits, strict=True)}
+    metres = measure(survey, final_bits, truth) if survey else {}
+    last = dict(names)
     return FrameResult(
         frame,
         role,
         variants,
         errors={v.variant: error_map(v.final(), frame.truth) for v in variants},
-        tallies=tallies,
+        tallies=tuple(_with_ground(each, metres, last) for each in tallies),
         health={name: judge(own, blind) for name, own in finals.items()},
         truth_bits=truth,
         changes=changes(names, bits, truth),
@@ -99,7 +107,22 @@ def score_frame(
         histograms=_histograms(frame.truth, variants),
         oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
         repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
+        metres=metres,
+        above={
+            (variant.variant, each.stage): survey.histogram(each.output.probability, frame.truth)
+            for variant in variants
+            for each in variant.stages
+            if survey and each.output.probability is not None
+        },
     )
+
+
+def _with_ground(tally: Tally, metres: Mapping[str, FrameMetres], last: Mapping[str, str]) -> Tally:
+    """Return a final mask's tally with its cells of the ground seen from above as a region."""
+    if tally.variant not in metres or last[tally.variant] != tally.stage:
+        return tally
+    counts = Counts(*metres[tally.variant].counts[0, -1].tolist())
+    return replace(tally, regions={**tally.regions, ABOVE: counts})
 
 
 def _histograms(truth: Truth, variants: Iterable[VariantResult]) -> dict[Name, Histogram]:

@@ -33,6 +33,7 @@ from roadeval.data import (
     Transition,
     VariantResult,
 )
+from roadeval.evaluation.metres import Surveys
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
     CameraMasks,
@@ -49,10 +50,12 @@ from roadeval.evaluation.score.counts import (
     sum_up,
 )
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
+from roadeval.evaluation.score.metres import Measured, MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
 from roadeval.evaluation.stats import CameraRates, Difference, holm, within_drive
+from roadeval.geometry.ground import Ground
 
 TESTED: Final = "ERR"
 """The rate whose differences are findings. Those of the final masks against one base are a family,
@@ -163,17 +166,25 @@ class Scoreboard:
     """Scores frames against their truth and sums up the drive.
 
     ``variants`` are the names of all, in the order of the tables; ``prior`` is the ``blind``
-    baseline, or None where no frame with truth was trained on.
+    baseline, or None where no frame with truth was trained on; ``ground`` is what is before the
+    camera, where that is known.
     """
 
     def __init__(
-        self, settings: EvaluationSettings, variants: Sequence[str], prior: BlindPrior | None
+        self,
+        settings: EvaluationSettings,
+        variants: Sequence[str],
+        prior: BlindPrior | None,
+        ground: Ground | None = None,
     ) -> None:
         if BASELINE in variants:
             raise ValueError(f"no variant may be called {BASELINE!r}")
         self._settings: Final = settings
         self._order: Final = (*variants, BASELINE)
         self._prior: Final = prior
+        self._surveys: Final = Surveys(ground, settings) if ground else None
+        self._metres: Final = MetreSums()
+        self._above: Final = Curves()
         self._frames: Final[list[int]] = []
         self._stamps: Final = array("q")
         self._roles: Final[Counter[str]] = Counter()
@@ -195,7 +206,9 @@ class Scoreboard:
 
     def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
         """Score one frame; changes nothing, so any thread may call it at any time."""
-        return score_frame(frame, role, variants, self._settings, self._prior)
+        return score_frame(
+            frame, role, variants, self._settings, self._prior, surveys=self._surveys
+        )
 
     def add(self, result: FrameResult) -> tuple[Doubt, ...]:
         """Add a scored frame: in the drive's order, from one thread.
@@ -227,6 +240,8 @@ class Scoreboard:
         for step, change in result.changes.items():
             self.changes[step] += change
         self.curves.add(result.frame.number, result.histograms)
+        self._metres.add(result.metres)
+        self._above.add(result.frame.number, result.above)
         self._frames.append(result.frame.number)
         self._stamps.append(result.frame.stamp_ns)
         return doubts
@@ -255,6 +270,10 @@ class Scoreboard:
     def regions(self) -> dict[tuple[str, str, str], Total]:
         """Sum up by variant, stage and region, as in `totals`."""
         return self._regions.totals()
+
+    def metres(self) -> Iterator[Measured]:
+        """Yield the measures in metres; none where the camera is not known."""
+        return self._metres.totals(self._above)
 
     def windows(self) -> Iterator[Window]:
         """Cut the drive into windows: by window, then variant and stage."""

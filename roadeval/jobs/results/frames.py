@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from operator import itemgetter
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
@@ -14,6 +15,7 @@ from roadeval.data import (
     BASELINE,
     ERRORS,
     FILTERED,
+    IGNORE,
     TRUTH,
     UNFILTERED,
     Health,
@@ -23,8 +25,10 @@ from roadeval.data import (
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import NOTEWORTHY
+from roadeval.geometry.plan import Plan
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import DriveResult
+from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
@@ -160,8 +164,22 @@ class FramePicker:
 
     def strip(self, frame: int, inspect: Callable[[int], str] | None, layers: int = SMALL) -> Strip:
         """Return a frame with its pictures, those of layers of at most so many pixels across."""
-        command = inspect(frame) if inspect else ""
-        return strip(self._pictured(frame), self._all, command, layers)
+        command, made = inspect(frame) if inspect else "", self._pictured(frame)
+        above = [*self._from_above(made)]
+        made = replace(made, layers=[*made.layers, *([above] if above else [])])
+        return strip(made, self._all, command, layers)
+
+    def _from_above(self, made: NotableFrame) -> Iterator[LayerImage]:
+        """Yield camera, truth and errors of a frame as they look from above, on known ground."""
+        facts = self._result.facts
+        if (ground := facts.drive.ground) is None:
+            return
+        plan = Plan(ground, *facts.evaluation.plan, facts.evaluation.plan_width, CELL)
+        for each in made.images:
+            if each.image.shape[:2] == (ground.height, ground.width):
+                seen = None if each.array is None else plan.picture(each.array, IGNORE)
+                title = f"from above: {each.title.replace(': ', ', ')}"
+                yield LayerImage(title, plan.picture(each.image), each.spec, seen)
 
     def wrong(self, lock: Lock) -> dict[tuple[str, str], tuple[list[int], npt.NDArray[np.uint8]]]:
         """Return where all frames with pictures have errors, by variant and outcome.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,15 +17,17 @@ from roadeval.data.result import Cells
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
+from roadeval.evaluation.metres import band_name
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.stats import mean_distribution
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import FramePicker, browsed, evenly, strips_of
 from roadeval.jobs.results.result import DriveResult, Result, RigResult
 from roadeval.report.blocks import Document, ImageFile
-from roadeval.report.charts.standard import BEHIND, WRONG
+from roadeval.report.charts.standard import BEHIND, WRONG, Interval
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import (
     Commands,
@@ -190,7 +193,25 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         coverage=_coverage(result, pictured),
         behind=dict(_behind(rows, score.finals(result.table("regions")))) if len(rows) else {},
         camera=result.camera,
+        metres=result.table("metres"),
+        by_distance=dict(_by_distance(result)) if len(rows) else {},
     )
+
+
+def _by_distance(result: DriveResult) -> Iterator[tuple[tuple[str, str], Interval]]:
+    """Yield the mean ERR of each final mask in each band of distance, with its interval."""
+    rows, settings = score.finals(result.table("regions")), result.facts.evaluation
+    bands = [band_name(*ends) for ends in pairwise(settings.distances)]
+    for variant in rows.distinct("variant"):
+        own = rows.of_variant(variant)
+        for band in bands:
+            there = own.take((own["region"] == band) & (own["N"] > 0))
+            errors = (there["FP"] + there["FN"]) / there["N"]
+            if len(errors):
+                low = high = None
+                if len(errors) >= settings.least_frames and np.ptp(errors):
+                    low, high = mean_distribution(errors).interval(settings.confidence)
+                yield (band, variant), (float(errors.mean()), low, high)
 
 
 def collect_rig(rig: RigResult, commands: Commands | None = None) -> Findings:

@@ -136,6 +136,11 @@ class Run:
     def calibration(self) -> Calibration | None:
         """The camera's calibration, for frames as they are read."""
         known, size = self.selection.calibration, self.selection.size
+        if (ground := self.selection.ground_as_read) and ground.is_posed:
+            frame = known.frame_id if known else self.key.camera.strip("/")
+            topic, mounting = (known.topic, known.mounting) if known else ("", None)
+            lens = ground.width, ground.height, ground.matrix, ground.model, ground.distortion
+            return Calibration(topic, *lens, frame, mounting)
         return known.scaled(*size) if known and size else None
 
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
@@ -162,6 +167,8 @@ class Run:
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
             calibration=self.calibration,
+            ground=self.selection.ground_as_read,
+            extent=(*self.config.evaluation.plan, self.config.evaluation.plan_width),
             tables={name: TABLES[name].header for name in STREAMED},
             properties=self._properties(),
         )
@@ -215,7 +222,8 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         ),
     )
     prior = None if model.prior is None else BlindPrior(model.prior)
-    board = Scoreboard(config.evaluation, [layout.name for layout in layouts], prior)
+    names = [layout.name for layout in layouts]
+    board = Scoreboard(config.evaluation, names, prior, selection.ground_as_read)
     return Run(
         log,
         config,

@@ -13,6 +13,7 @@ from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
 from roadeval.evaluation.comparison import Condition, Judgement
+from roadeval.evaluation.score import Measured
 from roadeval.fleet import readable
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -51,6 +52,8 @@ class Outcome:
     """Where in their code stages failed that are among the losses."""
     rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     """Those of the tables ``scores`` and ``effects``."""
+    metres: tuple[Measured, ...] = ()
+    """What was measured on the ground; of one camera that is known."""
     judgements: tuple[Judgement, ...] = ()
     """Of the conditions that were given."""
 
@@ -169,6 +172,7 @@ def _written(
         tuple(files),
         tracebacks=tracebacks,
         rows={name: [row for own in ended for row in own.rows[name]] for name in ended[0].rows},
+        metres=ended[0].metres if len(ended) == 1 else (),
     )
 
 
@@ -182,6 +186,7 @@ class _Ended:
     windows: Sequence[Row]
     rows: Mapping[str, list[dict[str, Any]]]
     """Those of ``scores`` and ``effects``."""
+    metres: tuple[Measured, ...]
 
 
 def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _Ended:
@@ -199,6 +204,7 @@ def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -
         _texts(run, facts, sums),
         rows["windows"],
         {"scores": scores, "effects": list(effect_rows(facts))},
+        tuple(run.board.metres()),
     )
 
 

@@ -67,6 +67,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             rate_hz=run.selection.image.rate_hz,
             topics=[*run.selection.reasons, *run.config.ignored()],
             calibration=run.calibration,
+            ground=run.selection.ground_as_read,
         ),
         frames=_accounting(run),
         seeds={"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else {},

@@ -6,6 +6,7 @@ topic; and static transforms, ROS's ``tf2_msgs/TFMessage`` and Foxglove's ``Fram
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -28,6 +29,17 @@ Transform = tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
 
 
+_RECTIFIED: Final = re.compile(r"(?:^|[_.-])(?:rect(?:ified)?|undist\w*)(?:$|[_.-])", re.I)
+
+
+def is_rectified(name: str) -> bool:
+    """Return whether images or labels without distortion have this name, as ``image_rect_color``.
+
+    The last two parts of a path tell.
+    """
+    return any(map(_RECTIFIED.search, name.rstrip("/").split("/")[-2:]))
+
+
 def calibration_of(
     image: TopicInfo, topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]
 ) -> tuple[Calibration | None, str]:
@@ -40,7 +52,7 @@ def calibration_of(
     for topic in topics:
         if topic.kind is TopicKind.CALIBRATION and topic.count:
             with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
-                found[topic.name] = _read(topic.name, readers[topic.name].fields(0))
+                found[topic.name] = _read(topic.name, readers[topic.name].fields(0), image.name)
     own = [e for e in found.values() if not e.frame_id or e.frame_id == image.frame_id]
     near = {each.topic: _shared(each.topic, image.name) for each in own}
     best = [each for each in own if near[each.topic] == max(near.values())]
@@ -51,6 +63,10 @@ def calibration_of(
         return None, f"{made.topic}: its focal length is 0: the camera was never calibrated"
     if image.size not in (None, (made.width, made.height)):
         return None, f"{made.topic}: it is for images of {made.width}x{made.height}"
+    with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+        reader = readers[made.topic]
+        if _read(made.topic, reader.fields(len(reader) - 1), image.name) != made:
+            return None, f"{made.topic}: it changes within the log"
     static = [each for each in topics if each.kind is TopicKind.TRANSFORMS]
     transforms = dict(_transforms(readers[each.name] for each in static))
     return replace(made, mounting=_mounting(made.frame_id, transforms)), ""
@@ -62,7 +78,9 @@ def _shared(one: str, other: str) -> int:
     return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)
 
 
-def _read(topic: str, message: Any) -> Calibration:
+def _read(topic: str, message: Any, image: str) -> Calibration:
+    """Read a message. Of rectified images it is the projection that holds, without distortion."""
+
     def numbers(name: str) -> tuple[float, ...]:
         value = getattr(message, name, None)
         return tuple(map(float, getattr(message, name.upper()) if value is None else value))
@@ -71,15 +89,12 @@ def _read(topic: str, message: Any) -> Calibration:
     matrix = numbers("k")
     if len(matrix) != 9 or not np.isfinite(matrix).all():
         raise ValueError(topic)
-    return Calibration(
-        topic,
-        int(message.width),
-        int(message.height),
-        matrix,
-        str(message.distortion_model),
-        numbers("d"),
-        str(header.frame_id),
-    )
+    lens = str(message.distortion_model), numbers("d")
+    if is_rectified(image):
+        p, lens = numbers("p"), ("", ())
+        matrix = (*p[:3], *p[4:7], *p[8:11])
+    size = int(message.width), int(message.height)
+    return Calibration(topic, *size, matrix, *lens, str(header.frame_id))
 
 
 def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform]]:

@@ -16,6 +16,7 @@ from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import format_of, size_of
 from roadeval.logs.settings import LabelPlace, MaskSettings
+from roadeval.logs.topics.calibration import is_rectified
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.meaning import (
     TOP,
@@ -42,7 +43,6 @@ from roadeval.logs.truth.pairing import (
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
-_RECTIFIED: Final = re.compile(r"(?:^|[_.-])(?:rect(?:ified)?|undist\w*)(?:$|[_.-])", re.I)
 _RAW: Final = re.compile(r"image_raw")
 _BYTE: Final = 255
 """Greatest code of a confidence map of 16 bits that was made for 8."""
@@ -168,14 +168,12 @@ def other_optics(labels: str, topic: str) -> tuple[str, ...]:
     """Return a warning where names say that labels are of rectified images and the camera's not.
 
     Both have the same size and stamps, so that nothing but the names of folder, file or topic
-    (its last two parts) can tell, as ``image_rect_color`` does.
+    can tell.
 
     >>> other_optics("labels_rectified", "/front/image_rect")
     ()
     """
-    rectified, of_camera = (
-        any(map(_RECTIFIED.search, text.rstrip("/").split("/")[-2:])) for text in (labels, topic)
-    )
+    rectified, of_camera = map(is_rectified, (labels, topic))
     if rectified == of_camera or (of_camera and not _RAW.search(labels)):
         return ()
     theirs, ours = ("rectified", "raw") if rectified else ("raw", "rectified")

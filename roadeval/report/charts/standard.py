@@ -14,7 +14,7 @@ import numpy.typing as npt
 from roadeval.data import BASELINE, Rows, colours
 from roadeval.data.arrays import Floats, Sums
 from roadeval.data.result import Cells
-from roadeval.data.words import in_percent, points
+from roadeval.data.words import DASH, in_percent, points
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import LEVELS, Thresholds, merged
@@ -236,6 +236,32 @@ def trimap(found: Mapping[str, Mapping[str, Sequence[int]]]) -> Chart:
     return Chart("ERR within so many pixels of the edge", ChartKind.LINES, drawn, names)
 
 
+def in_metres(name: str) -> str:
+    """Return the name of a distance, or of a band of it, for people, as ``20 m``."""
+    return name.replace("-", DASH).replace("m", " m")
+
+
+def by_distance(found: Mapping[tuple[str, str], Interval], variants: Sequence[str]) -> Chart:
+    """Return the error rate by distance ahead, with intervals: by region and variant.
+
+    Each variant has a row of its own in each band.
+    """
+    bands = list(dict.fromkeys(band for band, _ in found))
+    drawn, step = looks(variants), len(variants)
+    return Chart(
+        "ERR by distance ahead",
+        ChartKind.MARKS,
+        [
+            _intervals(
+                *(name, drawn[name], range(place, step * len(bands), step)),
+                [found.get((band, name), (None, None, None)) for band in bands],
+            )
+            for place, name in enumerate(variants)
+        ],
+        names=[name for band in bands for name in (in_metres(band), *[""] * (step - 1))],
+    )
+
+
 def heat(maps: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[HeatMap]:
     """Yield where each variant has false positives and negatives; equal shades are equal shares.
 
@@ -267,7 +293,7 @@ LEAST: Final = 0.001
 """The difference on either side of zero that is shown at least: less may be rounding."""
 
 
-_Interval = tuple[float | None, float | None, float | None]
+Interval = tuple[float | None, float | None, float | None]
 """A mean and the ends of its interval, as fractions."""
 
 
@@ -404,7 +430,7 @@ def _intervals(
     name: str,
     look: Look,
     places: Sequence[int],
-    found: Sequence[_Interval],
+    found: Sequence[Interval],
 ) -> Series:
     """Return means and the ends of their intervals, all as fractions, as a series."""
     columns = ([in_percent(each) for each in column] for column in zip(*found, strict=True))

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import DASH, MINUS, defined, number, percent, points
+from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.score import BINS, FILTER, merged
@@ -213,7 +214,9 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
     if not findings.regions:
         return
     yield Heading("Where the errors are")
-    names = titles([*dict.fromkeys(region for region, _ in findings.regions)], findings.height)
+    found = dict.fromkeys(region for region, _ in findings.regions)
+    # What counts cells of ground has no share of the pixels.
+    names = titles([name for name in found if name != ABOVE], findings.height)
     yield Figure(
         charts.regions(
             *(findings.regions, [*findings.finals], names),

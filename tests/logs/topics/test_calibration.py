@@ -172,44 +172,68 @@ def test_a_camera_of_ros_1_is_known(tmp_path: Path):
     assert (known.matrix, known.distortion, known.mounting) == (tuple(K), tuple(D), None)
 
 
-def test_a_camera_of_foxglove_is_known(tmp_path: Path):
-    time = {"sec": 5, "nsec": 0}
-    lens = {"width": 64, "height": 48, "distortion_model": "rational_polynomial", "D": D, "K": K}
-    (_, _, at, turn), _ = TREE
-    messages = {
-        "/front/calibration": (
-            "foxglove.CameraCalibration",
-            {"timestamp": time, "frame_id": "cam", **lens},
-        ),
-        "/tf_static": (
-            "foxglove.FrameTransform",
-            {
-                "timestamp": time,
-                "parent_frame_id": "car",
-                "child_frame_id": "cam",
-                "translation": dict(zip("xyz", at, strict=True)),
-                "rotation": dict(zip("xyzw", turn.as_quat().tolist(), strict=True)),
-            },
-        ),
-        "/front/image": (
-            "foxglove.CompressedImage",
-            {"timestamp": time, "frame_id": "cam", "format": "jpeg", "data": list(image())},
-        ),
-    }
-    with (tmp_path / "a.mcap").open("wb") as file:
+Message = tuple[str, str, dict[str, Any]]
+"""Topic, kind and content."""
+TIME = {"sec": 5, "nsec": 0}
+
+
+def picture(topic: str = "/front/image") -> Message:
+    content = {"timestamp": TIME, "frame_id": "cam", "format": "jpeg", "data": list(image())}
+    return topic, "foxglove.CompressedImage", content
+
+
+def lens(focal: float = K[0]) -> Message:
+    known = {"width": 64, "height": 48, "distortion_model": "rational_polynomial", "D": D}
+    k = [focal, *K[1:]]
+    p = [40.0, 0, 30, 0, 0, 41.0, 20, 0, 0, 0, 1, 0]
+    content = {"timestamp": TIME, "frame_id": "cam", **known, "K": k, "P": p}
+    return "/front/calibration", "foxglove.CameraCalibration", content
+
+
+def foxglove(path: Path, messages: list[Message]) -> Path:
+    with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
-        for topic, (name, message) in messages.items():
-            schema = writer.register_schema(name, "jsonschema", b"{}")
-            channel = writer.register_channel(topic, "json", schema)
+        channels: dict[str, int] = {}
+        for topic, name, content in messages:
+            if topic not in channels:
+                schema = writer.register_schema(name, "jsonschema", b"{}")
+                channels[topic] = writer.register_channel(topic, "json", schema)
             when = 5 * 10**9
-            writer.add_message(channel, when, json.dumps(message).encode(), when)
+            writer.add_message(channels[topic], when, json.dumps(content).encode(), when)
         writer.finish()
-    known, _ = found(tmp_path / "a.mcap")
+    return path
+
+
+def test_a_camera_of_foxglove_is_known(tmp_path: Path):
+    (_, _, at, turn), _ = TREE
+    place = {
+        "timestamp": TIME,
+        "parent_frame_id": "car",
+        "child_frame_id": "cam",
+        "translation": dict(zip("xyz", at, strict=True)),
+        "rotation": dict(zip("xyzw", turn.as_quat().tolist(), strict=True)),
+    }
+    messages = [lens(), ("/tf_static", "foxglove.FrameTransform", place), picture()]
+    known, _ = found(foxglove(tmp_path / "a.mcap", messages))
     assert known is not None
     assert known.mounting is not None
     assert (known.matrix, known.model) == (tuple(K), "rational_polynomial")
     assert (known.mounting.parent, known.mounting.translation) == ("car", at)
+
+
+def test_of_rectified_images_the_projection_holds_without_distortion(tmp_path: Path):
+    messages = [lens(), picture("/front/image_rect")]
+    known, _ = found(foxglove(tmp_path / "a.mcap", messages))
+    assert known is not None
+    assert known.matrix == (40, 0, 30, 0, 41, 20, 0, 0, 1)
+    assert not known.distortion
+
+
+def test_a_calibration_that_changes_within_the_log_is_not_used(tmp_path: Path):
+    messages = [lens(), picture(), lens(), lens(focal=60.0)]
+    path = foxglove(tmp_path / "a.mcap", messages)
+    assert found(path) == (None, "/front/calibration: it changes within the log")
 
 
 def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
@@ -257,4 +281,5 @@ def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
     known = Calibration("/c", 64, 48, tuple(K)).scaled(32, 16)
     point = np.array([0.3, -0.2, 2.0])
     whole, less = (np.array(m).reshape(3, 3) @ point for m in (K, known.matrix))
-    assert less[:2] / less[2] == pytest.approx(whole[:2] / whole[2] / [2, 3])
+    # The image's corner, half a pixel before the centre of its first one, stays where it is.
+    assert less[:2] / less[2] + 0.5 == pytest.approx((whole[:2] / whole[2] + 0.5) / [2, 3])

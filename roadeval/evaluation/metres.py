@@ -1,0 +1,305 @@
+"""Masks in metres: distance bands, the ground seen from above, edges of the road, free distance.
+
+All of it holds for flat ground. How far a wrong pitch or height would move a number is counted by
+counting again as if the camera stood otherwise, see `STANCES`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import CODES, NON_ROAD, ROAD, Histogram, Probability, Truth
+from roadeval.data.arrays import Bits, Floats, Matrix, Sums, TruthBits, pack, unpack
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.geometry.ground import Ground
+from roadeval.geometry.plan import OUTSIDE, Plan, pixels_of
+
+STANCES: Final = ((0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -0.05), (0.0, 0.05))
+"""As the camera is said to stand, and as it might: degrees further down, and metres higher."""
+ABOVE: Final = "from_above"
+"""The region of the ground seen from above: it counts square cells of ground, not pixels."""
+UNPLACED: Final = "no_ground"
+"""The region of the pixels above the horizon, or farther away than all bands."""
+LEFT: Final = "left_edge"
+RIGHT: Final = "right_edge"
+FREE: Final = "free_distance"
+"""The measures of a mask's ends."""
+STEP: Final = 0.004
+"""Metres between the places of a line that are looked up, to find the pixels that it crosses."""
+FARTHEST: Final = 4000
+"""Places of a line at most."""
+GAP: Final = 0.3
+"""A gap in the road of fewer metres across is no edge; ahead of fewer than `GAP_AHEAD`."""
+GAP_AHEAD: Final = 0.5
+Pixels = npt.NDArray[np.intp]
+"""``(n,)``: places in a flat image; `OUTSIDE` of none."""
+
+
+class Surveys:
+    """The survey for images of each size, made once."""
+
+    def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:
+        self._ground: Final = ground
+        self._settings: Final = settings
+        self._made: Final[dict[tuple[int, int], Survey]] = {}
+
+    def of(self, shape: tuple[int, int]) -> Survey:
+        """Return the survey for images of ``shape``, height and width."""
+        if shape not in self._made:
+            self._made[shape] = Survey(self._ground.scaled(shape[1], shape[0]), self._settings)
+        return self._made[shape]
+
+
+def plan_of(ground: Ground, settings: EvaluationSettings) -> Plan:
+    """Return the ground seen from above whose cells are counted."""
+    return Plan(ground, *settings.plan, settings.plan_width, settings.plan_cell)
+
+
+def band_name(near: int, far: int) -> str:
+    """Return the name of a band of distance, as a region.
+
+    >>> band_name(10, 20)
+    '10-20m'
+    """
+    return f"{near}-{far}m"
+
+
+class Survey:
+    """What of an image lies where on the ground.
+
+    For images of the size of ``ground``.
+    """
+
+    def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:
+        self.ground: Final = ground
+        self._settings: Final = settings
+        self._shape: Final = ground.height, ground.width
+        self._grounds: Final = [ground.moved(*each) for each in STANCES[: self.stances]]
+        edges = [(name, at) for at in settings.edges_at for name in (LEFT, RIGHT)]
+        self.measures: Final = (*edges, (FREE, 0))
+        """The name of each measure, and the distance at which it is taken."""
+
+    @property
+    def stances(self) -> int:
+        """How many of `STANCES` are counted: the first alone where a homography is all there is."""
+        return len(STANCES) if self.ground.is_posed else 1
+
+    @cached_property
+    def bands(self) -> list[dict[str, Bits]]:
+        """The bands of distance for each stance, ``(H, words)`` each, by name."""
+        height, width = self._shape
+        columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+        pixels = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64)
+        found = []
+        for ground in self._grounds:
+            ahead = ground.places(pixels)[:, 0].reshape(self._shape)
+            found.append(
+                {
+                    band_name(near, far): pack((near <= ahead) & (ahead < far))
+                    for near, far in pairwise(self._settings.distances)
+                }
+            )
+        return found
+
+    @cached_property
+    def regions(self) -> dict[str, Bits]:
+        """The regions of the frame that it counts: the bands, and what lies in none."""
+        bands = self.bands[0]
+        placed = unpack(np.bitwise_or.reduce([*bands.values()]), self._shape[1])
+        return {**bands, UNPLACED: pack(placed == 0)}
+
+    def histogram(self, probability: Probability, truth: Truth) -> Histogram:
+        """Count cells of the ground seen from above as `roadeval.data.histogram` does pixels."""
+        first, pixels, cells = self._above
+        codes, labels = (each[first:].ravel()[pixels] for each in (probability, truth))
+        counts = [
+            np.bincount(codes[labels == each], cells[0, labels == each], CODES)
+            for each in (NON_ROAD, ROAD)
+        ]
+        return np.array(counts, np.uint32)
+
+    @cached_property
+    def _above(self) -> tuple[int, Pixels, npt.NDArray[np.float32]]:
+        """The first row seen from above, the pixels below it, and the cells that each stands for.
+
+        Cells are ``(S, n)``, for each stance: a cell takes the pixel in which its centre lies.
+        """
+        height, width = self._shape
+        cells = np.zeros((len(self._grounds), height * width), np.float32)
+        for stance, ground in enumerate(self._grounds):
+            found = plan_of(ground, self._settings).cells
+            cells[stance] = np.bincount(found[found != OUTSIDE], minlength=height * width)
+        used = np.flatnonzero(cells.any(axis=0))
+        first = int(used[0]) // width if len(used) else height
+        return first, used - first * width, cells[:, used]
+
+    def from_above(self, masks: Bits, truth: TruthBits) -> Sums:
+        """Count cells of ground by outcome, ``(K, S, 4)``: of ``(K, H, words)`` masks."""
+        first, pixels, cells = self._above
+        width = self._shape[1]
+        rows = np.concatenate([[truth.road, truth.other], masks])[:, first:]
+        sets = np.concatenate([rows[:2], rows[2:] & rows[0], rows[2:] & rows[1]])
+        flags = np.unpackbits(sets.view(np.uint8), axis=2, count=width, bitorder="little")
+        taken = flags.reshape(len(flags), -1).take(pixels, axis=1).astype(np.float32)
+        # Whole numbers below 2 ** 24: float32 adds them without error, in any order.
+        road, other, *found = (cells @ taken.T).T.astype(np.int64)
+        tp, fp = np.reshape(found, (2, len(masks), -1))
+        return np.stack([tp, other - fp, fp, road - tp], axis=2)
+
+    @cached_property
+    def _lines(self) -> list[_Line]:
+        """The lines along which a road's ends are looked for: of each stance one a measure's place.
+
+        They lie across at each distance, and straight ahead.
+        """
+        settings = self._settings
+        half = settings.plan_width / 2
+        across = np.linspace(half, -half, min(FARTHEST, round(2 * half / STEP)) | 1)
+        ahead = np.geomspace(1.0, settings.distances[-1], FARTHEST)
+        lines = []
+        for ground in self._grounds:
+            for at in settings.edges_at:
+                places = np.column_stack([np.full_like(across, at), across])
+                lines.append(self._line(ground, places, across))
+            lines.append(self._line(ground, np.column_stack([ahead, 0 * ahead]), ahead))
+        return lines
+
+    def _line(self, ground: Ground, places: Matrix, along: Floats) -> _Line:
+        seen = pixels_of(ground, places)
+        inside: Pixels = np.flatnonzero(seen != OUTSIDE)
+        if not len(inside):
+            return _Line(np.zeros(0, np.intp), [0.0])
+        part = slice(inside[0], inside[-1] + 1)
+        seen, along = seen[part], along[part]
+        steps = np.flatnonzero(np.diff(seen)) + 1
+        borders = np.concatenate([along[:1], (along[steps - 1] + along[steps]) / 2, along[-1:]])
+        return _Line(seen[np.concatenate([[0], steps])], borders.tolist())
+
+    def ends(self, masks: Bits, truth: TruthBits) -> Floats:
+        """Return where masks and the truth end, ``(K, S, M, 2)``, see `FrameMetres.ends`.
+
+        Across, the truth's road is the one nearest to the line straight ahead, and a mask's the one
+        nearest to the middle of that; what runs out of the picture, or into pixels without truth,
+        has no end there. Ahead, both end at the latest where the truth is no longer known.
+        """
+        lines, places = self._lines, len(self._settings.edges_at) + 1
+        crossed = np.concatenate([line.pixels for line in lines])
+        stacked = np.concatenate([[truth.road, truth.labelled], masks])
+        flags = np.unpackbits(
+            stacked.view(np.uint8), axis=2, count=self._shape[1], bitorder="little"
+        )
+        taken = flags.reshape(len(flags), -1).take(crossed, axis=1)
+        ends = np.cumsum([len(line.pixels) for line in lines])
+        road, labelled, *own = (_runs(each, ends) for each in taken)
+        found = np.full((len(own), len(lines), 2, 2), np.nan)
+        for number, line in enumerate(lines):
+            known = labelled[number]
+            if number % places == places - 1:
+                end, start, cap = _ahead(road[number], known, line.borders)
+                found[:, number, 0, 1] = end
+                for place, runs in enumerate(own):
+                    found[place, number, 0, 0] = _free(runs[number], start, cap, line.borders)
+                continue
+            *sides, middle = _sides(road[number], line.borders, 0.0, known)
+            found[:, number, :, 1] = sides
+            for place, runs in enumerate(own):
+                found[place, number, :, 0] = _sides(runs[number], line.borders, middle)[:2]
+        by_stance = found.reshape(len(own), self.stances, 2 * places, 2)
+        return by_stance[:, :, :-1]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """A line on the ground: the pixels that it crosses, and where it enters and leaves them."""
+
+    pixels: Pixels
+    borders: list[float]
+    """Metres, one more than pixels."""
+
+
+Runs = list[tuple[int, int]]
+"""The first pixel of each stretch on a line, and the one after its last."""
+
+
+def _runs(flags: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> list[Runs]:
+    """Return the stretches of pixels that are set, line by line; ``ends`` are the lines' ends."""
+    padded = np.concatenate([[0], flags, [0]])
+    changed = np.asarray(padded[1:] != padded[:-1])
+    changed[ends[:-1]] = True  # a stretch ends with its line
+    at = np.flatnonzero(changed)
+    starts = at[:-1][flags[at[:-1]] != 0]
+    stops = at[np.searchsorted(at, starts, "right")]
+    firsts = np.concatenate([[0], ends[:-1]])
+    lines = np.searchsorted(ends, starts, "right")
+    found: list[Runs] = [[] for _ in ends]
+    shifts = firsts[lines]
+    pairs = zip(lines.tolist(), (starts - shifts).tolist(), (stops - shifts).tolist(), strict=True)
+    for line, start, stop in pairs:
+        found[line].append((start, stop))
+    return found
+
+
+def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
+    """Join stretches with less than ``gap`` metres between them."""
+    joined: Runs = []
+    for start, stop in runs:
+        if joined and abs(borders[start] - borders[joined[-1][1]]) < gap:
+            joined[-1] = joined[-1][0], stop
+        else:
+            joined.append((start, stop))
+    return joined
+
+
+def _sides(
+    runs: Runs, borders: list[float], middle: float, known: Runs | None = None
+) -> tuple[float, float, float]:
+    """Return the left and the right end of the road nearest to a place, and its middle, in metres.
+
+    An end beyond which nothing is known is NaN: by default all of the line is. Without road all
+    three are, but for the middle.
+    """
+    best, far = None, math.inf
+    for start, stop in _joined(runs, borders, GAP):
+        away = max(borders[stop] - middle, middle - borders[start], 0.0)
+        if away < far:
+            best, far = (start, stop), away
+    if best is None:
+        return math.nan, math.nan, middle
+    start, stop = best
+    last = len(borders) - 1
+    inner = [(0, last)] if known is None else known
+    left = any(first < start <= end for first, end in inner)
+    right = any(first <= stop < end for first, end in inner)
+    return (
+        borders[start] if left else math.nan,
+        borders[stop] if right else math.nan,
+        (borders[start] + borders[stop]) / 2,
+    )
+
+
+def _ahead(road: Runs, known: Runs, borders: list[float]) -> tuple[float, int, float]:
+    """Return where the truth's road ahead ends, its first pixel, and how far it is known.
+
+    The ends are in metres; the road's is NaN where there is none at the begin.
+    """
+    if not known:
+        return math.nan, 0, math.nan
+    start, stop = _joined(known, borders, GAP_AHEAD)[0]
+    return _free(road, start, borders[stop], borders, math.nan), start, borders[stop]
+
+
+def _free(
+    runs: Runs, start: int, cap: float, borders: list[float], nothing: float | None = None
+) -> float:
+    """Return how far the road reaches from a pixel on, in metres, at most to ``cap``."""
+    for first, stop in _joined(runs, borders, GAP_AHEAD):
+        if first <= start < stop:
+            return min(borders[stop], cap)
+    return borders[start] if nothing is None and not math.isnan(cap) else math.nan

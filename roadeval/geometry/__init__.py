@@ -1,0 +1,1 @@
+"""The ground in front of a camera: pixels to metres and back."""

@@ -1,0 +1,62 @@
+"""The settings of a camera that the log does not know, or not whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Interval, Len
+
+Degrees = Annotated[float, Interval(gt=-90, lt=90)]
+Length = Annotated[float, Interval(gt=0, le=1_000_000)]
+
+
+@dataclass(frozen=True)
+class GroundSettings:
+    """The camera over flat ground, where the log does not know it, or to correct what it says.
+
+    Each setting replaces what the log has: intrinsics of a CameraInfo or CameraCalibration, height
+    and angles of its static transforms. With intrinsics, height and pitch known, errors are counted
+    in metres, too.
+    """
+
+    height: Annotated[float | None, Interval(gt=0, le=1000)] = None
+    """Metres from the ground to the camera."""
+    pitch: Degrees | None = None
+    """Degrees that it looks down; negative ones look up."""
+    roll: Annotated[float, Interval(ge=-180, le=180)] | None = None
+    """Degrees that it leans to the right. Default: of the log's transforms, else 0."""
+    fov: Annotated[float | None, Interval(gt=0, lt=180)] = None
+    """Degrees from the left edge of the image to the right one, of a lens without distortion."""
+    focal: Annotated[tuple[Length, ...], Len(max_length=2)] = ()
+    """Focal length in pixels, or two: across and down."""
+    centre: Annotated[tuple[float, ...], Len(max_length=2)] = ()
+    """Column and row of the principal point. Default: the middle of the image."""
+    size: Annotated[tuple[int, ...], Len(max_length=2)] = ()
+    """Width and height of the images that focal length, centre and homography are for. Default: the
+    log's images."""
+    model: str = ""
+    """Of the distortion: ``plumb_bob``, ``rational_polynomial`` or ``equidistant`` (a fisheye)."""
+    distortion: Annotated[tuple[float, ...], Len(max_length=14)] = ()
+    """Its coefficients, in the order of ROS and OpenCV."""
+    homography: Annotated[tuple[float, ...], Len(max_length=9)] = ()
+    """Nine numbers, row by row: from column, row and 1 to metres ahead, metres to the left, and 1
+    (times any factor). It replaces height, pitch and roll."""
+
+    def __post_init__(self) -> None:
+        if self.fov is not None and self.focal:
+            raise ValueError("fov and focal both give the focal length: give one")
+        if self.homography and len(self.homography) != 9:
+            raise ValueError("homography must be nine numbers, row by row")
+        for name in ("centre", "size"):
+            if len(getattr(self, name)) == 1:
+                raise ValueError(f"{name} must be two numbers")
+        if self.homography and (self.height, self.pitch, self.roll) != (None,) * 3:
+            raise ValueError("homography replaces height, pitch and roll: leave them out")
+        if self.distortion and not self.model:
+            raise ValueError("distortion needs its model: plumb_bob, rational_polynomial, ...")
+
+    @property
+    def given(self) -> bool:
+        """Whether anything is."""
+        return self != GroundSettings()

@@ -1,0 +1,182 @@
+"""Pixels to metres and back, against the synthetic world's camera and against OpenCV."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from benchmarks.world.camera import Camera, Pose
+from roadeval.data import Calibration, Mounting
+from roadeval.geometry.ground import Ground, GroundError, ground_of
+from roadeval.geometry.plan import OUTSIDE, Plan
+from roadeval.geometry.settings import GroundSettings
+
+SIZE = 640, 480
+PLACES = np.random.default_rng(0).uniform([4, -6], [60, 6], (500, 2))
+LENSES = {
+    "plumb_bob": (-0.3, 0.1, 0.001, -0.002, 0.01),
+    "rational_polynomial": (0.2, -0.1, 0.001, 0.0005, 0.02, 0.3, -0.05, 0.01),
+    "equidistant": (-0.02, 0.003, -0.001, 0.0002),
+}
+
+
+def made(**settings: object) -> Ground:
+    given = {"height": 1.3, "pitch": 4.0, "roll": 2.0, "focal": (560.0,), **settings}
+    ground, why = ground_of(None, GroundSettings(**given), SIZE)  # type: ignore[arg-type]
+    assert ground is not None, why
+    return ground
+
+
+def test_places_are_seen_where_the_synthetic_world_draws_them():
+    pose = Pose(0, 1.3, 0, pitch=-math.radians(4), roll=math.radians(2))
+    world = np.column_stack([-PLACES[:, 1], np.zeros(len(PLACES)), PLACES[:, 0]])
+    seen = made().pixels(PLACES)
+    assert np.abs(seen - Camera(*SIZE, pose).project(world)).max() < 1e-6
+    assert np.abs(made().places(seen) - PLACES).max() < 1e-6
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_a_lens_bends_as_opencv_says_and_back(model: str):
+    ground = made(model=model, distortion=LENSES[model])
+    seen = ground.pixels(PLACES)
+    inside = ((seen >= 0) & (seen < SIZE)).all(axis=1)
+    assert inside.sum() > 400
+    assert np.abs(ground.places(seen) - PLACES)[inside].max() < 1e-6
+    turn, origin = ground.axes()
+    project = cv2.fisheye.projectPoints if model == "equidistant" else cv2.projectPoints
+    points = np.column_stack([PLACES, np.zeros(len(PLACES))])[:, None]
+    matrix, distortion = np.reshape(ground.matrix, (3, 3)), np.array(LENSES[model])
+    expected = project(points, Rotation.from_matrix(turn).as_rotvec(), origin, matrix, distortion)
+    assert np.abs(expected[0].reshape(-1, 2) - seen)[inside].max() < 1e-6
+
+
+def test_a_polynomial_does_not_bend_far_rays_back_into_the_picture():
+    ground = made(model="plumb_bob", distortion=(-0.4, 0.0, 0.0, 0.0))
+    beside = np.column_stack([np.full(200, 3.0), np.linspace(-30, 30, 200)])
+    seen = ground.pixels(beside)
+    known = np.isfinite(seen).all(axis=1)
+    assert 0 < known.sum() < 200
+    assert np.abs(ground.places(seen[known]) - beside[known]).max() < 1e-3
+
+
+def test_nothing_is_on_the_ground_from_the_horizon_upwards():
+    ground = made(roll=0.0)
+    horizon = (SIZE[1] - 1) / 2 - 560 * math.tan(math.radians(4))
+    rows = np.array([[320, horizon - 1], [320, horizon + 1]])
+    above, below = ground.places(rows)
+    assert np.isnan(above).all()
+    assert below[0] > 300
+    assert np.isnan(ground.pixels(np.array([[-5.0, 0.0]]))).all()
+
+
+def test_a_pixel_covers_more_the_farther_it_lies():
+    along, across = made(roll=0.0).pixel_at(20)
+    slope = math.atan(1.3 / 20)
+    assert across == pytest.approx(math.hypot(20, 1.3) * math.cos(slope - math.radians(4)) / 560)
+    assert along == pytest.approx(across * math.hypot(20, 1.3) / 1.3, rel=0.02)
+
+
+def test_a_camera_that_moves_is_where_it_moved_to():
+    height, pitch, roll = made().moved(pitch=1, height=0.05).pose
+    assert (height, pitch, roll) == pytest.approx((1.35, 5, 2))
+
+
+def test_reduced_images_show_the_same_places_at_reduced_pixels():
+    less = made().scaled(320, 160).pixels(PLACES)
+    assert less + 0.5 == pytest.approx((made().pixels(PLACES) + 0.5) / [2, 3])
+
+
+def test_a_homography_is_what_four_corners_say():
+    places = np.array([[6.0, 3], [6, -3], [30, 3], [30, -3]])
+    seen = made().pixels(places)
+    found, _ = cv2.findHomography(seen, places)
+    alone, _ = ground_of(None, GroundSettings(homography=tuple(found.ravel())), SIZE)
+    assert alone is not None
+    assert alone.pixels(PLACES) == pytest.approx(made().pixels(PLACES), abs=1e-3)
+    with pytest.raises(GroundError, match="homography alone"):
+        alone.moved(pitch=1)
+    settings = GroundSettings(homography=tuple(-7 * found.ravel()), focal=(560.0,))
+    posed, _ = ground_of(None, settings, SIZE)
+    assert posed is not None
+    assert posed.moved().pose == pytest.approx((1.3, 4, 2), abs=1e-4)
+
+
+def mounted(parent: str, at: tuple[float, ...], pitch: float, yaw: float = 0.0) -> Calibration:
+    optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    turn = Rotation.from_euler("ZYX", [yaw, pitch, 2.0], degrees=True) * Rotation.from_matrix(
+        optical
+    )
+    mounting = Mounting(parent, at, tuple(turn.as_quat()))
+    matrix = (560.0, 0, 319.5, 0, 560.0, 239.5, 0, 0, 1.0)
+    return Calibration("/info", *SIZE, matrix, "plumb_bob", (0.0,) * 5, "cam", mounting)
+
+
+def test_transforms_give_angles_and_on_a_footprint_the_height():
+    known = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4, yaw=30)
+    ground, why = ground_of(known, GroundSettings(), SIZE)
+    assert ground is not None
+    assert ground.pixels(PLACES) == pytest.approx(made().pixels(PLACES))
+    expected = "camera 1.30 m above it, pitch 4.0\N{DEGREE SIGN} down, roll 2.0\N{DEGREE SIGN}"
+    covers = "a pixel covers 0.14 m of the way 10 m ahead, 2.2 m at 40"
+    assert why == f"metres: flat ground, {expected}; {covers}"
+
+
+@pytest.mark.parametrize(
+    ("known", "given", "said"),
+    [
+        (mounted("base_link", (1.5, 0, 1.3), 4), {}, "height above the ground: the log has it"),
+        (mounted("base_footprint", (1.5, 0, -1.3), 4), {}, "the camera's height above the ground"),
+        (None, {"height": 1.4, "pitch": 1.0}, "the focal length is missing"),
+        (None, {"height": 1.4, "fov": 60.0}, "missing: its pitch"),
+        (None, {"fov": 60.0}, "the camera's height above the ground, and its pitch"),
+        (None, {"height": 1.4, "pitch": -40.0, "fov": 60.0}, "it looks up"),
+        (
+            None,
+            {"height": 1.0, "pitch": 1.0, "fov": 60.0, "model": "mei", "distortion": (1.0,)},
+            "the distortion is not known: mei of 1 numbers",
+        ),
+    ],
+)
+def test_what_is_missing_is_said(known: Calibration | None, given: dict[str, float], said: str):
+    ground, why = ground_of(known, GroundSettings(**given), SIZE)  # type: ignore[arg-type]
+    assert ground is None
+    assert said in why
+
+
+def test_of_a_camera_of_which_nothing_is_known_nothing_is_said():
+    assert ground_of(None, GroundSettings(), SIZE) == (None, "")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"fov": 60.0, "focal": (500.0,)}, "give one"),
+        ({"homography": (1.0, 2.0)}, "nine numbers"),
+        ({"homography": (1.0,) * 9, "height": 1.0}, "leave them out"),
+        ({"centre": (1.0,)}, "two numbers"),
+        ({"distortion": (1.0,)}, "needs its model"),
+    ],
+)
+def test_settings_that_do_not_go_together_are_refused(given: dict[str, float], said: str):
+    with pytest.raises(ValueError, match=said):
+        GroundSettings(**given)  # type: ignore[arg-type]
+
+
+def test_a_homography_of_zeros_is_refused():
+    with pytest.raises(GroundError, match="cannot be inverted"):
+        ground_of(None, GroundSettings(homography=(0.0,) * 9), SIZE)
+
+
+def test_a_plan_shows_the_pixel_in_which_each_cell_lies():
+    ground = made()
+    plan = Plan(ground, 6, 46, 20, 0.5)
+    image = np.arange(SIZE[0] * SIZE[1]).reshape(SIZE[::-1])
+    picture = plan.picture(image, nothing=-5)
+    for row, column in ((0, 0), (10, 20), (79, 19), (79, 0), (40, 39)):
+        place = 46 - 0.25 - 0.5 * row, 10 - 0.25 - 0.5 * column
+        x, y = np.rint(ground.pixels(np.array([place]))[0])
+        inside = 0 <= x < SIZE[0] and 0 <= y < SIZE[1]
+        assert picture[row, column] == (image[int(y), int(x)] if inside else -5)
+    assert (plan.cells == OUTSIDE).any()
