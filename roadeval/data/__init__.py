@@ -20,7 +20,7 @@ from roadeval.data.frame import (
     Role,
     Truth,
 )
-from roadeval.data.histogram import CODES, best_code, histogram, wrong_above
+from roadeval.data.histogram import CERTAIN, CODES, best_code, histogram, wrong_above
 from roadeval.data.layer import (
     ERRORS,
     ROAD_CLASSES,
@@ -61,6 +61,7 @@ from roadeval.data.result import (
 __all__ = [
     "BASELINE",
     "CAMERA",
+    "CERTAIN",
     "CODES",
     "ERRORS",
     "FILTERED",

@@ -10,7 +10,9 @@ import numpy.typing as npt
 from roadeval.data.frame import NON_ROAD, ROAD, Histogram, Probability, Truth
 
 CODES: Final = 1 << 16
-"""Codes of a probability: ``code / 65535`` is from 0 to 1."""
+"""Codes of a probability."""
+CERTAIN: Final = CODES - 1
+"""The code of a probability of 1; that of 0 is 0."""
 
 
 def histogram(probability: Probability, truth: Truth) -> Histogram:
@@ -41,4 +43,4 @@ def best_code(counts: npt.NDArray[Any]) -> int:
     wrong = wrong_above(counts)
     first = int(wrong.argmin())
     beyond = np.flatnonzero(wrong[first:] != wrong[first])
-    return first + (int(beyond[0]) - 1 if len(beyond) else CODES - 1 - first) // 2
+    return first + (int(beyond[0]) - 1 if len(beyond) else CERTAIN - first) // 2

@@ -18,14 +18,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Mask, Probability, Rgb
+from roadeval.data import CERTAIN, Mask, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import OnnxFile, load
 from roadeval.networks.settings import NetSettings
 from roadeval.runtime.text import visible
-
-FULL: Final = 65535
-"""The code of a probability of 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +71,7 @@ class Network:
         values = input_values(place.image(image), settings, self.file.inputs[0].dtype)
         outputs = self.file.run(values, settings.outputs or ())
         codes = np.maximum.reduce([self._codes(output, place, settings) for output in outputs])
-        limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * FULL)
+        limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * CERTAIN)
         mask = (codes > limit).astype(np.uint8)
         graded = not any(map(is_labels, outputs))
         if not graded or len(settings.road_numbers) * len(outputs) == 1:
@@ -107,12 +104,12 @@ class Network:
         assert scores is not None
         if is_labels(output):
             road = np.isin(scores[0], settings.road_numbers).astype(np.uint16)
-            return place.back(FULL * road, exact=True)
+            return place.back(CERTAIN * road, exact=True)
         shares = road_probability(scores.astype(np.float32), settings)
         if not np.isfinite(shares).all():
             raise self.file.error("gives NaN")
         framed = np.clip(place.back(shares, exact=False), 0, 1)
-        return np.rint(framed * np.float32(FULL)).astype(np.uint16)
+        return np.rint(framed * np.float32(CERTAIN)).astype(np.uint16)
 
 
 def road_probability(scores: Values, settings: NetSettings) -> Values:

@@ -23,7 +23,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
+from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
@@ -43,8 +43,6 @@ PACKAGE: Final = Path(__file__).parents[1]
 """The folder of roadeval itself."""
 TAKEN: Final = ("image", "moment", "settings")
 """The names of the arguments that a function may have."""
-FULL: Final = 65535
-"""The code of a probability of 1."""
 
 
 class UnknownStageError(RoadevalError, LookupError):
@@ -190,8 +188,8 @@ def _output(found: Any, spec: LayerSpec) -> Output:
         return Output((Layer(spec, mask),), mask=mask)
     if not ((array >= 0) & (array <= 1)).all():
         raise ValueError("it returned floats that are no probabilities, from 0 to 1")
-    codes = np.rint(array * FULL).astype(np.uint16)
-    mask = Packed.of(codes > round(FULL / 2))
+    codes = np.rint(array * CERTAIN).astype(np.uint16)
+    mask = Packed.of(codes > round(CERTAIN / 2))
     return Output((Layer(spec, mask),), mask=mask, probability=codes)
 
 

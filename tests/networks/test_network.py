@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.networks import FULL, NetSettings, Network, NetworkError
+from roadeval.data import CERTAIN
+from roadeval.networks import NetSettings, Network, NetworkError
 from tests.networks.making import SIZE, balanced, network, scores
 
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
@@ -28,7 +29,7 @@ def test_the_mask_is_the_one_that_numpy_computes(tmp_path):
     road = opened(network(tmp_path / "n.onnx", values=values)).road(IMAGE)
     share = softmax(scores(values, IMAGE.transpose(2, 0, 1) / 255))[1].astype(np.float32)
     expected = cv2.resize(share, SIZE)
-    assert np.abs(road.codes / FULL - expected).max() < 1e-4
+    assert np.abs(road.codes / CERTAIN - expected).max() < 1e-4
     assert np.array_equal(road.mask, expected > 0.5)
     assert 0.2 < road.mask.mean() < 0.8
 
@@ -36,7 +37,7 @@ def test_the_mask_is_the_one_that_numpy_computes(tmp_path):
 def test_the_mask_is_where_the_probability_is_above_the_threshold(tmp_path):
     path = network(tmp_path / "n.onnx", values=balanced(IMAGE))
     road = opened(path, decide="threshold", threshold=0.7).road(FRAME)
-    assert np.array_equal(road.mask, road.codes > round(0.7 * FULL))
+    assert np.array_equal(road.mask, road.codes > round(0.7 * CERTAIN))
     assert road.graded
 
 
@@ -56,10 +57,10 @@ def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
     road = opened(path, road=(0, 2), decide="threshold").road(IMAGE)
     shares = softmax(scores(values, IMAGE.transpose(2, 0, 1) / 255))
     expected = cv2.resize((shares[0] + shares[2]).astype(np.float32), SIZE)
-    assert np.abs(road.codes / FULL - expected).max() < 1e-4
+    assert np.abs(road.codes / CERTAIN - expected).max() < 1e-4
     for codes, number in zip(road.by_class, (0, 2), strict=True):
         alone = cv2.resize(shares[number].astype(np.float32), SIZE)
-        assert np.abs(codes / FULL - alone).max() < 1e-4
+        assert np.abs(codes / CERTAIN - alone).max() < 1e-4
 
 
 def test_two_classes_can_be_road_together(tmp_path):
@@ -89,7 +90,7 @@ def test_channels_scale_mean_and_deviation_are_applied_in_this_order(tmp_path):
     ).road(IMAGE)
     planes = ((IMAGE[..., ::-1] / 255 - mean) / deviation).transpose(2, 0, 1)
     expected = cv2.resize(softmax(scores(values, planes))[1].astype(np.float32), SIZE)
-    assert np.abs(road.codes / FULL - expected).max() < 1e-4
+    assert np.abs(road.codes / CERTAIN - expected).max() < 1e-4
 
 
 @pytest.mark.parametrize("last", [None, "Sigmoid"])

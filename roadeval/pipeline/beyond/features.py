@@ -7,14 +7,14 @@ float32 or what NumPy spreads to that.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from typing import Final
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Mask, Rgb
+from roadeval.data import CERTAIN, Mask, Rgb
 from roadeval.data.arrays import Values
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond.scene import Scene, mean, slopes_of, steepness, tones_of
@@ -94,11 +94,7 @@ def light_over(scene: Scene, *percentiles: int) -> Named:
 
 def place(scene: Scene) -> Named:
     """Return column (-1 to 1), its magnitude, and row (0 to 1) of each pixel's centre."""
-    return _coordinates(*scene.shape)
-
-
-@lru_cache(maxsize=8)
-def _coordinates(height: int, width: int) -> Named:
+    height, width = scene.shape
     across = (np.arange(width, dtype=np.float32) + np.float32(0.5)) * np.float32(2 / width) - 1
     down = (np.arange(height, dtype=np.float32) + np.float32(0.5)) / np.float32(height)
     return {"across": across[None], "from_middle": np.abs(across)[None], "down": down[:, None]}
@@ -305,7 +301,7 @@ def features(scene: Scene, groups: tuple[str, ...]) -> Values:
     return found
 
 
-SURE: Final = np.float32(1 / 65535)
+SURE: Final = np.float32(1 / CERTAIN)
 """The probability nearest to 0 or 1 that a log-odds is computed of."""
 
 
@@ -331,13 +327,13 @@ def opinions(opinion: Opinion, shape: tuple[int, int]) -> Values:
 
 
 def at_samples(
-    sample: TrainingSet, see: Callable[[Rgb, Opinion | None], Values]
+    sample: TrainingSet, see: Callable[[Rgb, Opinion | None], tuple[Scene, Values]]
 ) -> tuple[Values, Values]:
     """Return the features of the sampled pixels, and of the same in the mirrored images.
 
     Nothing but habit makes traffic keep to one side: the mirror doubles what there is to learn
-    from. Both are ``(n, F)`` float32, in the sample's order; ``see`` returns the features of an
-    image and what is said of it, ``(F, h, w)``.
+    from. Both are ``(n, F)`` float32, in the sample's order; ``see`` returns the scene of an image
+    and what is said of it, and the features, ``(F, h, w)``.
     """
     order, straight, mirrored = [], [], []
     heard = sample.opinions or (None,) * len(sample.images)
@@ -346,9 +342,9 @@ def at_samples(
         row, column = sample.row[here], sample.column[here]
         flipped = np.ascontiguousarray(image[:, ::-1])
         order.append(here)
-        straight.append(_at(see(image, opinion), image, row, column))
+        straight.append(_at(see(image, opinion)[1], image, row, column))
         opposite = None if opinion is None else opinion.mirrored()
-        mirrored.append(_at(see(flipped, opposite), image, row, image.shape[1] - 1 - column))
+        mirrored.append(_at(see(flipped, opposite)[1], image, row, image.shape[1] - 1 - column))
     back = np.argsort(np.concatenate(order))
     return np.concatenate(straight)[back], np.concatenate(mirrored)[back]
 

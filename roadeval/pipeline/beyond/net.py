@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
@@ -18,7 +18,7 @@ PROBABILITY: Final = LayerSpec(
 
 
 def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return the network as a pure function of what it sees; a `NetworkError`, see `resolve`."""
+    """Return the network as a pure function of what it sees; a `NetworkError`, see `Network.of`."""
     network = Network.of(settings)
 
     def run(view: View) -> Output:
@@ -38,26 +38,13 @@ def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
     return run
 
 
-def resolve(settings: NetSettings) -> NetSettings:
-    """Return the settings with everything stated that the network's file tells.
-
-    A `NetworkError` if the file cannot be used, or leaves something open.
-    """
-    return Network.of(settings).settings
-
-
-def about(settings: NetSettings) -> Mapping[str, Any]:
-    """Return what results tell of the network: what runs it, its licence, inputs and outputs."""
-    return Network.of(settings).facts()
-
-
 STAGE: Final = Stage(
     name="net",
     title="Network",
     settings=NetSettings,
     bind=bind,
     layers=(PROBABILITY, NET),
-    resolve=resolve,
+    resolve=lambda settings: Network.of(settings).settings,
     places=("file",),
-    about=about,
+    about=lambda settings: Network.of(settings).facts(),
 )

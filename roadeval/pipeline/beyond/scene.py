@@ -1,16 +1,6 @@
-"""The working image, on which texture means the same for every camera, and the way back from it.
+"""The working image, on which texture means the same for every camera, and ways from and to it.
 
-A `Scene` is what all features of a frame share. Values go back to the camera's pixels by a fast
-guided filter [1]_ [2]_, so that they have edges where its image has them: around each pixel of the
-working image they are fitted by a line of its brightness, ``p = a I + b``. The means of ``a`` and
-``b`` over the windows that hold a pixel are enlarged, and the line is applied to the brightness of
-the camera's image.
-
-References
-----------
-.. [1] K. He, J. Sun, X. Tang, Guided Image Filtering, IEEE Transactions on Pattern Analysis and
-   Machine Intelligence 35 (2013), equations 5, 6 and 8.
-.. [2] K. He, J. Sun, Fast Guided Filter, arXiv:1505.00996 (2015).
+A `Scene` is what all features of a frame share.
 """
 
 from __future__ import annotations
@@ -31,13 +21,6 @@ NOISE: Final = (0.06, 0.02, 0.02)
 LOGS: Final = np.log(np.arange(256) + 8.0).astype(np.float32)
 """``(256,)`` float32: logarithm of a channel; eight grey levels more keep dark, noisy pixels from
 running away."""
-
-SIDE: Final = 3
-"""Of a window, in pixels of the working image."""
-CONTRAST: Final = 16.0
-"""Grey levels: where brightness varies by so much in a window (one standard deviation), half of
-what it and the values have in common is kept as an edge. From 8 to 25 errors on IDD and CamVid are
-the same within a hundredth of a point."""
 
 Tones = tuple[Values, Values, Values]
 """Log brightness ``(ln R + ln G + ln B) / 3``, and the log-chromaticities ``ln R - ln G`` and
@@ -158,36 +141,3 @@ def stretched(values: Values, shape: tuple[int, ...]) -> Values:
     """Resize float32 values to the height and width of ``shape``, interpolated linearly."""
     large: Values = cv2.resize(values, (shape[1], shape[0]))
     return large
-
-
-def guided(values: Values, working: Rgb, image: Rgb) -> Values:
-    """Bring values to the size of an image, ``(H, W)`` float32.
-
-    An image that is smaller than the working image gives no edges; the values are smoothed.
-
-    In a window with means ``m`` of brightness and ``q`` of the values, ``a = (mean(I p) - m q) /
-    (var(I) + CONTRAST^2)`` and ``b = q - a m``. The result may lie beyond the range of the values.
-    ``values`` are ``(h, w)`` float32, as the working image is ``(h, w, 3)``; the camera's is ``(H,
-    W, 3)`` uint8 RGB.
-    """
-    grey = _brightness(working)
-    level, value = _mean(grey), _mean(values)
-    spread = _mean(grey * grey) - level * level
-    common = _mean(grey * values) - level * value
-    slope: Values = np.divide(common, spread + np.float32(CONTRAST**2))
-    offset: Values = value - slope * level
-    shape = image.shape
-    found: Values = _brightness(image)
-    found *= stretched(_mean(slope), shape)
-    found += stretched(_mean(offset), shape)
-    return found
-
-
-def _brightness(image: Rgb) -> Values:
-    grey: Values = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype(np.float32)
-    return grey
-
-
-def _mean(plane: Values) -> Values:
-    means: Values = cv2.blur(plane, (SIDE, SIDE))
-    return means

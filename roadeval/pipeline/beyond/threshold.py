@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.data import CODES, Layer, Packed, Probability, best_code, histogram, mask_spec
+from roadeval.data import CERTAIN, Layer, Packed, Probability, best_code, histogram, mask_spec
 from roadeval.pipeline.stage import (
     Opinion,
     Output,
@@ -36,7 +36,7 @@ class Threshold:
     """Road is what is more probable, 0..65535."""
 
     def __post_init__(self) -> None:
-        check_range("code", self.code, 0, CODES - 1)
+        check_range("code", self.code, 0, CERTAIN)
 
 
 def codes_of(opinion: Opinion | None) -> Probability:
@@ -57,7 +57,7 @@ def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
 def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
     """Return where road is more probable than that by the stage before."""
     road = Packed.of(codes_of(view.opinion) > learnt.code)
-    facts = {"threshold": learnt.code / (CODES - 1)}
+    facts = {"threshold": learnt.code / CERTAIN}
     return Output((Layer(THRESHOLD, road),), mask=road, facts=facts)
 
 

@@ -5,8 +5,7 @@ each of which was grown to mend what those before it leave [1]_, and a network w
 (`hidden_layer`). A term that is not learnt is taken from them:
 ``x = mean - w s max(d - 1, 0)`` with the distance d from the reference patch, 1 where roads end,
 and the share s of light (`roadeval.pipeline.beyond.features`); ``p = 1 / (1 + exp(-x))``. It is
-computed on a working image, and brought to the camera's pixels along the edges of its image
-(`roadeval.pipeline.beyond.working_image`).
+computed on a working image, and interpolated linearly to the camera's pixels.
 
 References
 ----------
@@ -25,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, field_validator
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, mask_spec
+from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values, sigmoid
 from roadeval.kernels import KERNELS
 from roadeval.kernels.plain import LEAVES
@@ -42,7 +41,7 @@ from roadeval.pipeline.beyond.features import (
     reach_inputs,
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
-from roadeval.pipeline.beyond.scene import Scene, guided, scene_of, stretched
+from roadeval.pipeline.beyond.scene import Scene, scene_of, stretched
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
     GREATEST,
@@ -132,15 +131,11 @@ def grow(
     """
     from threadpoolctl import threadpool_limits
 
-    # scikit-learn's own way to weighted quantiles takes several times as long as all trees.
-    pixel_weights = np.ones(len(values)) if weights is None else weights
-    edges = [bin_edges(feature, pixel_weights) for feature in values.T]
-    bins = np.column_stack(
-        [
-            np.searchsorted(own, feature).astype(np.uint8)
-            for own, feature in zip(edges, values.T, strict=True)
-        ]
-    )
+    # scikit-learn's own weighted quantiles take several times as long as all trees.
+    parts = np.arange(1, BINS) / BINS
+    quantiles = np.quantile(values, parts, axis=0, weights=weights, method="inverted_cdf")
+    edges = [np.unique(feature) for feature in quantiles.T]
+    bins = np.stack([np.searchsorted(*each) for each in zip(edges, values.T, strict=True)], axis=1)
     # Only here: the import takes a second, and a model from a file does not need it.
     boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
         learning_rate=RATE,
@@ -152,36 +147,11 @@ def grow(
         random_state=seed,
     )
     with threadpool_limits(1, "openmp"):
-        boosting.fit(bins, road, sample_weight=weights)
+        boosting.fit(bins.astype(np.uint8), road, sample_weight=weights)
     grown = [_arrays(tree.nodes, edges) for (tree,) in boosting._predictors]
     feature, threshold, kept, leaves = (np.stack(each) for each in zip(*grown, strict=True))
     offset = float(boosting._baseline_prediction.item())
     return Forest(feature, threshold, kept, leaves, offset, values.shape[1])
-
-
-def bin_edges(feature: Values, weights: Floats) -> Values:
-    """Return the values that part a feature into bins, ascending, at most ``BINS - 1``.
-
-    Bin i holds what is above edge i - 1, and at most edge i: a value alone where there are few of
-    them, else values of equal weight together, up to a weighted quantile (averaged inverted CDF).
-    ``feature`` and ``weights`` (above 0) are ``(n,)``; the edges ``(e,)`` float32, none where all
-    values are equal.
-    """
-    order = np.argsort(feature)
-    ascending: Values = feature[order]
-    distinct: Values = np.unique(ascending)
-    if len(distinct) <= BINS:
-        below, above = distinct[:-1], distinct[1:]
-    else:
-        sums = np.cumsum(weights[order])
-        wanted = sums[-1] * np.arange(1, BINS) / BINS
-        below, above = (
-            ascending[np.searchsorted(sums, wanted, side)] for side in ("left", "right")
-        )
-    middle = ((below.astype(np.float64) + above) / 2).astype(np.float32)
-    # Between two neighbours there is no number: the lower one parts them.
-    edges: Values = np.unique(np.where(middle < above, middle, below))
-    return edges
 
 
 def _arrays(
@@ -213,8 +183,6 @@ def _leaves(nodes: npt.NDArray[Any], root: int) -> Iterator[int]:
         yield from _leaves(nodes, int(nodes[side][root]))
 
 
-FULL: Final = 65535
-"""The code of probability 1."""
 IN_LIGHT, IN_SHADE = 2 / 3, 1 / 3
 """The network's weight."""
 OWN_CAMERA, OTHERS = 1.0, 4.0
@@ -325,22 +293,20 @@ class Blend:
         return mean
 
 
-def see(settings: TreesSettings, image: Rgb, opinion: Opinion | None = None) -> Values:
-    """Compute the features of ``(H, W, 3)`` uint8 RGB, ``(F, h, w)`` float32.
+def see(
+    settings: TreesSettings, image: Rgb, opinion: Opinion | None = None
+) -> tuple[Scene, Values]:
+    """Return the scene of ``(H, W, 3)`` uint8 RGB, and its features, ``(F, h, w)`` float32.
 
     Those of the opinion come last, where the settings ask for it.
     """
-    return seen(scene_of(image, settings.width, settings.patch), settings, opinion)
-
-
-def seen(scene: Scene, settings: TreesSettings, opinion: Opinion | None) -> Values:
-    """Return the features of a scene, and of an opinion where the settings ask for it."""
+    scene = scene_of(image, settings.width, settings.patch)
     own = features(scene, settings.features)
     if not settings.opinion:
-        return own
+        return scene, own
     if opinion is None:
         raise StageError("trees: `opinion` asks for a stage before it that makes a road mask")
-    return np.concatenate([own, opinions(opinion, scene.shape)])
+    return scene, np.concatenate([own, opinions(opinion, scene.shape)])
 
 
 def fit(sample: TrainingSet, settings: TreesSettings) -> Blend:
@@ -406,12 +372,6 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     return weight
 
 
-def log_odds(planes: Values, learnt: Blend, settings: TreesSettings) -> Values:
-    """Compute the log-odds of road from `features`, ``(F, h, w)``; ``(h, w)`` float32."""
-    values = planes.reshape(len(planes), -1)
-    return learnt.log_odds(values, network_weight(values, settings)).reshape(planes.shape[1:])
-
-
 def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(learnt, settings)
@@ -420,23 +380,24 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
     _, share_spec, _ = layers(settings)
 
     def run(view: View) -> Output:
-        scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
-        values = seen(scene, settings, view.opinion)
-        if len(values) != learnt.inputs:
+        shape = view.image.shape
+        scene, planes = see(settings, view.image, view.opinion)
+        if len(planes) != learnt.inputs:
             raise StageError(
-                f"trees: {len(values)} features of a pixel, and it has learnt from {learnt.inputs}:"
+                f"trees: {len(planes)} features of a pixel, and it has learnt from {learnt.inputs}:"
                 " the stage before says how probable other classes of road are"
             )
-        over, around, light = values[known] if len(known) == len(REACH) else reach_inputs(scene)
+        over, around, light = planes[known] if len(known) == len(REACH) else reach_inputs(scene)
         far = combined(over, around)
-        learnt_odds = log_odds(values, learnt, settings)
+        values = planes.reshape(len(planes), -1)
+        learnt_odds = learnt.log_odds(values, network_weight(values, settings))
         weight = settings.reach_weight
         if weight is None:
             weight = OWN_CAMERA if learnt.knows(view.original) else OTHERS
-        odds = learnt_odds - np.float32(weight) * beyond(far, light)
-        share = np.clip(guided(sigmoid(odds), scene.image, view.image), 0, 1)
-        codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
-        road = Packed.of(codes > round(settings.threshold * FULL))
+        odds = learnt_odds.reshape(scene.shape) - np.float32(weight) * beyond(far, light)
+        share = stretched(sigmoid(odds), shape)
+        codes = np.rint(share * np.float32(CERTAIN)).astype(np.uint16)
+        road = Packed.of(codes > round(settings.threshold * CERTAIN))
         shown = (
             Layer(GEODESIC, stretched(far, shape)),
             Layer(share_spec, (codes >> 8).astype(np.uint8)),

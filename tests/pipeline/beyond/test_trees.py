@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from roadeval.data import Packed
+from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions, reach
 from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.beyond.trees import (
     ALL,
-    BINS,
     NODES,
     Blend,
     TreesSettings,
     balanced_back,
-    bin_edges,
     grow,
 )
 from roadeval.pipeline.stage import MisfitError, Opinion, StageError, TrainingSet, View
@@ -65,7 +63,7 @@ def features_and_road(seed=0, count=600):
 @pytest.mark.parametrize("leaves", [2, 5, 32])
 def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values, road = features_and_road(count=1000)
-    values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
+    values = values.round(0)  # so few that each has a bin, as in scikit-learn
     weights = balanced_back(road, 0.2) if weighted else None
     found = grow(values, road, weights, replace(SMALL, leaves=leaves), 0, share=1.0).sums(
         np.ascontiguousarray(values.T)
@@ -79,35 +77,6 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
         random_state=0,
     ).fit(values, road, sample_weight=weights)
     np.testing.assert_allclose(found, boosting.decision_function(values), atol=1e-5)
-
-
-@pytest.mark.parametrize("weighted", [False, True])
-def test_bins_of_many_values_weigh_the_same(weighted):
-    rng = np.random.default_rng(0)
-    feature = rng.normal(size=3001).astype(np.float32)
-    weights = rng.uniform(0.5, 2, 3001) if weighted else np.ones(3001)
-    edges, sums = bin_edges(feature, weights), np.cumsum(weights[np.argsort(feature)])
-    assert len(edges) == BINS - 1
-    for number, edge in enumerate(edges, 1):
-        wanted = sums[-1] * number / BINS
-        first = next(i for i, each in enumerate(sums) if each >= wanted)
-        assert edge == np.sort(feature)[first]
-
-
-@pytest.mark.parametrize(
-    ("feature", "edges"),
-    [
-        ([5, 5, 5], []),
-        ([3, 1, 1, 2], [1.5, 2.5]),
-        # Neighbours among the numbers; the middle of the latter two rounds to the upper one.
-        ([1, 1 + 2**-23], [1]),
-        ([1 + 2**-23, 1 + 2**-22], [1 + 2**-23]),
-        ([2e38, 3.4e38], [2.7e38]),
-    ],
-)
-def test_bins_of_few_values_part_each_from_the_next(feature, edges):
-    found = bin_edges(np.array(feature, np.float32), np.ones(len(feature)))
-    np.testing.assert_array_equal(found, np.array(edges, np.float32))
 
 
 def test_the_same_seed_grows_the_same_trees(sample, forest):
@@ -154,7 +123,7 @@ def test_samples_are_seen_as_they_are_and_mirrored():
     sample = TrainingSet((image,), *where, np.array([True, False]))
 
     def see(seen, _opinion):
-        return np.moveaxis(seen, 2, 0).astype(np.float32)
+        return None, np.moveaxis(seen, 2, 0).astype(np.float32)
 
     straight, mirrored = at_samples(sample, see)
     np.testing.assert_array_equal(straight, image[[23, 3], [31, 5]])
@@ -215,7 +184,7 @@ def test_trees_that_hear_nothing_say_so():
 def test_samples_keep_their_order():
     images = tuple(np.full((24, 32, 3), grey, np.uint8) for grey in (10, 200))
     sample = TrainingSet(images, *np.array([[1, 0, 1], [0, 1, 2], [0, 1, 2]]), np.ones(3, bool))
-    straight, _ = at_samples(sample, lambda seen, _: np.moveaxis(seen, 2, 0).astype(np.float32))
+    straight, _ = at_samples(sample, lambda seen, _: (None, np.moveaxis(seen, 2, 0)))
     assert straight[:, 0].tolist() == [200, 10, 200]
 
 
@@ -289,12 +258,11 @@ def test_an_adapted_model_knows_the_cameras_of_both(sample, learnt):
 @pytest.mark.parametrize(
     "groups", [("place",), ("place", "paths"), ("place", "barriers", "light", "paths")]
 )
-def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, groups, monkeypatch):
-    monkeypatch.setattr(trees, "guided", lambda values, *_images: values)
+def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, groups):
     without = replace(SMALL, features=groups, reach_weight=0.0)
     learnt = trees.fit(sample, without)
     plain, more = (
-        trees.bind(replace(without, reach_weight=weight), learnt)(VIEW).probability / trees.FULL
+        trees.bind(replace(without, reach_weight=weight), learnt)(VIEW).probability / CERTAIN
         for weight in (0.0, 2.0)
     )
     scene = scene_of(VIEW.image, SMALL.width, SMALL.patch)
