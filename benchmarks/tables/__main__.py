@@ -65,7 +65,10 @@ def main() -> int:
     options = _arguments()
     if options.measure is not None:
         with tempfile.TemporaryDirectory() as made:
-            _measure(options, Path(options.work or made))
+            try:
+                _measure(options, Path(options.work or made))
+            except MissingSourceError as error:
+                sys.exit(str(error))
         if not options.write:
             return 0
     numbers = load()
@@ -83,7 +86,7 @@ def main() -> int:
 def _measure(options: argparse.Namespace, work: Path) -> None:
     """Measure what was named, or everything; every result is kept at once."""
     work.mkdir(parents=True, exist_ok=True)
-    sources = Sources(work, options.logs, options.camvid, options.comma10k)
+    sources = Sources(work, options.logs, options.camvid, options.comma10k, options.idd)
     names = options.measure or [*DRIVES, *([] if options.replays else OTHERS)]
     for name in names:
         if name in WITHOUT_FILES:
@@ -103,11 +106,7 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
         for key, replay in REPLAYS.items():
             if name in replay.drives and key in (options.replays or REPLAYS):
                 begin = time.monotonic()
-                try:
-                    found = replayed(key, DRIVES[name], sources)
-                except MissingSourceError as error:
-                    sys.exit(str(error))
-                _keep(found, "drives", name, key)
+                _keep(replayed(key, DRIVES[name], sources), "drives", name, key)
                 print(f"{name} {key}: {time.monotonic() - begin:.0f} s", flush=True)
 
 

@@ -29,12 +29,15 @@ class Sources:
         The folder CamVid of the SegNet tutorial.
     comma10k
         A folder with some of comma10k's `imgs` and `masks`.
+    idd
+        The folder `idd20k_lite`.
     """
 
     work: Path
     logs: Path | None
     camvid: Path | None
     comma10k: Path | None
+    idd: Path | None = None
 
 
 class MissingSourceError(Exception):

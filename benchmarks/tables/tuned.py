@@ -1,20 +1,26 @@
-"""A network as it comes, with the threshold of ten frames, and tuned on them, beside `robust`.
+"""A network as it comes, with the threshold of labelled frames, and tuned on them, beside `robust`.
 
-The network is any that was trained elsewhere, by its ONNX file.
+The network is any that was trained elsewhere, by its ONNX file. A log's first ten frames teach, and
+each half of IDD's drives teaches what the other is scored with.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+import numpy as np
+
 import roadeval
-from benchmarks.tables.drives import DRIVES, Sources
+from benchmarks.tables import idd
+from benchmarks.tables.drives import DRIVES, MissingSourceError, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST
 from benchmarks.tables.measure import DEVELOPED, change_of, rounded
-from roadeval.config import network_variant
+from roadeval.config import RunConfig, network_variant
 from roadeval.data import FINAL_STAGE
 
 NAMES: Final = {
@@ -27,28 +33,53 @@ NAMES: Final = {
 
 
 def measured(sources: Sources, network: Path) -> dict[str, Any]:
-    """Return ERR of each of `NAMES` on each drive, with three seeds, as fractions."""
+    """Return ERR of each of `NAMES` on each drive and on IDD, with three seeds, as fractions."""
+    if sources.idd is None:
+        raise MissingSourceError(f"tuned: name the folder of {idd.SOURCE} (--idd)")
     digest = hashlib.sha256(network.read_bytes()).hexdigest()
     drives = {name: _on(name, sources, network) for name in DEVELOPED}
-    return {"sha256": digest, "drives": drives}
+    return {"sha256": digest, "drives": {**drives, "idd": _on_idd(sources.idd, sources, network)}}
 
 
 def _on(name: str, sources: Sources, network: Path) -> dict[str, Any]:
     drive = DRIVES[name]
-    tables = {
-        "preset": "robust",
-        "labels": drive.labels,
-        "training": {"seeds": SEEDS_OF_ROBUST},
-        "output": {"record": "none"},
-    }
+    tables = {"labels": drive.labels, "training": {"seeds": SEEDS_OF_ROBUST}}
+    config = _config(tables, sources, network)
+    reports = sources.work / f"{name}.tuned"
+    return of_summary(roadeval.replay(drive.find(sources, name), config, reports=reports).summary)
+
+
+def _config(tables: dict[str, Any], sources: Sources, network: Path) -> RunConfig:
+    """Return `robust` and the variants of a network beside it."""
     with TemporaryDirectory(dir=sources.work) as folder:
         trained = Path(folder, "at.toml")
         trained.write_text(f'file = "{network.resolve()}"\ndecide = "trained"\n')
         nets = [network_variant("net", str(network)), network_variant("at", str(trained))]
-        config = roadeval.configure(tables).with_variants(nets).with_tuned(["net"])
-        reports = sources.work / f"{name}.tuned"
-        summary = roadeval.replay(drive.find(sources, name), config, reports=reports).summary
-    return of_summary(summary)
+        robust = {"preset": "robust", "output": {"record": "none"}, **tables}
+        return roadeval.configure(robust).with_variants(nets).with_tuned(["net"])
+
+
+def _on_idd(folder: Path, sources: Sources, network: Path) -> dict[str, Any]:
+    """Return the same of all pixels together, with intervals of a bootstrap over drives."""
+    config, folds = _config({}, sources, network).resolved(), idd.both_ways(folder)
+    blind = np.concatenate([idd.count_blind(*fold) for fold in folds])
+    counted = {}
+    for key, variant in NAMES.items():
+        own = replace(config, pipeline=config.pipelines()[variant])
+        seeds = 1 if key in ("network", "threshold") else SEEDS_OF_ROBUST
+        counted[key] = idd.with_each_seed(own, seeds, folds)
+    return told_of_idd(blind, counted)
+
+
+def told_of_idd(blind: idd.Counted, counted: Mapping[str, list[idd.Counted]]) -> dict[str, Any]:
+    """Return ERR of outcomes by drive with each seed, and differences of the first one."""
+    tuned, robust, network = (counted[key][0] for key in ("tuned", "robust", "network"))
+    return {
+        "blind": idd.err(blind.sum(axis=0)),
+        "change": idd.difference(idd.err, tuned, robust),
+        "against_network": idd.difference(idd.err, tuned, network),
+        **{key: [idd.err(each.sum(axis=0)) for each in seeds] for key, seeds in counted.items()},
+    }
 
 
 def of_summary(summary: dict[str, Any]) -> dict[str, Any]:
@@ -61,6 +92,7 @@ def of_summary(summary: dict[str, Any]) -> dict[str, Any]:
         "own": summary["thresholds"]["net"]["own"],
         "chosen": summary["thresholds"]["net"]["threshold"],
         "change": change_of(summary["against_unfiltered"]["net_tuned"]["ERR"]),
+        "against_network": change_of(summary["against_method"]["net_tuned"]["ERR"]),
         **{key: {**once, **each}[variant] for key, variant in NAMES.items()},
     }
     kept: dict[str, Any] = rounded(found)
