@@ -168,7 +168,7 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
 def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
     """Return the ground in space, below the camera, and from above with each variant's errors."""
     names = [each.name for each in layout.variants[:_OUTCOMES]] if layout.has_truth else []
-    flat = [picture("The ground from above", at.GROUND)]
+    flat = [picture("From above", at.GROUND)]
     if layout.has_truth:
         flat.append(picture("Truth: road", at.GROUND, at.ground_path(TRUTH.name)))
     flat += [picture(f"{name}: errors", at.GROUND, at.ground_path(name)) for name in names]
