@@ -95,11 +95,11 @@ class Survey:
     def bands(self) -> list[dict[str, Bits]]:
         """The bands of distance for each stance, ``(H, words)`` each, by name."""
         height, width = self._shape
-        columns, rows = np.meshgrid(np.arange(width), np.arange(height))
-        pixels = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64)
+        columns, rows = np.meshgrid(np.arange(float(width)), np.arange(float(height)))
+        rays = self.ground.rays(np.column_stack([columns.ravel(), rows.ravel()]))
         found = []
-        for ground in self._grounds:
-            ahead = ground.places(pixels)[:, 0].reshape(self._shape)
+        for ground in self._grounds:  # the lens is the same, however the camera stands
+            ahead = ground.places_of(rays)[:, 0].reshape(self._shape)
             found.append(
                 {
                     band_name(near, far): pack((near <= ahead) & (ahead < far))

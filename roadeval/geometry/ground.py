@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -70,27 +70,25 @@ class Ground:
 
         Pixels may lie outside the image.
         """
-        rays = _applied(self.plane, places)
-        rays[~(rays[:, 2] > 0)] = np.nan
-        rays = rays[:, :2] / rays[:, 2:]
+        rays = _divided(_applied(self.plane, places))
         if not any(self.distortion):
-            found = _applied(self.matrix, rays)
-            return np.asarray(found[:, :2] / found[:, 2:])
+            return _divided(_applied(self.matrix, rays))
         found = np.full(rays.shape, np.nan)
         known = np.flatnonzero(np.isfinite(rays).all(axis=1))
         if len(known):
             seen = self._distorted(rays[known])
-            back = np.abs(self._rays(seen) - rays[known]).max(axis=1)
+            back = np.abs(self.rays(seen) - rays[known]).max(axis=1)
             sure = back < TOLERANCE * (1 + np.abs(rays[known]).max(axis=1))
             found[known[sure]] = seen[sure]
         return found
 
     def places(self, pixels: Matrix) -> Matrix:
         """Return where on the ground pixels lie, ``(n, 2)``; NaN from the horizon upwards."""
-        found = _applied(_flat(np.linalg.inv(np.reshape(self.plane, (3, 3)))), self._rays(pixels))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = found[:, 2:] > 0
-            return np.where(ahead, found[:, :2] / found[:, 2:], np.nan)
+        return self.places_of(self.rays(pixels))
+
+    def places_of(self, rays: Matrix) -> Matrix:
+        """Return where on the ground some `rays` end, ``(n, 2)``; NaN from the horizon upwards."""
+        return _divided(_applied(_inverse(self.plane), rays))
 
     def pixel_at(self, ahead: float) -> tuple[float, float]:
         """Return how many metres a pixel covers straight ahead: along, and across; NaN unseen."""
@@ -132,15 +130,14 @@ class Ground:
 
         matrix, distortion = np.reshape(self.matrix, (3, 3)), np.array(self.distortion)
         if self.model in FISHEYE:
-            # cv2.fisheye.distortPoints takes no skew beside the matrix, and needs three axes.
             found = cv2.fisheye.distortPoints(rays[:, None], matrix, distortion)
             return np.asarray(found[:, 0])
         points = np.column_stack([rays, np.ones(len(rays))])
         zero = np.zeros(3)
         return np.asarray(cv2.projectPoints(points, zero, zero, matrix, distortion)[0][:, 0])
 
-    def _rays(self, pixels: Matrix) -> Matrix:
-        """Return the rays of pixels in units of the focal length, ``(n, 2)``."""
+    def rays(self, pixels: Matrix) -> Matrix:
+        """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down."""
         matrix = np.reshape(self.matrix, (3, 3))
         if any(self.distortion):
             import cv2
@@ -153,8 +150,7 @@ class Ground:
                 rays = cv2.fisheye.undistortPoints(points, matrix, distortion, criteria=ends)
                 return np.asarray(rays[:, 0])
             pixels = cv2.undistortImagePoints(points, matrix, distortion, None, ends)[:, 0]
-        found = _applied(_flat(np.linalg.inv(matrix)), pixels)
-        return np.asarray(found[:, :2] / found[:, 2:])
+        return _divided(_applied(_inverse(self.matrix), pixels))
 
 
 def ground_of(
@@ -293,9 +289,22 @@ def _matrix_of(quaternion: Sequence[float]) -> Matrix:
     )
 
 
-def _applied(matrix: Sequence[float], points: Matrix) -> Any:
-    """Apply nine numbers to ``(n, 2)`` points and a 1: ``(n, 3)``."""
-    return np.column_stack([points, np.ones(len(points))]) @ np.reshape(matrix, (3, 3)).T
+def _applied(matrix: Sequence[float], points: Matrix) -> tuple[Floats, Floats, Floats]:
+    """Apply nine numbers to ``(n, 2)`` points and a 1: three arrays, ``(n,)``."""
+    x, y = points.T
+    first, second, third = (a * x + b * y + c for a, b, c in np.reshape(matrix, (3, 3)))
+    return first, second, third
+
+
+def _divided(applied: tuple[Floats, Floats, Floats]) -> Matrix:
+    """Return ``(n, 2)`` points of the plane; NaN of what lies behind it."""
+    x, y, w = applied
+    w = np.where(w > 0, w, np.nan)
+    return np.stack([x / w, y / w], axis=1)
+
+
+def _inverse(matrix: Sequence[float]) -> tuple[float, ...]:
+    return _flat(np.linalg.inv(np.reshape(matrix, (3, 3))))
 
 
 def _frame(width: int, height: int) -> Matrix:
