@@ -21,6 +21,8 @@ NOTEWORTHY: Final = 0.05
 """The least change of ERR by the filter, or excess over ``blind``, that is noted."""
 
 
+MOST_CELLS: Final = 4_000_000
+"""Of the ground seen from above: a frame's cells are held for each stance of the camera."""
 Metres = Annotated[int, Field(ge=0, le=500)]
 
 
@@ -65,3 +67,6 @@ class EvaluationSettings:
             steps = getattr(self, name)
             if any(far <= near for near, far in pairwise(steps)):
                 raise ValueError(f"{name} must rise")
+        cells = (self.plan[1] - self.plan[0]) * self.plan_width / self.plan_cell**2
+        if cells > MOST_CELLS:
+            raise ValueError(f"plan has {cells:,.0f} cells, more than {MOST_CELLS:,}")

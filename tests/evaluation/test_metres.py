@@ -235,3 +235,27 @@ def test_sums_are_means_over_frames_and_ranges_over_stances():
     )
     above = sum(each.counts[0, -1] for each in found)
     assert rows["recall", ABOVE].value == pytest.approx(above[0] / (above[0] + above[3]))
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"distances": (0, 20, 10)}, "distances must rise"),
+        ({"plan": (46, 6)}, "plan must rise"),
+        ({"plan": (0, 500), "plan_cell": 0.01}, "plan has 100,000,000 cells"),
+    ],
+)
+def test_settings_without_sense_are_refused(settings: dict[str, Any], said: str):
+    with pytest.raises(ValueError, match=said):
+        EvaluationSettings(**settings)
+
+
+def test_a_camera_that_sees_only_far_ground_has_no_ends_nearby():
+    far, _ = ground_of(None, GroundSettings(height=1.3, pitch=-8, fov=20), (64, 48))
+    assert far is None
+    up, _ = ground_of(None, GroundSettings(height=30, pitch=2, fov=30), (64, 48))
+    assert up is not None
+    survey = Survey(up, EvaluationSettings())
+    found = measured(np.ones((48, 64), np.uint8), np.ones((48, 64), np.uint8), survey)
+    assert np.isnan(found.ends).all()
+    assert not found.counts[0, -1].any()
