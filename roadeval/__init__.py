@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.log_files import demo, info, pack
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.results.compare import compare
+    from roadeval.jobs.results.pick import pick
     from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result
     from roadeval.jobs.run.fleet import FleetOutcome, FleetProgress, replay_fleet
@@ -57,6 +58,7 @@ __all__ = [
     "load_config",
     "load_model",
     "pack",
+    "pick",
     "replay",
     "replay_fleet",
     "run_frame",

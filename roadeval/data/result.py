@@ -270,6 +270,8 @@ class FrameResult:
     doubts: tuple[Doubt, ...] = ()
     metres: Mapping[str, FrameMetres] = field(default_factory=dict)
     above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
+    apart: Mapping[str, float] = field(default_factory=dict)
+    """ERR by variant of a frame that was labelled because it was in doubt, which no sum counts."""
 
     def without_layers(self) -> FrameResult:
         """Return the result without layers, which take most memory, for summing up."""

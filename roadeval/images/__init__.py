@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from roadeval.images.decoding import (
         eight_bits,
         palette_indices,
+        png_of,
         size_of,
         to_labels,
         to_png,

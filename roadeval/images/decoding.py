@@ -227,3 +227,11 @@ def _samples(image: Any) -> Array:
             raise ImageError("an image of 32-bit numbers")
         samples = samples.astype(np.uint16)
     return samples.astype(samples.dtype.newbyteorder("="), copy=False)
+
+
+def png_of(pixels: npt.NDArray[np.uint8]) -> bytes:
+    """Encode an ``(H, W, 3)`` RGB or ``(H, W)`` grey image of uint8 as PNG."""
+    import cv2
+
+    stored = cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR) if pixels.ndim == 3 else pixels
+    return cv2.imencode(".png", stored)[1].tobytes()

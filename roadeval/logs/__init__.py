@@ -30,6 +30,15 @@ if TYPE_CHECKING:
         parse_time,
     )
     from roadeval.logs.topics.reader import TopicInfo
+    from roadeval.logs.truth.drawn import Proposal
+    from roadeval.logs.truth.picks import (
+        PICK,
+        Picked,
+        Picks,
+        Why,
+        digest_of,
+        proposal_files,
+    )
     from roadeval.logs.truth.source import LabelSource, label_files
     from roadeval.logs.writing.writer import LogWriter, NoSidecar, PackResult, SidecarWriter, pack
 

@@ -361,6 +361,7 @@ _STATES: Final[Mapping[str, Colour]] = {
     Role.COPY: colours.YELLOW,
     Role.GAP: colours.DARK_GREY,
     Role.UNLABELLED: colours.GREY,
+    Role.PICKED: colours.ORANGE,
 }
 _OUTCOME_COLOURS: Final[Mapping[str, Colour]] = {
     "TP": colours.TP,

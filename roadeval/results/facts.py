@@ -20,7 +20,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
 from roadeval.evaluation.score import Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats import Difference, Estimate
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
 from roadeval.runtime.documents import LONGEST, VALUES, read_bounded, read_json
@@ -100,6 +100,26 @@ class UnlabelledFacts:
     """Numbers of frames, the first of the rank first, one a scene."""
     differing: dict[str, dict[str, float]]
     """The mean share of pixels on which two variants differ, by both names."""
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateFacts:
+    """Rates of a whole drive from frames that were drawn at random, picked by `roadeval pick`."""
+
+    frames: int
+    """All frames that could be picked."""
+    drawn: int
+    labels: int
+    """Frames that were drawn at random, and how many of these are labelled and scored."""
+    probability: float
+    """Of each frame to be drawn."""
+    rates: dict[str, dict[str, Estimate]]
+    """By variant and rate of its final mask; empty where there is a problem."""
+    apart: dict[str, dict[str, float | None]]
+    """ERR of the frames that were picked by rank and train nothing, by frame and variant; in no
+    rate."""
+    problem: str = ""
+    """Why there are no rates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +257,8 @@ class Facts(_Document):
     versions: dict[str, str] = field(default_factory=dict)
     unlabelled: UnlabelledFacts | None = None
     """None where every frame has truth."""
+    estimate: EstimateFacts | None = None
+    """Rates of the whole drive, where picked frames are the truth."""
     log: LogFacts | None = None
     """None of a run that ended early."""
     masks: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -254,11 +276,11 @@ class Facts(_Document):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "seeds", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled"),
+        *("cameras", "unlabelled", "estimate"),
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "seeds", "methods", "masks", "files"),
-        *("cameras", "unlabelled"),
+        *("cameras", "unlabelled", "estimate"),
     )
 
     @cached_property

@@ -24,7 +24,7 @@ from roadeval.data.words import (
 from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
 from roadeval.evaluation.stats import Difference
-from roadeval.results.facts import FrameAccount, UnlabelledFacts
+from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
 
 PROBABLY: Final = 0.2
 """The greatest p-value of a difference that is called probable: without an effect, one drive in ten
@@ -196,6 +196,7 @@ def _family(found: Difference, settings: EvaluationSettings) -> str:
 _WHY: Final = {
     "trained on": "to train on",
     "unlabelled": "without truth",
+    "picked": "labelled because they were in doubt",
     "undecodable": "that cannot be decoded",
     "failed in a stage": "on which a stage failed",
     "gap after training": "in the gap after training",
@@ -254,6 +255,7 @@ def verdict(
     thresholds: Mapping[str, Mapping[str, float]] | None = None,
     *,
     unlabelled: UnlabelledFacts | None = None,
+    estimated: EstimateFacts | None = None,
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences.
 
@@ -263,7 +265,8 @@ def verdict(
     ``totals`` are by variant and stage, empty where nothing was scored; ``effects`` are of final
     masks at least; ``claims`` says in how many windows of a drive each claim of the paper holds,
     ``thresholds`` what other thresholds would bring on it, see `at_thresholds`. Where nothing was
-    scored, ``unlabelled`` says which frames to look at.
+    scored, ``unlabelled`` says which frames to look at. ``estimated`` is what frames that were
+    drawn at random say of the whole drive.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
@@ -275,7 +278,10 @@ def verdict(
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     against = finals.get((BASELINE, best))
     blind = None if against is None else against.rates[TESTED]
-    parts = [_best(best, rates, blind, settings), *at_thresholds(thresholds or {}, rates)]
+    parts = [_best(best, rates, blind, settings)]
+    if whole := [*from_labels(estimated, best)]:
+        parts = [*whole, f"On these alone: {parts[0]}"]
+    parts += at_thresholds(thresholds or {}, rates)
     for base, variant in (pair for pair in finals if pair[1] == pair[0] + TUNED):
         found = finals[base, variant].rates[TESTED]
         ends, rate = levels(found, rates[base], rates[variant]), f"{TESTED} of {stages[variant]}"
@@ -313,6 +319,26 @@ def without_truth(found: UnlabelledFacts | None) -> Iterator[str]:
         why = RANKED_BY[found.sign].format(variant=found.variant)
         frames = listing([str(each) for each in found.look_at[:NAMED]])
         yield f"Look first at frames {frames}: there {why}. That is a rank, and no error rate."
+
+
+def from_labels(found: EstimateFacts | None, variant: str) -> Iterator[str]:
+    """Yield a variant's error rate on the whole drive, from its labelled frames, in a sentence."""
+    own = found.rates.get(variant, {}).get(TESTED) if found else None
+    if found is None or own is None:
+        return
+    ends = "no interval yet"
+    if own.low is not None and own.high is not None:
+        ends = f"{percent(own.low, 1)} to {percent(own.high, 1)}"
+    more = ""
+    if own.to_halve:
+        more = f"; {number(own.to_halve)} more drawn at random would halve that interval"
+    yield (
+        f"{variant}: {TESTED} {percent(own.mean, 1)} % ({ends}) from {number(own.labels)} labelled "
+        f"frames, drawn at random, of {number(own.frames)}{more}."
+    )
+    worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in found.apart.items())
+    if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:
+        yield f"Frames that were picked by rank are not in it; the worst: {listing(shown)}."
 
 
 def at_thresholds(

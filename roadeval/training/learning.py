@@ -17,7 +17,7 @@ import numpy.typing as npt
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import BlindPrior
-from roadeval.logs import LoggedFrame
+from roadeval.logs import LoggedFrame, Picks, Why
 from roadeval.pipeline.beyond.exposure import ExposureSettings, expose, gains
 from roadeval.pipeline.beyond.features import reach
 from roadeval.pipeline.beyond.scene import scene_of, stretched
@@ -253,6 +253,7 @@ def from_log(
     *,
     labelled: bool,
     base: Model | None = None,
+    picks: Picks | None = None,
 ) -> tuple[tuple[Model, ...], Schedule]:
     """Train on some frames of a log, with each seed of the settings.
 
@@ -261,12 +262,15 @@ def from_log(
     are decoded as are needed, and ``on_frame`` is called with the number of those so far.
     ``labelled`` says that the log's truth may be used: then only frames that have one train, and
     some must be left to evaluate. Where no frame of the range has one, the first ones train.
-    ``base`` is what was learnt from other drives. Returned are the model of each seed, the first
+    ``base`` is what was learnt from other drives. With ``picks`` those train that were picked by
+    rank. Returned are the model of each seed, the first
     with the warnings of all, and which frames are left out.
     """
     if base is not None:
         _require_adaptable(pipelines)
-    candidates, by_truth = _candidates(frames, labelled=labelled)
+    ranked = _of_picks(frames, picks, on_frame) if picks and labelled else None
+    candidates, by_truth = _candidates(frames, labelled=labelled and picks is None)
+    by_truth = by_truth or ranked is not None
     if base is not None and not by_truth and settings.source != "patch":
         raise TrainingError(
             "no frame of the range has road truth to adapt the model to, and what the reference "
@@ -277,14 +281,14 @@ def from_log(
     if not learning:
         made_for = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
         nothing = Model({name: {} for name in pipelines}, made_for, "none", frozenset(), 0)
-        return (nothing,), Schedule(frozenset())
+        return (nothing,), Schedule(frozenset(), picks=picks)
     if not settings.frames:
         raise TrainingError(
             f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
             "or run what learns nothing with `only`"
         )
     choose = _spread_out if settings.placement == "spread" else _from_the_first
-    chosen = choose(candidates, settings, on_frame, by_truth=by_truth)
+    chosen = ranked or choose(candidates, settings, on_frame, by_truth=by_truth)
     held, count = chosen.held, len(chosen.held.frames)
     warnings = []
     if held.is_full:
@@ -296,8 +300,10 @@ def from_log(
         )
     warnings += _repeated(held.frames)
     if labelled and not by_truth:
-        warnings.append(f"no frame that is read has road truth: {BY_PATCH}")
-    schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first)
+        what = "no frame that is read has road truth"
+        what = what if picks is None else "no frame that was picked by rank is labelled"
+        warnings.append(f"{what}: {BY_PATCH}")
+    schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first, picks=picks)
     if base is None:
         schedule = replace(schedule, sizes=frozenset(len(f.payload) for f in held.frames))
     else:
@@ -462,6 +468,20 @@ def _candidates(
         for first in with_truth:
             return chain([first], with_truth), True
     return iter(frames()), False
+
+
+def _of_picks(
+    frames: Callable[[], Iterable[LoggedFrame]], picks: Picks, on_frame: Callable[[int], None]
+) -> Chosen | None:
+    """Choose all frames that were picked by rank and labelled since; None without any."""
+    held, ranked = HeldFrames(), picks.stamps_of(Why.RANKED)
+    for _, frame in decoded(e for e in frames() if e.labelled and e.stamp_ns in ranked):
+        if frame.truth is None or picks.is_proposal(frame.stamp_ns, frame.truth):
+            continue
+        if not held.add(frame):
+            break
+        on_frame(len(held.frames))
+    return Chosen(held, frozenset(), None) if held.frames else None
 
 
 def _from_the_first(

@@ -42,6 +42,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Frame, Rgb, Role
+from roadeval.logs import Picks, Why
 
 SIDE: Final = 32
 """Cells of the grid along each edge of the image."""
@@ -138,6 +139,8 @@ class Schedule:
     likeness: Likeness | None = None
     """The pictures of the training frames of a model file: frames that show the same are not
     evaluated. In a log that trains its own model later frames count as others, however similar."""
+    picks: Picks | None = None
+    """Which frames were picked to be labelled: those that were drawn at random are evaluated."""
 
     def use(self, frame: Frame) -> Use:
         """Return what a decoded frame is used for."""
@@ -145,6 +148,11 @@ class Schedule:
         if self.likeness is not None:
             same, beside = self.likeness.of(frame.image)
         role = Role.UNLABELLED if frame.truth is None else Role.EVALUATED
+        if self.picks is not None and frame.truth is not None:
+            if self.picks.is_proposal(frame.stamp_ns, frame.truth):
+                role = Role.UNLABELLED
+            elif frame.stamp_ns not in self.picks.stamps_of(Why.RANDOM):
+                role = Role.PICKED
         if frame.number in self.gap:
             role = Role.GAP
         if same:

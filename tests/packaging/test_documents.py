@@ -27,7 +27,10 @@ HEALTH = ("failed", "degraded")
 MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 """The head of a file that CONTRIBUTING.md adds."""
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
-ELSEWHERE = (".venv/", "reports/", "recordings/", "build/", "masks/", "images/", "../shared/")
+ELSEWHERE = (
+    *(".venv/", "reports/", "recordings/", "build/", "masks/", "images/", "../shared/"),
+    *("to_label/", "labels/", "proposals/"),
+)
 """Where runs write, and what users bring."""
 
 

@@ -68,4 +68,4 @@ from roadeval.evaluation.score.thresholds import (
     calibration_error,
     changes,
 )
-from roadeval.evaluation.score.unlabelled import SIGNS, Unlabelled, doubts_of, sign_of
+from roadeval.evaluation.score.unlabelled import SIGNS, Unlabelled, chosen, doubts_of, sign_of

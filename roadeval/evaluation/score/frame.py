@@ -67,7 +67,7 @@ def score_frame(
     """Score one frame; one that is not `EVALUATED` is passed on without counts.
 
     Of a training frame it counts alone how probable its road and the rest are, of one without truth
-    how much each mask is in doubt.
+    how much each mask is in doubt, of one that was picked by rank the ERR, apart from all counts.
 
     A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
     stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on;
@@ -77,6 +77,8 @@ def score_frame(
         return FrameResult(frame, role, variants, histograms=_histograms(frame.truth, variants))
     if role is Role.UNLABELLED:
         return FrameResult(frame, role, variants, doubts=doubts_of(variants))
+    if role is Role.PICKED and frame.truth is not None:
+        return FrameResult(frame, role, variants, **_apart(frame.truth, variants))
     if role is not Role.EVALUATED:
         return FrameResult(frame, role, variants)
     if frame.truth is None:
@@ -123,6 +125,17 @@ def _with_ground(tally: Tally, metres: Mapping[str, FrameMetres], last: Mapping[
         return tally
     counts = Counts(*metres[tally.variant].counts[0, -1].tolist())
     return replace(tally, regions={**tally.regions, ABOVE: counts})
+
+
+def _apart(truth: Truth, variants: Iterable[VariantResult]) -> dict[str, Any]:
+    """Return the final masks' ERR and error maps, as parts of `FrameResult`."""
+    finals = {(each.variant, FINAL_STAGE): Packed.of(each.final()) for each in variants}
+    bits = TruthBits.of(truth)
+    found = tally(list(finals), bits.bits_of(finals.values()), bits, {})
+    return {
+        "apart": {each.variant: each.rates["ERR"] for each in found},
+        "errors": {each.variant: error_map(each.final(), truth) for each in variants},
+    }
 
 
 def _histograms(truth: Truth, variants: Iterable[VariantResult]) -> dict[Name, Histogram]:

@@ -180,6 +180,11 @@ def scene_ns(stamps: Ints) -> int:
     return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
 
 
+def near(stamps: Ints) -> int:
+    """Return how far apart frames are that are no neighbours: a 30th of the drive, at most 1 s."""
+    return min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
+
+
 def worst(
     rows: Rows, variant: str, count: int, apart_ns: int | None = None, by: str = "ERR"
 ) -> Rows:
@@ -187,13 +192,13 @@ def worst(
 
     Or with the highest value of another column, as of ``unlabelled``.
 
-    Neighbours fail alike, so of frames less than ``apart_ns`` apart only the worst is picked: by
-    default a thirtieth of the drive, and at most a second.
+    Neighbours fail alike, so of frames less than ``apart_ns`` apart, by default `near`, only the
+    worst is picked.
     """
     own = finals(rows.of_variant(variant))
     own = own.take(~np.isnan(own[by]))
     ranked = np.argsort(-own[by], kind="stable")
-    return own.take(_apart(own["stamp_ns"], ranked, count, apart_ns))
+    return own.take(separate(own["stamp_ns"], ranked, count, apart_ns))
 
 
 def most_changed(
@@ -212,15 +217,15 @@ def most_changed(
     """
     sign = 1 if harmed else -1
     ranked = np.argsort(-sign * changes, kind="stable")
-    return _apart(stamps, ranked[sign * changes[ranked] > 0], count, apart_ns, besides)
+    return separate(stamps, ranked[sign * changes[ranked] > 0], count, apart_ns, besides)
 
 
-def _apart(
+def separate(
     stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
 ) -> Ints:
     """Return the first ``count`` places of a ranking that are no neighbours of one before."""
     if apart_ns is None:
-        apart_ns = min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
+        apart_ns = near(stamps)
     places: list[int] = []
     for place in ranked.tolist():
         if len(places) == count:

@@ -200,6 +200,8 @@ class Scoreboard:
         self.curves: Final = Curves()
         self.unlabelled: Final = Unlabelled()
         """The frames without truth."""
+        self.apart: Final[dict[int, Mapping[str, float]]] = {}
+        """ERR of the frames that were picked by rank, by number and variant."""
         self._training: Final = Curves()
         self._edges: Final = EdgesAndFlicker(settings.boundary_width)
         self._seconds: Final[defaultdict[Name, list[float]]] = defaultdict(lambda: [0.0, 0])
@@ -217,6 +219,8 @@ class Scoreboard:
         """
         doubts = self.unlabelled.add(result)
         self._roles[result.role] += 1
+        if result.apart:
+            self.apart[result.frame.number] = result.apart
         self._edges.add(result)
         for variant in result.variants:
             for stage in variant.stages:

@@ -19,6 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, Rows, VariantResult, ones
+from roadeval.data.arrays import Floats
+from roadeval.evaluation.score.rows import Ints, near, separate
+from roadeval.evaluation.stats import draw_order
 
 SIGNS: Final[Mapping[str, str]] = {
     "entropy": "how unsure road is, mean over pixels, from 0 to 1 bit",
@@ -136,3 +139,45 @@ def sign_of(rows: Rows, variant: str) -> str | None:
     """Return by which of `SIGNS` a variant's frames are ranked; None where it has none."""
     own = rows.of_variant(variant)
     return next((sign for sign in SIGNS if np.isfinite(own[sign]).any()), None)
+
+
+def chosen(
+    stamps: Ints,
+    scores: Floats,
+    count: int,
+    seed: int,
+    *,
+    drawn: int = 0,
+    taken: Sequence[int] = (),
+) -> tuple[Ints, Ints]:
+    """Choose frames to label: half of them at random, half by rank.
+
+    The random ones are the next in `draw_order`; one that is ``taken``, because an earlier rank has
+    put it there, needs no further label. The ranked ones have the highest score and are apart from
+    all others, as far as there are so many.
+
+    Parameters
+    ----------
+    stamps, scores
+        ``(n,)`` of all frames; nanoseconds, and how much each is in doubt, NaN where unknown.
+    drawn, taken
+        How many of the order were drawn before, and the places of all frames that have a label.
+
+    Returns
+    -------
+    tuple
+        The places of the random ones, and of the ranked ones.
+    """
+    known = np.flatnonzero(np.isfinite(scores))
+    half = -(-count // 2) if len(known) else count
+    random = draw_order(len(stamps), seed)[drawn : drawn + half]
+    without = [*{*taken, *random.tolist()}]
+    wanted = max(count - len({*random.tolist()} - {*taken}), 0)
+    ranked = known[np.argsort(-scores[known], kind="stable")]
+    ranked = ranked[~np.isin(ranked, without)]
+    apart = near(stamps)
+    while True:
+        found = separate(stamps, ranked, wanted, apart, stamps[without].tolist())
+        if len(found) == min(wanted, len(ranked)) or not apart:
+            return random, found
+        apart //= 2

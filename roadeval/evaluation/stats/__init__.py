@@ -19,3 +19,4 @@ from roadeval.evaluation.stats.drives import (
     sign_flip_p,
     strata,
 )
+from roadeval.evaluation.stats.sampling import Estimate, draw_order, estimate

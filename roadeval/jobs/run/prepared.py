@@ -197,16 +197,20 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
     selection = log.select()
     again = partial(log.frames, selection)
     variants = config.variants()
+    picks = logs.Picks.read(Path(config.truth.path)) if config.truth.path else None
+    if picks and config.frames.scale != 1:
+        raise RoadevalError("`frames.scale` and picked frames do not go together")
     labelled = selection.truth is not None
     frames = len(again())
     truths = frames if selection.truth is None else len(selection.truth.pictures)
-    if frames > SPARSE * truths:
+    if frames > SPARSE * truths and picks is None:
         note = f"at most {truths} of {frames} frames have road truth: "
         note += "`frames.labelled` reads these alone"
         on_progress(Progress(0, None, "opening", note))
     # Without truth no rate could tell the trainings apart.
     training = config.training if labelled else replace(config.training, seeds=1)
-    (model, *others), schedule = _learn(again, variants, training, on_progress, labelled=labelled)
+    learn = partial(_learn, again, variants, training, on_progress)
+    (model, *others), schedule = learn(labelled=labelled, picks=picks)
     try:
         chains, *repeats = (bind(variants, each) for each in (model, *others))
     except MisfitError as error:
@@ -248,11 +252,13 @@ def _learn(
     on_progress: OnProgress,
     *,
     labelled: bool,
+    picks: logs.Picks | None,
 ) -> tuple[tuple[Model, ...], Schedule]:
     pipelines = {variant.name: variant.pipeline for variant in variants}
     base = None
     if settings.model is not None:
         base, schedule = learning.from_file(Path(settings.model), pipelines)
+        schedule = replace(schedule, picks=picks)
         if not settings.adapt:
             return (base,), schedule
     total = min(settings.frames, len(frames()))
@@ -263,6 +269,7 @@ def _learn(
         lambda done: on_progress(Progress(done, total, "training")),
         labelled=labelled and settings.source != "patch",
         base=base,
+        picks=picks,
     )
 
 
@@ -437,6 +444,8 @@ def _process(
     except logs.FrameError:
         return run, None  # the log's accounting has it, with the reason
     use = run.schedule.use(frame)
+    if use.role is Role.UNLABELLED and frame.truth is not None:
+        frame = replace(frame, truth=None)  # it is a proposal as it was made
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of_frame(frame)

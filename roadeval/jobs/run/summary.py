@@ -9,20 +9,27 @@ from dataclasses import asdict, replace
 from importlib.metadata import version
 from typing import Any, Final
 
+import numpy as np
+
 from roadeval.config import AS_IT_IS
 from roadeval.data import BASELINE, FINAL_STAGE, TUNED, Role
+from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import (
     Scoreboard,
     Unlabelled,
     drive_effects,
+    final_stages,
     over_cameras,
     scene_ns,
     sign_of,
     worst,
 )
+from roadeval.evaluation.stats import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
+from roadeval.logs import PICK, Picks
 from roadeval.results.facts import (
     DriveFacts,
+    EstimateFacts,
     Facts,
     FrameAccount,
     LogFacts,
@@ -49,7 +56,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     repeats = run.board.repeats()
     settings = run.config.training
     given = settings.model is not None and not settings.adapt
-    unlabelled = _unlabelled(run.board.unlabelled)
+    unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run)
     thresholds = dict(_thresholds(run))
     return Facts(
         **found,
@@ -57,8 +64,10 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         verdict=verdict(
             *(found["totals"], effects, run.config.evaluation, found["claims"], thresholds),
             unlabelled=unlabelled,
+            estimated=estimated,
         ),
         unlabelled=unlabelled,
+        estimate=estimated,
         thresholds=thresholds,
         drive=DriveFacts(
             run.log.name,
@@ -77,7 +86,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             len(run.model.digests),
             run.model.pixels,
             settings.model,
-            None if given else settings.placement,
+            None if given else "picked" if run.schedule.picks else settings.placement,
             settings.adapt,
         ),
         warnings=list(warnings(run)),
@@ -107,6 +116,43 @@ def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
     for (one, other), share in frames.differing().items():
         differing[one][other] = share
     return UnlabelledFacts(len(own), first, sign, look_at, dict(differing))
+
+
+def _estimate(run: Run) -> EstimateFacts | None:
+    """Estimate the final masks' rates on the whole drive, from frames that were drawn at random."""
+    picks = run.schedule.picks
+    if picks is None:
+        return None
+    masks = run.board.masks()
+    finals, every = final_stages((m.variant, m.stage) for m in masks.masks), picks.every_score()
+    places = np.array([picks.places.get(stamp, -1) for stamp in masks.stamps.tolist()], np.int64)
+    rates: dict[str, dict[str, Estimate]] = {}
+    problem = _not_random(run, picks)
+    for mask in masks.masks:
+        if problem or finals[mask.variant] != mask.stage:
+            continue
+        for number, rate in enumerate(METRICS):
+            values = mask.rates[:, number]
+            known = np.isfinite(values)
+            if rate in SHORT and known.any():
+                scores = every[places[mask.positions[known]]]
+                found = estimate(values[known], scores, every, run.config.evaluation.confidence)
+                rates.setdefault(mask.variant, {})[rate] = found
+    apart: dict[str, dict[str, float | None]] = {
+        str(frame): dict(own) for frame, own in run.board.apart.items()
+    }
+    numbers = len(every), picks.drawn, len(masks.stamps)
+    return EstimateFacts(*numbers, picks.drawn / len(every), rates, apart, problem)
+
+
+def _not_random(run: Run, picks: Picks) -> str:
+    """Return why the labelled frames are no random part of the drive; empty if they are."""
+    if picks.log != run.log.digest:
+        return "the log is not as it was when its frames were picked: pick again, into a new folder"
+    seen, labelled = run.frames.accounting, run.config.frames.labelled
+    if seen.in_range < seen.in_log or (seen.read < seen.in_range and not labelled):
+        return "only a part of the drive was read"
+    return ""
 
 
 def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, float]]]:
@@ -224,6 +270,7 @@ def warnings(run: Run) -> tuple[str, ...]:
         *_tuned(run),
         *_missing(run),
         *_near_training(run),
+        *_of_picks(run),
         *_constant(run),
         *run.model.warnings,
     )
@@ -237,6 +284,33 @@ def _most_doubtful(run: Run) -> Iterator[str]:
         if found.sign not in RANKS_AT_ONCE:
             kept = "kept no pictures: one method alone says nothing by which a frame could rank"
         yield f"without truth `output.record` {rule} {kept}"
+
+
+def _of_picks(run: Run) -> Iterator[str]:
+    """Yield how many picked frames are not labelled yet, and which labels were not picked."""
+    picks, roles = run.schedule.picks, Counter(run.board.roles())
+    if picks is None:
+        return
+    if problem := _not_random(run, picks):
+        yield f"no number for the whole drive: {problem}"
+    scored = roles[Role.EVALUATED]
+    if (missing := picks.drawn - scored) > 0:
+        rest = f"the number is from the other {scored}, and too low if the hard ones were left"
+        rest = rest if scored else "there is no number"
+        yield (
+            f"{missing} of the {picks.drawn} frames that were drawn at random have no label yet: "
+            f"{rest}"
+        )
+    used = (Role.PICKED, *([Role.TRAINING] if run.model.source == "truth" else []))
+    own = scored + sum(roles[each] for each in used)
+    if (unchanged := run.frames.accounting.labelled - own) > 0:
+        yield (
+            f"{unchanged} labels are as they were proposed, and count as not labelled; of one that "
+            f"is right as it is, empty `proposal` in {PICK}"
+        )
+    known = {each.frame for each in picks.picked}
+    if others := len(run.board.apart.keys() - known):
+        yield f"{others} labels are of frames that were not picked: they are in no number"
 
 
 def _tuned(run: Run) -> Iterator[str]:
@@ -371,6 +445,7 @@ def _accounting(run: Run) -> FrameAccount:
         "copies of training frames": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
+        "picked": roles[Role.PICKED],
     }
     return FrameAccount(
         in_log=seen.in_log,

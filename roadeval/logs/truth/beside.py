@@ -22,6 +22,7 @@ from roadeval.logs.settings import Color
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, Drawn, LabelFormat, Size
 from roadeval.logs.truth.pairing import LabelSet, NamedLabel
+from roadeval.logs.truth.picks import LABELS, PICK
 from roadeval.runtime.discovery import found_in
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
@@ -37,13 +38,15 @@ _NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, O
 
 
 def labels_in(path: Path, size: Size | None) -> LabelSet:
-    """List the labels in a folder or a file.
+    """List the labels in a folder or a file; of picked frames those in their folder of labels.
 
     In a folder, files of an annotation tool come before images: these may be the ones that were
     annotated. A folder without any of both, or with lists of names alone, is searched with all
     below it. ``size`` is the width and height of the log's images, if known: some formats have
     shares of it. A `LogError` if there is no label, or the file of labels cannot be read.
     """
+    if (path / PICK).is_file():
+        path /= LABELS
     if path.is_file() and path.suffix.lower() not in _readers():
         known = ", ".join(sorted({each.name for own in _readers().values() for each in own}))
         raise LogError(f"{path}: no file of labels; known are folders of images, and {known}")

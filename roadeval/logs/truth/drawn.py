@@ -178,6 +178,32 @@ Drawn = Drawing | Segments
 """The label of one image, as a format reads it."""
 
 
+class Proposal(NamedTuple):
+    """A mask that an annotator is to correct."""
+
+    image: str
+    """The name of the image's file."""
+    road: Mask
+    """``(H, W)``."""
+
+    @property
+    def size(self) -> Size:
+        """Width and height in pixels."""
+        height, width = self.road.shape
+        return width, height
+
+    def runs(self, *, by_columns: bool = False) -> list[int]:
+        """Return the lengths of its runs, alternately outside and inside, the first outside."""
+        flat = self.road.T.ravel() if by_columns else self.road.ravel()
+        changes = np.flatnonzero(np.diff(flat, prepend=False))
+        lengths: list[int] = np.diff(changes, prepend=0, append=flat.size).tolist()
+        return lengths
+
+
+PROPOSED: Final = "road"
+"""The class of what is proposed."""
+
+
 @dataclass(frozen=True, slots=True)
 class LabelFormat:
     """A kind of files that hold labels.
@@ -195,3 +221,6 @@ class LabelFormat:
     """Return the label of each image in a parsed file of this format, given the size of the log's
     images. A `LogError` says what cannot be used; a KeyError, TypeError or ValueError means that
     the file is not as the format asks."""
+    write: Callable[[Sequence[Proposal]], Mapping[str, bytes]] | None = None
+    """Returns the files of masks for an annotator to correct, by their names; None where it writes
+    none."""

@@ -238,6 +238,11 @@ def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
 
 
 def _trained_here(placement: str | None) -> str:
+    if placement == "picked":
+        return (
+            "Trained on frames of this drive that were labelled because they were in doubt (none "
+            "of them is evaluated): the rates are of a method that has seen this road."
+        )
     if placement == "spread":
         return (
             "Trained on frames spread along this drive (neither they nor those beside them are "

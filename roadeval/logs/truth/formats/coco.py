@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import (
+    PROPOSED,
     Drawing,
     Drawn,
     LabelFormat,
     Outline,
+    Proposal,
     Runs,
     Segments,
     Shape,
@@ -78,4 +83,25 @@ def lengths_in(text: str) -> Sequence[int]:
     return lengths
 
 
-FORMAT = LabelFormat("COCO", ".json", _holds, _read)
+def _write(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+    """Return one file, with a region of uncompressed runs for each image."""
+    images, annotations = [], []
+    for number, each in enumerate(proposals, 1):
+        width, height = each.size
+        rows, columns = (np.flatnonzero(each.road.any(axis=axis)).tolist() for axis in (1, 0))
+        box = [0, 0, 0, 0]
+        if rows:
+            left, top = columns[0], rows[0]
+            box = [left, top, columns[-1] + 1 - left, rows[-1] + 1 - top]
+        images.append({"id": number, "file_name": each.image, "width": width, "height": height})
+        about = {"id": number, "image_id": number, "category_id": 1, "iscrowd": 1}
+        runs = {"size": [height, width], "counts": each.runs(by_columns=True)}
+        annotations.append(
+            {**about, "area": int(each.road.sum()), "bbox": box, "segmentation": runs}
+        )
+    content = {"images": images, "annotations": annotations}
+    content["categories"] = [{"id": 1, "name": PROPOSED}]
+    return {"instances.json": json.dumps(content).encode()}
+
+
+FORMAT = LabelFormat("COCO", ".json", _holds, _read, _write)

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Runs, Shape, Size, rectangle
+from roadeval.logs.truth.drawn import (
+    PROPOSED,
+    Drawing,
+    LabelFormat,
+    Outline,
+    Proposal,
+    Runs,
+    Shape,
+    Size,
+    rectangle,
+)
 
 NO_AREAS = ("polyline", "points", "tag", "skeleton")
 
@@ -43,4 +53,19 @@ def _shape(element: Element, path: Path) -> Shape:
             raise LogError(f"{path}: it holds a shape ({other}) that roadeval does not read")
 
 
-FORMAT = LabelFormat("CVAT for images", ".xml", _holds, _read)
+def _write(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+    """Return one file, with a mask of runs for each image that shows road."""
+    root = Element("annotations")
+    SubElement(root, "version").text = "1.1"
+    for number, each in enumerate(proposals):
+        size = dict(zip(("width", "height"), map(str, each.size), strict=True))
+        image = SubElement(root, "image", {"id": str(number), "name": each.image, **size})
+        if each.road.any():
+            runs = ", ".join(map(str, each.runs()))
+            about = {"label": PROPOSED, "source": "auto", "occluded": "0", "z_order": "0"}
+            SubElement(image, "mask", {**about, "rle": runs, "left": "0", "top": "0", **size})
+    content: bytes = tostring(root, "utf-8", xml_declaration=True)
+    return {"annotations.xml": content}
+
+
+FORMAT = LabelFormat("CVAT for images", ".xml", _holds, _read, _write)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from base64 import b64decode
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,21 @@ import numpy as np
 
 from roadeval.images import Limits, to_rgb
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Runs, Shape, Size, rectangle
+from roadeval.logs.truth.drawn import (
+    PROPOSED,
+    Drawing,
+    LabelFormat,
+    Outline,
+    Proposal,
+    Runs,
+    Shape,
+    Size,
+    rectangle,
+)
 
+SMALLEST = 64
+"""Area of an outline that is written, in quarters of a pixel."""
+HOLE = "other"
 NO_AREAS = ("point", "points", "line", "linestrip")
 
 
@@ -47,4 +61,39 @@ def _shape(shape: Mapping[str, Any], path: Path) -> Shape:
             raise LogError(f"{path}: it holds a shape ({other}) that roadeval does not read")
 
 
-FORMAT = LabelFormat("LabelMe", ".json", _holds, _read)
+def _write(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+    """Return a file for each image, with its outlines; a hole is an outline of another class."""
+    found = {}
+    for each in proposals:
+        width, height = each.size
+        common: dict[str, Any] = {"shape_type": "polygon", "group_id": None, "flags": {}}
+        shapes = [{"label": label, "points": ring, **common} for label, ring in _outlines(each)]
+        content: dict[str, Any] = {
+            "version": "5.0.0",
+            "flags": {},
+            "shapes": shapes,
+            "imageData": None,
+            "imagePath": f"../images/{each.image}",
+            "imageHeight": height,
+            "imageWidth": width,
+        }
+        found[f"{Path(each.image).stem}.json"] = json.dumps(content).encode()
+    return found
+
+
+def _outlines(proposal: Proposal) -> Iterator[tuple[str, list[list[float]]]]:
+    """Yield outlines with few points, within a pixel; small holes and islands are left out."""
+    import cv2
+
+    road = np.pad(proposal.road.astype(np.uint8).repeat(2, 0).repeat(2, 1), 1)
+    rings, parents = cv2.findContours(road, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    links = parents[0] if parents is not None else ()
+    order = sorted(range(len(rings)), key=lambda place: links[place][3] >= 0)
+    for place in order:
+        ring = cv2.approxPolyDP(rings[place], 2.0, closed=True)[:, 0, :]
+        if len(ring) > 2 and cv2.contourArea(rings[place]) >= SMALLEST:
+            label = PROPOSED if links[place][3] < 0 else HOLE
+            yield label, ((ring - 0.5) / 2).tolist()
+
+
+FORMAT = LabelFormat("LabelMe", ".json", _holds, _read, _write)

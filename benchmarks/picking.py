@@ -1,0 +1,138 @@
+"""What picked labels are worth: ``python -m benchmarks.picking --drives FOLDER``.
+
+The truth of drives is held back, frames are picked as `roadeval pick` does, and the number for the
+whole drive is held against the true one, 200 times with another draw. The table is that of
+``docs/how-to/pick.md``. ``FOLDER`` holds the two drives of CamVid; synthetic drives are rendered.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+import roadeval
+from benchmarks.world import RenderSettings, write_drive
+from roadeval.evaluation.score import chosen
+from roadeval.evaluation.stats import Estimate, draw_order, estimate
+
+DRAWS: Final = 200
+LABELS: Final = (10, 20, 50)
+WORST: Final = 10
+SEEDS: Final = (1, 2, 3)
+CAMVID: Final = {
+    "camvid_0016E5_15hz": {"labels": {"road": [3], "ignore": [11]}},
+    "camvid_0006R0_1hz": {},
+}
+Values = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive with its truth: of each frame the stamp, the doubt, and the ERR."""
+
+    name: str
+    stamps: npt.NDArray[np.int64]
+    scores: Values
+    errors: Values
+
+
+def measured(path: Path, preset: str, tables: dict[str, object]) -> Drive:
+    """Replay a drive, with its truth to score and without it for the doubt."""
+    options = {"record": "none", "figures": False}
+    with TemporaryDirectory() as folder:
+        for name, hidden in (("scored", {}), ("hidden", {"topics": {"truth": ""}})):
+            given = {} if hidden else tables
+            settings = {"preset": preset, "training": {"source": "patch"}, **given, **hidden}
+            config = roadeval.configure({**settings, "output": options})
+            roadeval.replay(path, config, reports=Path(folder, name))
+        rows = roadeval.Result(Path(folder, "scored")).frames
+        doubt = pd.read_csv(Path(folder, "hidden", "unlabelled.csv"))
+    first = doubt.variant[0]
+    doubt = doubt[doubt.variant == first]
+    rows = rows[(rows.variant == first) & (rows.stage == doubt.stage.iloc[0])]
+    both = doubt.merge(rows[["stamp_ns", "ERR"]], on="stamp_ns").dropna(subset="ERR")
+    sign = next(each for each in ("entropy", "disagreement") if both[each].notna().all())
+    columns = (both[name].to_numpy() for name in ("stamp_ns", sign, "ERR"))
+    return Drive(f"{path.stem}, {preset} ({sign})", *columns)
+
+
+def tried(drive: Drive, labels: int) -> dict[str, tuple[float, float, float]]:
+    """Return coverage, median width and worst frames found, in percent, by strategy."""
+    count, truth = len(drive.errors), drive.errors.mean()
+    worst = {*np.argsort(-drive.errors)[:WORST].tolist()}
+    unknown = np.full(count, np.nan)
+    found: dict[str, list[tuple[bool, float, float]]] = {}
+
+    def note(name: str, places: npt.NDArray[np.int64], own: Estimate) -> None:
+        assert own.low is not None
+        assert own.high is not None
+        hits = len(worst & {*places.tolist()}) / WORST
+        found.setdefault(name, []).append((own.low <= truth <= own.high, own.high - own.low, hits))
+
+    for seed in range(DRAWS):
+        random, ranked = chosen(drive.stamps, drive.scores, labels, seed)
+        own = estimate(drive.errors[random], drive.scores[random], drive.scores)
+        note("pick", np.union1d(random, ranked), own)
+        drawn = draw_order(count, seed)[:labels]
+        note("random", drawn, estimate(drive.errors[drawn], unknown[drawn], unknown))
+        start = np.random.default_rng(seed).uniform()
+        even = ((np.arange(labels) + start) * count / labels).astype(np.int64)
+        note("uniform", even, estimate(drive.errors[even], unknown[even], unknown))
+    doubtful = np.argsort(-drive.scores)[:labels]
+    note("doubtful", doubtful, estimate(drive.errors[doubtful], unknown[doubtful], unknown))
+    percent = {name: 100 * np.array(own, float).T for name, own in found.items()}
+    return {
+        n: (float(h.mean()), float(np.median(w)), float(f.mean()))
+        for n, (h, w, f) in percent.items()
+    }
+
+
+def table(drives: list[Drive]) -> Iterator[str]:
+    """Yield the lines of the table."""
+    yield (
+        "| drive, preset (ranked by): true ERR | labels | interval holds, % | its width, points "
+        "| of the ten worst found, % |"
+    )
+    yield "| --- | --- | --- | --- | --- |"
+    for drive in drives:
+        for labels in LABELS:
+            by = tried(drive, labels)
+            cells = [
+                " / ".join(f"{by[name][place]:.{digits}f}" for name in STRATEGIES)
+                for place, digits in ((0, 0), (1, 1), (2, 0))
+            ]
+            first = (
+                f"{drive.name}: {100 * drive.errors.mean():.1f} %" if labels == LABELS[0] else ""
+            )
+            yield f"| {first} | {labels} | {' | '.join(cells)} |"
+
+
+STRATEGIES: Final = ("pick", "random", "uniform", "doubtful")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--drives", type=Path, required=True, metavar="FOLDER")
+    options = parser.parse_args()
+    drives = []
+    for name, tables in CAMVID.items():
+        path = options.drives / f"{name}.mcap"
+        drives += [measured(path, preset, tables) for preset in ("robust", "paper")]
+    with TemporaryDirectory() as folder:
+        for seed in SEEDS:
+            path = Path(folder, f"synthetic_{seed}.mcap")
+            write_drive(path, RenderSettings(seed=seed))
+            drives.append(measured(path, "robust", {}))
+    print("\n".join(table(drives)))
+
+
+if __name__ == "__main__":
+    main()

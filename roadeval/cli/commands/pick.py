@@ -1,0 +1,87 @@
+"""``roadeval pick``: frames worth labelling."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import typer
+
+from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import Given, takes
+
+
+@takes(
+    *("preset", "config", "variants", "nets", "masks", "tunes", "only"),
+    *("training", "truth", "topics", "cameras", "labels", "frames", "run"),
+)
+def pick(
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DRIVE|RESULT",
+            show_default=False,
+            help="Camera logs (MCAP), which are replayed first, recordings (.rrd) of them, or a "
+            "fleet's folder.",
+            readable=False,
+        ),
+    ],
+    *,
+    count: Annotated[
+        int, typer.Option("-n", "--count", metavar="N", min=1, max=100_000, help="Frames to label.")
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="Where they land, or go on.", readable=False
+        ),
+    ],
+    form: Annotated[
+        Literal["png", "coco", "labelme", "cvat"],
+        typer.Option("--format", help="Of the present masks, which are to be corrected."),
+    ] = "png",
+    variant: Annotated[
+        str | None,
+        typer.Option("--by", metavar="NAME", help="Whose masks and doubt. Default: the first."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the drawing.")] = 0,
+    given: Given,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Pick frames of a log without truth to label.
+
+    Half of them are drawn at random along the drive: of these 'replay --truth FOLDER' makes a
+    number for the whole drive, with its interval. The others are those most in doubt, apart from
+    each other: to learn from. FOLDER/images has the images, FOLDER/proposals the present masks;
+    corrected ones belong into FOLDER/labels. Picking again into the same folder goes on.
+    """
+    arguments.one_camera(given)
+    config = arguments.configuration(given)
+    from roadeval.jobs.results.pick import pick as run
+    from roadeval.logs import Why
+
+    with progress.watched(quiet) as watch:
+        found = run(
+            *(sources, count, output, config),
+            labels=form,
+            variant=variant,
+            seed=seed,
+            on_progress=watch,
+        )
+    for each in found if not quiet else ():
+        random = sum(frame.why is Why.RANDOM for frame in each.added)
+        ranked, by = len(each.added) - random, each.picks.method["ranked_by"]
+        doubt = f", {ranked} most in doubt (by {by})" if ranked else ""
+        of = f"{random} drawn at random of {len(each.picks.stamps):,}"
+        console.emit(f"{each.folder}: {len(each.added)} frames to label: {of}{doubt}")
+    if found and not quiet:
+        first = found[0]
+        out = console.results()
+        out.print(f"Correct {first.folder}/proposals, and put the results into labels/.")
+        console.show_next(out, f"roadeval replay {first.log} --truth {first.folder}")
+    messages.loops_missing()
+    return ExitCode.DONE
+
+
+COMMAND: Final = pick

@@ -1,0 +1,128 @@
+"""A rate of a whole drive from a few labelled frames that were drawn at random.
+
+Only chance in the drawing enters: however alike neighbours are, and whatever the frames are like,
+the interval is of the mean over exactly these frames. ``docs/how-to/pick.md`` tells how
+often it holds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.runtime.imports import special
+
+Values = npt.NDArray[np.float64]
+REGRESSION_FROM: Final = 8
+"""So many labels it takes to learn how a rate goes with the frames' score."""
+FINER: Final = 4
+"""Each frame has at least two to the power of so many less one points of the order's ring."""
+LEAST_LEFT: Final = 0.05
+"""One minus the leverage of a frame is at least this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The mean of a rate over all frames, from those that were drawn and labelled."""
+
+    mean: float
+    low: float | None
+    high: float | None
+    """The ends of the interval; None where it takes more labels."""
+    confidence: float
+    labels: int
+    frames: int
+    """Labelled frames that were drawn, and frames in all."""
+    to_halve: int | None
+    """So many further labels, drawn at random, would halve the interval; None where none can."""
+
+
+def draw_order(count: int, seed: int) -> npt.NDArray[np.int64]:
+    """Return ``count`` frames in an order of which every beginning is a stratified random sample.
+
+    The first m frames lie spread along the drive, and every frame is among them with probability
+    m / count exactly, so that whoever labels more goes on in the order. They are hit by the van der
+    Corput sequence, scrambled as in [1]_, on a ring of frames that is turned at random.
+
+    References
+    ----------
+    .. [1] A. B. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995.
+    """
+    rng = np.random.default_rng(seed)
+    levels = max(count - 1, 1).bit_length() + FINER
+    cells = np.arange(2**levels)
+    rank = np.zeros(2**levels, np.int64)
+    for level in range(levels):
+        flips = rng.integers(0, 2, 2**level)
+        bit = (cells >> (levels - 1 - level)) & 1
+        rank |= (bit ^ flips[cells >> (levels - level)]) << level
+    frame = (cells * (count / 2**levels) + rng.uniform(0, count)).astype(np.int64) % count
+    first = np.full(count, 2**levels)
+    np.minimum.at(first, frame, rank)
+    return np.argsort(first, kind="stable")
+
+
+def estimate(
+    values: Values, scores: Values, every_score: Values, confidence: float = 0.95
+) -> Estimate:
+    """Estimate the mean of a rate over all frames.
+
+    The drawn frames' mean is moved by how far their mean score is from that of all (a regression
+    estimator [1]_, section 7); its variance is that of the residuals, each divided by one minus its
+    leverage as the jackknife does, as of a simple random sample, which is cautious for one that is
+    stratified. With fewer than `REGRESSION_FROM` labels it is the plain mean. The interval is
+    Student's of the logarithm: error rates are skewed to the right.
+
+    Parameters
+    ----------
+    values
+        ``(m,)``: the rate of the labelled ones among the frames that were drawn at random.
+    scores, every_score
+        ``(m,)`` theirs, and ``(n,)`` those of all frames: any number that was known before, as how
+        unsure a mask is. Where one is NaN, none is used.
+
+    References
+    ----------
+    .. [1] W. G. Cochran, Sampling Techniques, 3rd edition, 1977.
+    """
+    labels, frames = len(values), len(every_score)
+    mean, centred = float(values.mean()), scores - scores.mean()
+    spread, fitted = float(centred @ centred), 1
+    residuals = values - mean
+    weights, left = np.ones(labels), np.full(labels, 1 - 1 / labels)
+    if labels >= REGRESSION_FROM and np.isfinite(every_score).all() and spread > 0:
+        off = float(every_score.mean() - scores.mean())
+        slope = float(centred @ values) / spread
+        moved = mean + slope * off
+        if moved > 0:
+            mean, fitted = moved, 2
+            residuals = residuals - slope * centred
+            weights = 1 + labels * off * centred / spread
+            left = np.maximum(left - centred**2 / spread, LEAST_LEFT)
+    unseen = 1 - labels / frames
+    if labels <= 1:
+        return Estimate(mean, None, None, confidence, labels, frames, None)
+    error = math.sqrt(unseen * float(((weights * residuals / left) ** 2).sum())) / labels
+    if not error and unseen:
+        return Estimate(mean, None, None, confidence, labels, frames, None)
+    reach = _student(confidence, labels - fitted) * error / mean if mean else 0.0
+    low, high = mean * math.exp(-reach), min(mean * math.exp(min(reach, 700.0)), 1.0)
+    more = _to_halve(labels, frames, fitted, confidence)
+    return Estimate(mean, low, high, confidence, labels, frames, more)
+
+
+def _student(confidence: float, freedom: int) -> float:
+    return float(special("stdtrit")(freedom, (1 + confidence) / 2))
+
+
+def _to_halve(labels: int, frames: int, fitted: int, confidence: float) -> int | None:
+    """Return how many more labels would halve an interval, if the frames are as those seen."""
+    counts = np.arange(labels, frames + 1)
+    quantiles = special("stdtrit")(counts - fitted, (1 + confidence) / 2)
+    widths = quantiles * np.sqrt(1 / counts - 1 / frames)
+    halved = np.flatnonzero(widths <= widths[0] / 2)
+    return int(halved[0]) if len(halved) and halved[0] else None

@@ -1,0 +1,280 @@
+"""Frames worth labelling: chosen from a result, and written for an annotation tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.config import RunConfig
+from roadeval.data import Rows
+from roadeval.errors import RoadevalError
+from roadeval.evaluation import score
+from roadeval.images import png_of
+from roadeval.jobs.progress import OnProgress, ignore
+from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.logs import Picked, Picks, Proposal, Why, digest_of, proposal_files
+from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, as_read
+from roadeval.results.facts import is_fleet
+from roadeval.results.fleet import FleetFolder, recording_path
+from roadeval.runtime.files import AnyPath, put, writing
+
+PNG: Final = "png"
+"""The format of masks as images, 255 where there is road."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The frames that a command has picked."""
+
+    folder: Path
+    picks: Picks
+    """All so far."""
+    new: int
+    """Frames to label that this command has added."""
+    log: str
+    """Where the log lies."""
+
+    @property
+    def added(self) -> list[Picked]:
+        """Those frames."""
+        return self.picks.picked[len(self.picks.picked) - self.new :]
+
+
+def pick(
+    source: AnyPath | Sequence[AnyPath],
+    count: int,
+    folder: AnyPath,
+    config: RunConfig | None = None,
+    *,
+    labels: str = PNG,
+    variant: str | None = None,
+    seed: int = 0,
+    on_progress: OnProgress = ignore,
+) -> list[Outcome]:
+    """Pick frames of logs without truth to label: half drawn at random, half most in doubt.
+
+    Parameters
+    ----------
+    source
+        A recording, a log, which is replayed first, or a fleet's folder, of which the recordings
+        that were kept are taken; or several of these.
+    count
+        How many frames to label; of several drives each gives as many as its length asks for.
+    folder
+        Where they land; of several drives in a folder each, of its name. Where it holds picks
+        already, these go on: no frame comes twice.
+    config
+        How a log is replayed.
+    labels
+        In which format the present masks are written for correction: ``png``, or one of
+        `roadeval.logs.truth.picks.WRITTEN`.
+    variant
+        Whose masks, and by whose doubt; by default the first one.
+    seed
+        Of the drawing; picks that go on keep theirs.
+
+    Raises
+    ------
+    RoadevalError
+        If nothing can be picked, with what to do.
+    """
+    from roadeval.jobs.run.replay import replay
+
+    given = [source] if isinstance(source, str | PathLike) else [*source]
+    with TemporaryDirectory(prefix="roadeval-") as place:
+        drives = []
+        for number, each in enumerate(part for one in given for part in _parts(Path(one))):
+            made = each
+            if each.suffix != ".rrd":
+                made = Path(place, f"{number}.rrd")
+                output = {"record": "masks", "figures": False}
+                own = (config or RunConfig()).override({"output": output})
+                own_reports = Path(place, "reports")
+                replay(each, own, save=made, reports=own_reports, on_progress=on_progress)
+            drives.append(_drive(made))
+        if not drives:
+            raise RoadevalError(f"{given[0]}: no recording was kept; replay it with --keep all")
+        many = len(drives) > 1
+        names = [drive.name for drive in drives]
+        if len({*names}) < len(names):
+            raise RoadevalError("two drives have the same name; pick from each into its own folder")
+        shares = _shares([len(drive.table("unlabelled")) for drive in drives], count)
+        return [
+            _picked(drive, _Wanted(own, Path(folder, *[drive.name] * many), labels, variant, seed))
+            for drive, own in zip(drives, shares, strict=True)
+            if own
+        ]
+
+
+def _parts(source: Path) -> list[Path]:
+    """Return the recordings that a fleet has kept; of anything else itself."""
+    if not is_fleet(source):
+        return [source]
+    drives = FleetFolder(source).drives
+    return [path for name in drives if (path := recording_path(source, name)).exists()]
+
+
+def _shares(sizes: Sequence[int], count: int) -> list[int]:
+    """Share a number out in proportion to sizes, by the largest remainders.
+
+    >>> _shares([100, 50, 51], 10)
+    [5, 2, 3]
+    """
+    exact = np.array(sizes) * count / max(sum(sizes), 1)
+    whole = np.floor(exact).astype(int)
+    whole[np.argsort(whole - exact, kind="stable")[: count - whole.sum()]] += 1
+    found: list[int] = whole.tolist()
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What is asked for, see `pick`."""
+
+    count: int
+    folder: Path
+    labels: str
+    variant: str | None
+    seed: int
+
+
+def _drive(source: Path) -> DriveResult:
+    """Open a recording of one camera."""
+    drive = Result(source).drive
+    if drive is None or drive.recording is None:
+        raise RoadevalError(f"{source}: frames are picked from the recording of one camera")
+    return drive
+
+
+def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
+    """Pick frames of a recording and write them."""
+    rows = drive.table("unlabelled")
+    names = rows.distinct("variant")
+    if not names:
+        raise RoadevalError(f"{drive.path}: every frame has truth, or none was replayed")
+    if (name := wanted.variant or names[0]) not in names:
+        raise RoadevalError(f"{drive.path}: no variant {name}; there are {', '.join(names)}")
+    known, own = _known(drive, rows, name, wanted), rows.of_variant(name)
+    scores = known.every_score()
+    if (sign := score.sign_of(rows, name)) is not None:  # how much they are in doubt by now
+        now = dict(zip(own["stamp_ns"].tolist(), own[sign].tolist(), strict=True))
+        scores = np.array([now.get(stamp, np.nan) for stamp in known.stamps])
+    taken = [known.places[stamp] for stamp in known.by_stamp]
+    choose = partial(score.chosen, drawn=known.drawn, taken=taken)
+    found = choose(np.array(known.stamps, np.int64), scores, wanted.count, known.seed)
+    random, ranked = (places.tolist() for places in found)
+    frames = [known.frames[place] for place in {*random, *ranked} - {*taken}]
+    if lacking := sorted({*frames} - {*drive.pictured}):
+        raise RoadevalError(
+            f"{drive.path}: no pictures of frame {lacking[0]}; replay with --record masks"
+        )
+    stage, masks = str(own["stage"][0]), {}
+    for frame in frames:
+        mask = drive.layer(name, stage, frame)
+        assert mask is not None
+        masks[frame] = mask == 1
+    shown = {f: as_read(wanted.labels, Proposal("", mask)) for f, mask in masks.items()}
+    digests = {frame: digest_of(mask) for frame, mask in shown.items()}
+    picks, new = _with(known, random, ranked, digests)
+    _write(drive, picks, [(each, masks[each.frame]) for each in new], wanted)
+    log = drive.facts.log
+    return Outcome(wanted.folder, picks, len(new), log.path if log else drive.name)
+
+
+def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Picks:
+    """Return the picks that a folder holds, or ones without a frame."""
+    folder, facts = wanted.folder, drive.facts
+    found = Picks.read(folder)
+    if found is None:
+        if folder.exists() and any(folder.iterdir()):
+            raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
+        return _nothing_yet(drive, rows, variant, wanted.seed)
+    if (found.log, found.camera) != (facts.log_digest, facts.drive.camera):
+        raise RoadevalError(f"{folder}: its frames are of another log; name a folder of its own")
+    return found
+
+
+def _write(
+    drive: DriveResult,
+    picks: Picks,
+    new: Sequence[tuple[Picked, npt.NDArray[np.bool_]]],
+    wanted: _Wanted,
+) -> None:
+    """Write images, masks to correct, and last what was picked."""
+    recording, folder = drive.recording, wanted.folder
+    assert recording is not None
+    with writing(folder, RoadevalError):
+        for part in (IMAGES, PROPOSALS, LABELS):
+            (folder / part).mkdir(parents=True, exist_ok=True)
+        proposals = []
+        for each, mask in new:
+            name = f"{each.stamp_ns:019d}.png"
+            (folder / IMAGES / name).write_bytes(png_of(recording.image(each.frame)))
+            proposals.append(Proposal(name, mask))
+        files = (
+            {each.image: png_of(np.uint8(255) * each.road) for each in proposals}
+            if wanted.labels == PNG
+            else proposal_files(wanted.labels, proposals)
+        )
+        for name, content in files.items():
+            path = folder / PROPOSALS / name
+            wave = new[0][0].wave if path.exists() else ""
+            path.with_name(f"{wave}{name}").write_bytes(content)
+        put(folder / PICK, picks.text().encode())
+
+
+def _nothing_yet(drive: DriveResult, rows: Rows, variant: str, seed: int) -> Picks:
+    """Return picks without a frame: those of a result that can be picked, and their doubt."""
+    own, sign = rows.of_variant(variant), score.sign_of(rows, variant)
+    stamps = own["stamp_ns"].tolist()
+    if len({*stamps}) < len(stamps):
+        raise RoadevalError(
+            f"{drive.path}: several frames have one stamp, so no label finds its own"
+        )
+    doubts = own[sign].tolist() if sign else [np.nan] * len(own)
+    method = {"variant": variant, "ranked_by": sign, "identity": drive.properties.get("input")}
+    return Picks(
+        drive=drive.name,
+        camera=drive.facts.drive.camera,
+        log=drive.facts.log_digest,
+        method=method,
+        seed=seed,
+        drawn=0,
+        frames=own["frame"].tolist(),
+        stamps=stamps,
+        scores=[doubt if np.isfinite(doubt) else None for doubt in doubts],
+        picked=[],
+    )
+
+
+def _with(
+    known: Picks, random: Sequence[int], ranked: Sequence[int], proposals: Mapping[int, str]
+) -> tuple[Picks, list[Picked]]:
+    """Return the picks with some more, and those that are new, by the drive's order.
+
+    A frame that was ranked before, and is drawn now, becomes a random one.
+    """
+    drawn, wave = known.drawn + len(random), max((e.wave for e in known.picked), default=0) + 1
+    probability, chosen = drawn / len(known.stamps), {known.stamps[place] for place in random}
+    old = [
+        replace(each, why=Why.RANDOM, probability=probability)
+        if each.why is Why.RANDOM or each.stamp_ns in chosen
+        else each
+        for each in known.picked
+    ]
+    new = []
+    for place in sorted({*random, *ranked}):
+        if (stamp := known.stamps[place]) not in known.by_stamp:
+            why, chance = (Why.RANDOM, probability) if place in random else (Why.RANKED, None)
+            frame = known.frames[place]
+            own = why, chance, known.scores[place], proposals[frame], wave
+            new.append(Picked(frame, stamp, *own))
+    return replace(known, drawn=drawn, picked=[*old, *new]), new

@@ -1,0 +1,214 @@
+"""From no truth to a number: pick frames, label them, replay with them, pick on."""
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from roadeval import logs
+from roadeval.config import configure
+from roadeval.logs import Picks, Proposal, Why, proposal_files
+from tests.e2e.commands import here
+from tests.fixtures.make import make
+
+HIDDEN = ("--truth-topic", "", "--preset", "robust")
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory):
+    """A folder with a drive whose truth is hidden, its recording, and picked frames."""
+    folder = tmp_path_factory.mktemp("pick")
+    shutil.copy(make("drives/car_park.mcap", folder), folder / "car_park.mcap")
+    words = ("--save", "out.rrd", "--reports", "reports", *HIDDEN)
+    assert here("replay", "car_park.mcap", *words, cwd=folder).returncode == 0
+    done = here("pick", "out.rrd", "-n", 10, "-o", "to_label", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "10 frames to label: 5 drawn at random of" in done.stdout
+    assert "5 most in doubt (by entropy)" in done.stdout
+    return folder
+
+
+@pytest.fixture
+def work(begun, tmp_path):
+    """A copy of that folder."""
+    return shutil.copytree(begun, tmp_path / "work")
+
+
+@pytest.fixture(scope="module")
+def truths(begun):
+    """The truth of each frame by its stamp."""
+    with logs.open_log(begun / "car_park.mcap", configure({})) as log:
+        return {each.stamp_ns: each.decode().truth for each in log.frames(log.select())}
+
+
+def label(folder, truths, only=None, form="png"):
+    """Put true labels of picked frames where an annotator would put them."""
+    picked = [e for e in Picks.read(folder).picked if only is None or e.why is only]
+    values = np.array([0, 255], np.uint8)
+    proposals = [Proposal(f"{e.stamp_ns:019d}.png", truths[e.stamp_ns] == 1) for e in picked]
+    for each in proposals if form == "png" else ():
+        Image.fromarray(values[each.road.astype(int)]).save(folder / "labels" / each.image)
+    for name, content in proposal_files(form, proposals).items() if form != "png" else ():
+        (folder / "labels" / name).write_bytes(content)
+
+
+def scored(work, *words, code=0):
+    """Replay with the picked labels; return the summary and what was said."""
+    outputs = ("--save", "new.rrd", "--reports", "new")
+    done = here(
+        "replay", "car_park.mcap", *outputs, *HIDDEN, "--truth", "to_label", *words, cwd=work
+    )
+    assert done.returncode == code, done.stderr
+    return json.loads((work / "new" / "summary.json").read_text()), done
+
+
+def test_the_folder_has_images_masks_to_correct_and_why_each(begun):
+    folder = begun / "to_label"
+    known = json.loads((folder / "pick.json").read_text())
+    assert [e["why"] for e in known["picked"]].count("random") == 5
+    assert {e["probability"] for e in known["picked"] if e["why"] == "random"} == {
+        5 / len(known["stamps"])
+    }
+    assert known["method"]["ranked_by"] == "entropy"
+    names = {f"{e['stamp_ns']:019d}.png" for e in known["picked"]}
+    for part in ("images", "proposals"):
+        assert {each.name for each in (folder / part).iterdir()} == names
+    frames = pd.read_csv(begun / "reports" / "unlabelled.csv")
+    assert known["stamps"] == frames.stamp_ns.tolist()
+    assert known["scores"] == pytest.approx(frames.entropy.tolist())
+
+
+def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(work, truths):
+    label(work / "to_label", truths)
+    summary, done = scored(work)
+    drawn = Picks.read(work / "to_label").stamps_of(Why.RANDOM)
+    frames = pd.read_csv(work / "new" / "frames.csv").query("variant == 'unfiltered'")
+    assert {*frames.stamp_ns} == drawn
+    assert summary["frames"]["trained_on"] == 5
+    found = summary["estimate"]["rates"]["unfiltered"]["ERR"]
+    own = frames.query("stage == 'post'").ERR
+    assert found["mean"] == pytest.approx(own.mean())
+    assert found["low"] < found["mean"] < found["high"]
+    assert f"from 5 labelled frames, drawn at random, of {found['frames']}" in " ".join(
+        done.stdout.split()
+    )
+
+
+def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
+    words = ("--config", "patch.toml")
+    (work / "patch.toml").write_text('preset = "robust"\n[training]\nsource = "patch"\n')
+    label(work / "to_label", truths)
+    before, _ = scored(work, *words)
+    label(work / "to_label", {stamp: 1 - (t == 1) for stamp, t in truths.items()}, Why.RANKED)
+    after, _ = scored(work, *words)
+    assert before["estimate"]["rates"] == after["estimate"]["rates"]
+    assert before["totals"] == after["totals"]
+    assert before["estimate"]["apart"] != after["estimate"]["apart"]
+    assert len(after["estimate"]["apart"]) == 5
+
+
+@pytest.mark.parametrize("form", ["coco", "cvat"])
+def test_every_format_gives_the_numbers_of_the_images(form, work, truths):
+    label(work / "to_label", truths)
+    images, _ = scored(work)
+    shutil.rmtree(work / "to_label" / "labels")
+    (work / "to_label" / "labels").mkdir()
+    label(work / "to_label", truths, form=form)
+    others, _ = scored(work)
+    assert others["estimate"] == images["estimate"]
+    assert others["totals"] == images["totals"]
+
+
+def test_proposals_as_they_are_count_as_no_labels(work, truths):
+    folder = work / "to_label"
+    label(folder, truths)
+    drawn = sorted(Picks.read(folder).stamps_of(Why.RANDOM))
+    for stamp in drawn[:2]:
+        shutil.copy(folder / "proposals" / f"{stamp:019d}.png", folder / "labels")
+    summary, done = scored(work)
+    assert summary["estimate"]["labels"] == summary["frames"]["evaluated"] == 3
+    assert "2 of the 5 frames that were drawn at random have no label yet" in done.stderr
+    assert "2 labels are as they were proposed" in done.stderr
+
+
+def test_outlines_as_they_were_proposed_count_as_no_labels(work, truths):
+    done = here("pick", "out.rrd", "-n", 10, "-o", "outlines", "--format", "labelme", cwd=work)
+    assert done.returncode == 0, done.stderr
+    for each in (work / "outlines" / "proposals").iterdir():
+        shutil.copy(each, work / "outlines" / "labels")
+    words = ("--truth", "outlines", "--road-label", "road", *HIDDEN)
+    done = here("replay", "car_park.mcap", "--reports", "o", "--record", "none", *words, cwd=work)
+    assert done.returncode == 0, done.stderr
+    assert "10 labels are as they were proposed" in done.stderr
+    assert json.loads((work / "o" / "summary.json").read_text())["totals"] == {}
+
+
+def test_a_label_of_a_frame_that_was_not_picked_is_in_no_number(work, truths):
+    folder = work / "to_label"
+    label(folder, truths)
+    alone, _ = scored(work)
+    other = next(
+        stamp for stamp in Picks.read(folder).stamps if stamp not in Picks.read(folder).by_stamp
+    )
+    Image.fromarray((truths[other] == 1).astype(np.uint8) * 255).save(
+        folder / "labels" / f"{other:019d}.png"
+    )
+    summary, done = scored(work)
+    assert summary["estimate"]["rates"] == alone["estimate"]["rates"]
+    assert "1 labels are of frames that were not picked" in done.stderr
+
+
+def test_a_log_that_changed_gives_no_number_for_the_whole_drive(work, truths):
+    label(work / "to_label", truths)
+    path = work / "to_label" / "pick.json"
+    known = json.loads(path.read_text())
+    path.write_text(json.dumps({**known, "log": "another"}))
+    summary, done = scored(work)
+    assert summary["estimate"]["rates"] == {}
+    assert summary["frames"]["evaluated"] == 5
+    assert "no number for the whole drive: the log is not as it was" in done.stderr
+
+
+def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(work, truths):
+    label(work / "to_label", truths)
+    before = Picks.read(work / "to_label")
+    scored(work)
+    done = here("pick", "new.rrd", "-n", 8, "-o", "to_label", cwd=work)
+    assert done.returncode == 0, done.stderr
+    after = Picks.read(work / "to_label")
+    assert len(after.picked) == len(after.by_stamp) == 18
+    assert {*before.by_stamp} < {*after.by_stamp}
+    assert after.drawn == 9
+    random = [each for each in after.picked if each.why is Why.RANDOM]
+    assert len(random) == 9
+    assert {each.probability for each in random} == {9 / len(after.stamps)}
+    at_once = here("pick", "out.rrd", "-n", 18, "-o", "at_once", cwd=work)
+    assert at_once.returncode == 0
+    assert Picks.read(work / "at_once").stamps_of(Why.RANDOM) == after.stamps_of(Why.RANDOM)
+
+
+def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work):
+    shutil.copy(work / "car_park.mcap", work / "second.mcap")
+    done = here("pick", "car_park.mcap", "second.mcap", "-n", 6, "-o", "both", *HIDDEN, cwd=work)
+    assert done.returncode == 0, done.stderr
+    assert {each.name for each in (work / "both").iterdir()} == {"car_park", "second"}
+    assert len(Picks.read(work / "both" / "second").picked) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("out.rrd", "-n", 5, "-o", "reports"), "holds something else"),
+        (("out.rrd", "-n", 5, "-o", "x", "--by", "nobody"), "no variant nobody; there are"),
+        (("reports", "-n", 5, "-o", "x"), "reports"),
+        (("nothing.rrd", "-n", 5, "-o", "x"), "nothing.rrd"),
+    ],
+)
+def test_what_cannot_be_picked_is_one_line(work, words, said):
+    done = here("pick", *words, cwd=work)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

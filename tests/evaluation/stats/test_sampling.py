@@ -1,0 +1,110 @@
+"""Rates of a drive from frames drawn at random: the order of drawing, and the interval."""
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from scipy import stats
+
+from roadeval.evaluation.stats import draw_order, estimate
+from roadeval.evaluation.stats.sampling import REGRESSION_FROM
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 64, 1000])
+def test_an_order_has_every_frame_once_and_a_seed_repeats_it(count):
+    assert sorted(draw_order(count, 3)) == list(range(count))
+    np.testing.assert_array_equal(draw_order(count, 3), draw_order(count, 3))
+
+
+@pytest.mark.parametrize(("count", "first"), [(7, 3), (91, 10)])
+def test_every_frame_is_as_likely_to_be_drawn(count, first):
+    draws = 4000
+    seen = np.bincount(
+        np.concatenate([draw_order(count, seed)[:first] for seed in range(draws)]), minlength=count
+    )
+    variance = draws * first / count * (1 - first / count)
+    # Exactly `first` are drawn each time, which leaves count - 1 degrees of freedom.
+    chi2 = ((seen - draws * first / count) ** 2).sum() / variance * (count - 1) / count
+    assert 1e-3 < stats.chi2.sf(chi2, count - 1) < 1 - 1e-3
+
+
+def test_every_beginning_is_spread_along_the_drive():
+    for seed in range(20):
+        for parts in (4, 8, 16):
+            drawn = np.sort(draw_order(160, seed)[:parts])
+            gaps = np.diff([*drawn, drawn[0] + 160])
+            assert gaps.max() < 2 * 160 / parts + 1
+
+
+def a_drive(seed, frames=91, slope=1.0):
+    """Scores, and skewed rates that go with them."""
+    rng = np.random.default_rng(seed)
+    scores = rng.gamma(4, 0.01, frames)
+    return scores, slope * scores + rng.gamma(1.5, 0.01, frames)
+
+
+@pytest.mark.parametrize("labels", [REGRESSION_FROM, 25])
+def test_mean_and_error_are_those_of_statsmodels_with_hc3(labels):
+    scores, rates = a_drive(0)
+    drawn = draw_order(91, 1)[:labels]
+    found = estimate(rates[drawn], scores[drawn], scores)
+    fit = sm.OLS(rates[drawn], sm.add_constant(scores[drawn])).fit(cov_type="HC3")
+    at = np.array([1, scores.mean()])
+    assert found.mean == pytest.approx(float(fit.predict(at[None])[0]))
+    error = np.sqrt(at @ fit.cov_params() @ at * (1 - labels / 91))
+    reach = stats.t.ppf(0.975, labels - 2) * error / found.mean
+    assert found.low == pytest.approx(found.mean * np.exp(-reach))
+    assert found.high == pytest.approx(found.mean * np.exp(reach))
+
+
+def test_few_labels_or_an_unknown_score_give_the_plain_mean():
+    scores, rates = a_drive(0)
+    few, many = draw_order(91, 1)[: REGRESSION_FROM - 1], draw_order(91, 1)[:20]
+    assert estimate(rates[few], scores[few], scores).mean == pytest.approx(rates[few].mean())
+    unknown = np.where(np.arange(91) == 4, np.nan, scores)
+    assert estimate(rates[many], unknown[many], unknown).mean == pytest.approx(rates[many].mean())
+
+
+@pytest.mark.parametrize("labels", [5, 10, 25])
+def test_the_interval_holds(labels):
+    held = 0
+    for seed in range(300):
+        scores, rates = a_drive(seed)
+        drawn = draw_order(91, seed)[:labels]
+        found = estimate(rates[drawn], scores[drawn], scores)
+        held += found.low <= rates.mean() <= found.high
+    assert held >= 0.93 * 300
+
+
+def test_a_score_that_goes_with_the_rate_narrows_the_interval():
+    def width(slope):
+        scores, rates = a_drive(5, slope=slope)
+        drawn = draw_order(91, 5)[:20]
+        found = estimate(rates[drawn], scores[drawn], scores)
+        plain = estimate(rates[drawn], scores[drawn], np.full(91, np.nan))
+        return (found.high - found.low) / (plain.high - plain.low)
+
+    assert width(4.0) < 0.6
+
+
+def test_all_frames_labelled_leave_no_doubt():
+    scores, rates = a_drive(0)
+    found = estimate(rates, scores, scores)
+    assert (found.low, found.mean, found.high) == pytest.approx([rates.mean()] * 3)
+    assert found.to_halve is None
+
+
+def test_one_label_or_labels_without_a_difference_give_no_interval():
+    assert estimate(np.array([0.1]), np.array([1.0]), np.arange(9.0)).low is None
+    assert estimate(np.zeros(5), np.arange(5.0), np.arange(9.0)).high is None
+
+
+def test_so_many_more_would_halve_the_interval():
+    scores, rates = a_drive(2, frames=2000)
+    order = draw_order(2000, 2)
+    found = estimate(rates[order[:12]], scores[order[:12]], scores)
+
+    def width(labels):
+        return stats.t.ppf(0.975, labels - 2) * np.sqrt(1 / labels - 1 / 2000)
+
+    more = found.to_halve
+    assert width(12 + more) <= width(12) / 2 < width(12 + more - 1)
