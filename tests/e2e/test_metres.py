@@ -9,6 +9,8 @@ import pytest
 import roadeval
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
+from roadeval.jobs.results.report import collect
+from roadeval.jobs.results.result import DriveResult
 from tests.e2e.commands import here
 from tests.e2e.test_rig import IMAGE, SIZE, a_rig
 from tests.recording.making import paths_of
@@ -70,6 +72,17 @@ def test_the_recording_has_the_ground_and_the_camera_over_it(metres: Path):
     assert expected == {path for path in paths if path.startswith("/ground")}
 
 
+def test_the_chart_has_the_means_over_the_frames(metres: Path):
+    table = pd.read_csv(metres / "out" / "regions.csv").query("N > 0")
+    drawn = collect(DriveResult(metres / "out.rrd")).by_distance
+    for (band, variant), (mean, low, high) in drawn.items():
+        own = table[(table["region"] == band) & (table["variant"] == variant)]
+        own = own[own["stage"] == "post"]
+        assert mean == pytest.approx(((own["FP"] + own["FN"]) / own["N"]).mean())
+        assert low is None or low < mean < high
+    assert len(drawn) == 4 * 3
+
+
 def test_report_and_page_have_the_section(metres: Path):
     for name in ("out.pdf", "out.html"):
         assert here("report", "out.rrd", "-o", name, cwd=metres).returncode == 0
@@ -127,6 +140,12 @@ def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
     heights = {name: each.drive.ground.pose[0] for name, each in facts.cameras.items()}
     assert heights == pytest.approx({"front": 1.42, "rear": 2.5})
     assert {*pd.read_csv(tmp_path / "rig" / "metres.csv")["camera"]} == {"front", "rear"}
+    words = "--config", "rig.toml", "-o", "fleet", "-q"
+    assert here("fleet", "rig.mcap", *words, cwd=tmp_path).returncode == 0
+    folders = (tmp_path / "fleet" / "results").iterdir()
+    facts_of = (roadeval.Result(folder).drive.facts for folder in folders)
+    found = sorted(facts.drive.ground.pose[0] for facts in facts_of)
+    assert found == pytest.approx([1.42, 2.5])
     (tmp_path / "camera.toml").write_text(CAMERA)
     refused = here("replay", "rig.mcap", *words, "--camera", "camera.toml", cwd=tmp_path)
     assert refused.returncode != 0

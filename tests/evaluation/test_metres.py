@@ -213,6 +213,33 @@ def test_the_histogram_from_above_is_that_of_the_picture_from_above():
     assert (SURVEY.histogram(codes, truth) == expected).all()
 
 
+def test_a_mask_is_measured_at_the_road_of_the_truth_and_not_at_another_ahead():
+    truth = ((LEFTWARDS > 1) & (LEFTWARDS < 5)).astype(np.uint8)
+    mask = truth | ((LEFTWARDS < 0.5) & (LEFTWARDS > -4)).astype(np.uint8)
+    found = measured(mask, truth)
+    assert difference(found, LEFT, 20) == 0
+    assert difference(found, RIGHT, 20) == 0
+
+
+def test_each_variant_has_its_own_curve_and_sizes_are_without_sign():
+    truth, sums, curves = road(3, 3), MetreSums(), Curves()
+    codes = np.where(truth == 1, 40_000, 10_000).astype(np.uint16)
+    inverse = (65_535 - codes).astype(np.uint16)
+    for left in (2.0, 2.5, 3.5):
+        sums.add(dict.fromkeys(("sure", "lost"), measured(road(left, 3), truth)))
+    curves.add(
+        0,
+        {
+            ("sure", "post"): SURVEY.histogram(codes, truth),
+            ("lost", "post"): SURVEY.histogram(inverse, truth),
+        },
+    )
+    rows = {(e.variant, e.measure, e.where): e for e in sums.totals(curves)}
+    assert rows["sure", "MaxF", ABOVE].value == 1
+    assert rows["lost", "MaxF", ABOVE].value < 0.8
+    assert rows["sure", LEFT, "10m"].p95 == pytest.approx(1, abs=0.05)
+
+
 def test_sums_are_means_over_frames_and_ranges_over_stances():
     truth, sums = road(3, 3), MetreSums()
     masks = road(3.4, 3), road(3, 2.5, 30), road(2.8, 3)

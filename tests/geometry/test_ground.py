@@ -123,6 +123,23 @@ def test_transforms_give_angles_and_on_a_footprint_the_height():
     assert why == f"metres: flat ground, {expected}; {covers}"
 
 
+def test_what_a_file_says_replaces_what_the_log_says():
+    known = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4)
+    given = GroundSettings(
+        height=1.5, pitch=3.0, roll=-1.0, model="plumb_bob", distortion=LENSES["plumb_bob"]
+    )
+    ground, _ = ground_of(known, given, SIZE)
+    assert ground is not None
+    assert ground.pose == pytest.approx((1.5, 3, -1))
+    assert ground.distortion == LENSES["plumb_bob"]
+
+
+def test_intrinsics_may_be_for_images_of_another_size():
+    larger = made(size=(1280, 960), focal=(1120.0,), centre=(639.5, 479.5))
+    assert larger.pixels(PLACES) == pytest.approx(made().pixels(PLACES))
+    assert made(focal=(), fov=60.0).matrix[0] == pytest.approx(320 / math.tan(math.radians(30)))
+
+
 @pytest.mark.parametrize(
     ("known", "given", "said"),
     [

@@ -1,0 +1,72 @@
+"""The ground in the viewer: where its pictures lie in space, and in a rig below which paths."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+import rerun.blueprint as rrb
+
+from roadeval.data import Calibration, VariantLayout, mask_spec
+from roadeval.geometry.ground import ground_of
+from roadeval.geometry.settings import GroundSettings
+from roadeval.recording.layout import GROUND, Layout
+from roadeval.recording.views import arrange, before_the_first_frame
+
+SIZE = 64, 48
+GIVEN = GroundSettings(height=1.3, pitch=4, roll=2, focal=(56.0,))
+
+
+def a_layout() -> Layout:
+    ground, _ = ground_of(None, GIVEN, SIZE)
+    assert ground is not None
+    lens = Calibration("", *SIZE, ground.matrix, frame_id="cam")
+    variants = (VariantLayout("filtered", "", ("post",), (mask_spec("post", "Road mask"),)),)
+    return Layout("d", *SIZE, variants, ("ERR",), calibration=lens, ground=ground)
+
+
+def values(component: Any) -> list[Any]:
+    (found,) = component.as_arrow_array().to_pylist()
+    return found
+
+
+@pytest.mark.parametrize("place", [(6.0, 10.0), (46.0, -10.0), (20.0, 3.0)])
+def test_a_place_on_the_ground_lies_in_space_where_the_camera_sees_it(place: tuple[float, float]):
+    layout = a_layout()
+    assert layout.ground is not None
+    (logged,) = [
+        parts
+        for path, parts in before_the_first_frame(layout, {})
+        if path == GROUND and isinstance(parts[0], rr.Pinhole)
+    ]
+    pinhole, transform = logged
+    matrix = np.reshape(values(pinhole.image_from_camera), (3, 3)).T
+    # The picture's pixel of the place, as far from the virtual camera as its plane is.
+    across, along = 10 - place[1], 46 - place[0]
+    width, height = values(pinhole.resolution)
+    pixel = np.array([across / 20 * width, along / 40 * height, 1.0])
+    point = np.linalg.inv(matrix) @ pixel * values(pinhole.image_plane_distance)
+    turn = np.reshape(values(transform.mat3x3), (3, 3)).T
+    in_camera = turn @ point + values(transform.translation)
+    seen = np.reshape(layout.ground.matrix, (3, 3)) @ in_camera
+    assert seen[:2] / seen[2] == pytest.approx(layout.ground.pixels(np.array([place]))[0], abs=1e-3)
+
+
+def views_of(part: Any) -> Iterator[Any]:
+    if isinstance(part, rrb.View):
+        yield part
+    else:
+        for each in part.contents:
+            yield from views_of(each)
+
+
+@pytest.mark.parametrize("prefix", ["", "/front"])
+def test_the_space_shows_the_camera_without_its_picture(prefix: str):
+    blueprint = arrange({prefix: a_layout()})
+    (space,) = (
+        view for view in views_of(blueprint.root_container) if isinstance(view, rrb.Spatial3DView)
+    )
+    paths = [f"{prefix}{path}" for path in ("/ground", "/ground/filtered", "/camera")]
+    assert space.contents == paths
+    assert [*space.visualizer_overrides] == [f"{prefix}/camera"]

@@ -1,0 +1,42 @@
+"""The tables of errors in metres: what they mark as unsure."""
+
+import math
+from typing import Any
+
+from roadeval.report.blocks import plain
+from roadeval.report.sections.ground import UNSURE, distance_table, edges_tables
+
+NAMES = ["filtered", "unfiltered"]
+
+
+def row(variant: str, measure: str, where: str, value: float, sway: float) -> dict[str, Any]:
+    own = {"variant": variant, "measure": measure, "where": where, "frames": 9, "missing": 1}
+    return own | {"value": value, "p95": 0.5, "low": value - sway, "high": value + sway / 2}
+
+
+def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
+    rows = [
+        row("filtered", "ERR", "0-10m", 0.10, 0.02),
+        row("filtered", "ERR", "from_above", 0.10, 0.02),
+        row("unfiltered", "ERR", "0-10m", 0.13, 0.05),
+        row("unfiltered", "ERR", "from_above", 0.11, 0.05),
+    ]
+    first, ranges, second, *_ = distance_table(rows, NAMES).rows
+    assert [plain(cell) for cell in first[1:3]] == ["10.0", f"{UNSURE}10.0"]
+    assert plain(ranges[1]) == "8.0\N{EN DASH}11.0"
+    assert [plain(cell) for cell in second[1:3]] == ["13.0", "11.0"]
+
+
+def test_an_edge_that_a_wrong_camera_could_explain_is_marked():
+    rows = [
+        row("filtered", "left_edge", "10m", 0.30, 0.2),
+        row("filtered", "right_edge", "10m", -0.10, 0.2),
+        row("filtered", "free_distance", "ahead", 0.0, math.nan),
+    ]
+    edges, free = edges_tables(rows, NAMES)
+    cells = [plain(cell) for cell in edges.rows[0]]
+    assert cells[2] == "+0.30"
+    assert cells[6] == f"{UNSURE}\N{MINUS SIGN}0.10"
+    assert cells[5] == "1 of 9"
+    assert plain(free.rows[0][1]) == "0.00"
+    assert plain(free.rows[0][2]) == "\N{EN DASH}"
