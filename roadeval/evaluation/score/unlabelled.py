@@ -72,8 +72,8 @@ class Unlabelled:
     """Collects the doubts on a drive's frames, and adds their flicker."""
 
     def __init__(self) -> None:
-        self._numbers: Final[defaultdict[str, array[float]]] = defaultdict(lambda: array("d"))
-        self._stamps: Final[defaultdict[str, array[int]]] = defaultdict(lambda: array("q"))
+        self._numbers: Final = defaultdict[str, "array[float]"](lambda: array("d"))
+        self._stamps: Final = defaultdict[str, "array[int]"](lambda: array("q"))
         self._stages: Final[dict[str, str]] = {}
         self._differ: Final[defaultdict[tuple[str, str], list[float]]] = defaultdict(
             lambda: [0.0, 0]
