@@ -55,14 +55,22 @@ def label(folder, truths, only=None, form="png"):
         (folder / "labels" / name).write_bytes(content)
 
 
-def scored(work, *words, code=0):
+def scored(work, *words):
     """Replay with the picked labels; return the summary and what was said."""
     outputs = ("--save", "new.rrd", "--reports", "new")
     done = here(
         "replay", "car_park.mcap", *outputs, *HIDDEN, "--truth", "to_label", *words, cwd=work
     )
-    assert done.returncode == code, done.stderr
+    assert done.returncode == 0, done.stderr
     return json.loads((work / "new" / "summary.json").read_text()), done
+
+
+@pytest.fixture(scope="module")
+def labelled(begun, truths, tmp_path_factory):
+    """A copy in which every picked frame is labelled by an image, and the log replayed with it."""
+    work = shutil.copytree(begun, tmp_path_factory.mktemp("labelled") / "work")
+    label(work / "to_label", truths)
+    return work, *scored(work)
 
 
 def test_the_folder_has_images_masks_to_correct_and_why_each(begun):
@@ -81,9 +89,8 @@ def test_the_folder_has_images_masks_to_correct_and_why_each(begun):
     assert known["scores"] == pytest.approx(frames.entropy.tolist())
 
 
-def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(work, truths):
-    label(work / "to_label", truths)
-    summary, done = scored(work)
+def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(labelled):
+    work, summary, done = labelled
     drawn = Picks.read(work / "to_label").stamps_of(Why.RANDOM)
     frames = pd.read_csv(work / "new" / "frames.csv").query("variant == 'unfiltered'")
     assert {*frames.stamp_ns} == drawn
@@ -98,7 +105,7 @@ def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(wor
 
 
 def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
-    words = ("--config", "patch.toml")
+    words = ("--config", "patch.toml", "--record", "none")
     (work / "patch.toml").write_text('preset = "robust"\n[training]\nsource = "patch"\n')
     label(work / "to_label", truths)
     before, _ = scored(work, *words)
@@ -111,13 +118,10 @@ def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
 
 
 @pytest.mark.parametrize("form", ["coco", "cvat"])
-def test_every_format_gives_the_numbers_of_the_images(form, work, truths):
-    label(work / "to_label", truths)
-    images, _ = scored(work)
-    shutil.rmtree(work / "to_label" / "labels")
-    (work / "to_label" / "labels").mkdir()
+def test_every_format_gives_the_numbers_of_the_images(form, work, truths, labelled):
+    _, images, _ = labelled
     label(work / "to_label", truths, form=form)
-    others, _ = scored(work)
+    others, _ = scored(work, "--record", "none")
     assert others["estimate"] == images["estimate"]
     assert others["totals"] == images["totals"]
 
@@ -128,7 +132,7 @@ def test_proposals_as_they_are_count_as_no_labels(work, truths):
     drawn = sorted(Picks.read(folder).stamps_of(Why.RANDOM))
     for stamp in drawn[:2]:
         shutil.copy(folder / "proposals" / f"{stamp:019d}.png", folder / "labels")
-    summary, done = scored(work)
+    summary, done = scored(work, "--record", "none")
     assert summary["estimate"]["labels"] == summary["frames"]["evaluated"] == 3
     assert "2 of the 5 frames that were drawn at random have no label yet" in done.stderr
     assert "2 labels are as they were proposed" in done.stderr
@@ -146,17 +150,17 @@ def test_outlines_as_they_were_proposed_count_as_no_labels(work, truths):
     assert json.loads((work / "o" / "summary.json").read_text())["totals"] == {}
 
 
-def test_a_label_of_a_frame_that_was_not_picked_is_in_no_number(work, truths):
+def test_a_label_of_a_frame_that_was_not_picked_is_in_no_number(work, truths, labelled):
     folder = work / "to_label"
     label(folder, truths)
-    alone, _ = scored(work)
+    _, alone, _ = labelled
     other = next(
         stamp for stamp in Picks.read(folder).stamps if stamp not in Picks.read(folder).by_stamp
     )
     Image.fromarray((truths[other] == 1).astype(np.uint8) * 255).save(
         folder / "labels" / f"{other:019d}.png"
     )
-    summary, done = scored(work)
+    summary, done = scored(work, "--record", "none")
     assert summary["estimate"]["rates"] == alone["estimate"]["rates"]
     assert "1 labels are of frames that were not picked" in done.stderr
 
@@ -166,16 +170,15 @@ def test_a_log_that_changed_gives_no_number_for_the_whole_drive(work, truths):
     path = work / "to_label" / "pick.json"
     known = json.loads(path.read_text())
     path.write_text(json.dumps({**known, "log": "another"}))
-    summary, done = scored(work)
+    summary, done = scored(work, "--record", "none")
     assert summary["estimate"]["rates"] == {}
     assert summary["frames"]["evaluated"] == 5
     assert "no number for the whole drive: the log is not as it was" in done.stderr
 
 
-def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(work, truths):
-    label(work / "to_label", truths)
+def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled, tmp_path):
+    work = shutil.copytree(labelled[0], tmp_path / "work")
     before = Picks.read(work / "to_label")
-    scored(work)
     done = here("pick", "new.rrd", "-n", 8, "-o", "to_label", cwd=work)
     assert done.returncode == 0, done.stderr
     after = Picks.read(work / "to_label")
@@ -192,7 +195,8 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(work, tru
 
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work):
     shutil.copy(work / "car_park.mcap", work / "second.mcap")
-    done = here("pick", "car_park.mcap", "second.mcap", "-n", 6, "-o", "both", *HIDDEN, cwd=work)
+    words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 12)
+    done = here("pick", "car_park.mcap", "second.mcap", *words, cwd=work)
     assert done.returncode == 0, done.stderr
     assert {each.name for each in (work / "both").iterdir()} == {"car_park", "second"}
     assert len(Picks.read(work / "both" / "second").picked) == 3
