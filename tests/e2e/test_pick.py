@@ -195,7 +195,7 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
 
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work):
     shutil.copy(work / "car_park.mcap", work / "second.mcap")
-    words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 12)
+    words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 20)
     done = here("pick", "car_park.mcap", "second.mcap", *words, cwd=work)
     assert done.returncode == 0, done.stderr
     assert {each.name for each in (work / "both").iterdir()} == {"car_park", "second"}

@@ -351,10 +351,24 @@ def _closest(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> int:
 def _equal(
     stamps: Stamps, stamp: int, middle: int, reach: int | None, end: int | None = None
 ) -> Iterator[int]:
-    """Yield the positions with a stamp around a position, before ``end`` if it is given."""
-    around = _around(stamps, stamp, middle, None if reach is None else 0)
-    before = around if end is None else takewhile(lambda place: place < end, around)
-    return (place for place in before if stamps.stamp(place) == stamp)
+    """Yield the positions with a stamp around a position, before ``end`` if it is given.
+
+    Where the stamp comes more often in a row than is looked at, the row is followed to its ends.
+    """
+
+    def is_it(place: int) -> bool:
+        return stamps.stamp(place) == stamp
+
+    stop, last = len(stamps) if end is None else end, middle
+    for number, last in enumerate(_around(stamps, stamp, middle, None if reach is None else 0)):
+        if last >= stop:
+            return
+        if is_it(last):
+            if not number:
+                yield from reversed([*takewhile(is_it, range(last - 1, -1, -1))])
+            yield last
+    if last < stop and is_it(last):
+        yield from takewhile(is_it, range(last + 1, stop))
 
 
 def _around(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> Iterator[int]:

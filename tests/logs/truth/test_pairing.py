@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roadeval.logs.topics.reader import UNREADABLE
@@ -61,6 +61,11 @@ def test_repeated_stamps_pair_in_their_order() -> None:
     assert pairs([10, 10, 20], [10, 10, 20]) == [0, 1, 2]
 
 
+def test_a_stamp_that_comes_many_times_pairs_each_once() -> None:
+    assert pairs([7] * 9, [7] * 7) == [*range(7), None, None]
+    assert pairs([3, *[7] * 9, 9], [*[7] * 12, 9]) == [None, *range(9), 12]
+
+
 def test_a_repeated_image_does_not_take_the_only_label_twice() -> None:
     assert pairs([10, 10, 20], [10, 20]) == [0, None, 1]
 
@@ -88,6 +93,8 @@ def test_only_stamps_near_the_one_looked_for_are_read() -> None:
     st.lists(st.integers(0, 60), max_size=30).map(sorted),
     st.integers(0, 6),
 )
+@example([0] * 6, [0] * 5, 0)
+@example([0] * 3 + [7] * 9 + [9], [7] * 12, 2)
 def test_the_frames_of_labels_are_those_that_find_a_label(images, labels, tolerance):
     pairing = Pairing(Stamps(images), Stamps(labels), tolerance)
     partners = Partners(pairing)
