@@ -22,7 +22,7 @@ CAMERA = "height = 1.42\npitch = 2.9\nfocal = [140]\n"
 @pytest.fixture(scope="module")
 def metres(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("metres")
-    a_rig(folder / "drive.mcap", {"front": (0, 30)})
+    a_rig(folder / "drive.mcap", {"front": (0, 24)})
     (folder / "camera.toml").write_text(CAMERA)
     words = "--camera", "camera.toml", "--save", "out.rrd", "-o", "out"
     run = here("replay", "drive.mcap", *words, cwd=folder)
@@ -126,7 +126,7 @@ def test_a_file_that_says_too_little_or_nonsense_gets_a_line(
 
 
 def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
-    a_rig(tmp_path / "rig.mcap", {"front": (0, 25), "rear": (45, 70)})
+    a_rig(tmp_path / "rig.mcap", {"front": (0, 14), "rear": (45, 59)})
     cameras = "\n".join(
         f'[[cameras]]\nname = "{name}"\nimage = "/{name}{IMAGE}"\n'
         f"ground = {{ height = {height}, pitch = 2.9, fov = 59.5 }}"

@@ -12,18 +12,21 @@ from roadeval import logs
 from roadeval.config import configure
 from roadeval.logs import Picks, Proposal, Why, proposal_files
 from tests.e2e.commands import here
-from tests.fixtures.make import make
+from tests.e2e.test_rig import a_rig
 
-HIDDEN = ("--truth-topic", "", "--preset", "robust")
+HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
+QUICK = 'preset = "robust"\n[trees]\ntrees = 15\nhidden = 8\n'
+"""Some trees are enough: what is picked and counted is tested here, not how good it is."""
 
 
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory):
     """A folder with a drive whose truth is hidden, its recording, and picked frames."""
     folder = tmp_path_factory.mktemp("pick")
-    shutil.copy(make("drives/car_park.mcap", folder), folder / "car_park.mcap")
+    a_rig(folder / "street.mcap", {"front": (0, 60)})
+    (folder / "quick.toml").write_text(QUICK)
     words = ("--save", "out.rrd", "--reports", "reports", *HIDDEN)
-    assert here("replay", "car_park.mcap", *words, cwd=folder).returncode == 0
+    assert here("replay", "street.mcap", *words, cwd=folder).returncode == 0
     done = here("pick", "out.rrd", "-n", 10, "-o", "to_label", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "10 frames to label: 5 drawn at random of" in done.stdout
@@ -40,7 +43,7 @@ def work(begun, tmp_path):
 @pytest.fixture(scope="module")
 def truths(begun):
     """The truth of each frame by its stamp."""
-    with logs.open_log(begun / "car_park.mcap", configure({})) as log:
+    with logs.open_log(begun / "street.mcap", configure({})) as log:
         return {each.stamp_ns: each.decode().truth for each in log.frames(log.select())}
 
 
@@ -58,9 +61,7 @@ def label(folder, truths, only=None, form="png"):
 def scored(work, *words):
     """Replay with the picked labels; return the summary and what was said."""
     outputs = ("--save", "new.rrd", "--reports", "new")
-    done = here(
-        "replay", "car_park.mcap", *outputs, *HIDDEN, "--truth", "to_label", *words, cwd=work
-    )
+    done = here("replay", "street.mcap", *outputs, *HIDDEN, "--truth", "to_label", *words, cwd=work)
     assert done.returncode == 0, done.stderr
     return json.loads((work / "new" / "summary.json").read_text()), done
 
@@ -106,7 +107,7 @@ def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(lab
 
 def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
     words = ("--config", "patch.toml", "--record", "none")
-    (work / "patch.toml").write_text('preset = "robust"\n[training]\nsource = "patch"\n')
+    (work / "patch.toml").write_text(f'{QUICK}[training]\nsource = "patch"\n')
     label(work / "to_label", truths)
     before, _ = scored(work, *words)
     label(work / "to_label", {stamp: 1 - (t == 1) for stamp, t in truths.items()}, Why.RANKED)
@@ -144,7 +145,7 @@ def test_outlines_as_they_were_proposed_count_as_no_labels(work, truths):
     for each in (work / "outlines" / "proposals").iterdir():
         shutil.copy(each, work / "outlines" / "labels")
     words = ("--truth", "outlines", "--road-label", "road", *HIDDEN)
-    done = here("replay", "car_park.mcap", "--reports", "o", "--record", "none", *words, cwd=work)
+    done = here("replay", "street.mcap", "--reports", "o", "--record", "none", *words, cwd=work)
     assert done.returncode == 0, done.stderr
     assert "10 labels are as they were proposed" in done.stderr
     assert json.loads((work / "o" / "summary.json").read_text())["totals"] == {}
@@ -194,11 +195,11 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
 
 
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work):
-    shutil.copy(work / "car_park.mcap", work / "second.mcap")
+    shutil.copy(work / "street.mcap", work / "second.mcap")
     words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 20)
-    done = here("pick", "car_park.mcap", "second.mcap", *words, cwd=work)
+    done = here("pick", "street.mcap", "second.mcap", *words, cwd=work)
     assert done.returncode == 0, done.stderr
-    assert {each.name for each in (work / "both").iterdir()} == {"car_park", "second"}
+    assert {each.name for each in (work / "both").iterdir()} == {"street", "second"}
     assert len(Picks.read(work / "both" / "second").picked) == 3
 
 
