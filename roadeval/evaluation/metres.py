@@ -72,9 +72,9 @@ def band_name(near: int, far: int) -> str:
 
 
 class Survey:
-    """What of an image lies where on the ground.
+    """The places on the ground of an image's pixels, for images of the size of ``ground``.
 
-    For images of the size of ``ground``.
+    Made once, it counts masks by distance and from above, and finds where the road ends.
     """
 
     def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:

@@ -25,7 +25,7 @@ class LabelledFrame:
     variants: tuple[VariantResult, ...]
     settings: EvaluationSettings
     survey: Survey | None = None
-    """What of it lies where on the ground, where the camera is known."""
+    """The places of its pixels on the ground; None where the camera is not known."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,9 +121,7 @@ class Ground:
     def pose(self) -> tuple[float, float, float]:
         """Height in metres; pitch and roll in degrees, as of `GroundSettings`."""
         turn, third = self.axes()
-        body = (AXES.T @ turn).T
-        pitch = math.degrees(math.atan2(-body[2, 0], math.hypot(body[0, 0], body[1, 0])))
-        return float(-(turn.T @ third)[2]), pitch, math.degrees(math.atan2(body[2, 1], body[2, 2]))
+        return float(-(turn.T @ third)[2]), *_angles_of(turn.T @ AXES)
 
     def _distorted(self, rays: Matrix) -> Matrix:
         import cv2
@@ -217,11 +215,9 @@ def _pose(
     mounting: Mounting | None, given: GroundSettings
 ) -> tuple[tuple[float, float, float], str] | str:
     """Return height, pitch and roll, and where they come from, or what is missing."""
-    angles, height, text = (given.pitch, given.roll), given.height, []
+    angles, height = (given.pitch, given.roll), given.height
     if mounting is not None:
-        body = _matrix_of(mounting.rotation) @ AXES
-        pitch = math.degrees(math.atan2(-body[2, 0], math.hypot(body[0, 0], body[1, 0])))
-        roll = math.degrees(math.atan2(body[2, 1], body[2, 2]))
+        pitch, roll = _angles_of(_matrix_of(mounting.rotation) @ AXES)
         angles = (
             pitch if given.pitch is None else given.pitch,
             roll if given.roll is None else given.roll,
@@ -275,6 +271,12 @@ def _rolled(angle: float) -> Matrix:
     """Return the rotation of ahead, left and up about ahead: left goes up."""
     s, c = math.sin(angle), math.cos(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def _angles_of(body: Matrix) -> tuple[float, float]:
+    """Return pitch and roll in degrees of a rotation whose first axis is ahead; yaw is left out."""
+    pitch = math.atan2(-body[2, 0], math.hypot(body[0, 0], body[1, 0]))
+    return math.degrees(pitch), math.degrees(math.atan2(body[2, 1], body[2, 2]))
 
 
 def _matrix_of(quaternion: Sequence[float]) -> Matrix:

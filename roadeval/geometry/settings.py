@@ -41,7 +41,8 @@ class GroundSettings:
     """Its coefficients, in the order of ROS and OpenCV."""
     homography: Annotated[tuple[float, ...], Len(max_length=9)] = ()
     """Nine numbers, row by row: from column, row and 1 to metres ahead, metres to the left, and 1
-    (times any factor). It replaces height, pitch and roll."""
+    (times any factor); of a lens with distortion, from pixels without it. It replaces height, pitch
+    and roll."""
 
     def __post_init__(self) -> None:
         if self.fov is not None and self.focal:

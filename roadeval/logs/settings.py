@@ -113,7 +113,7 @@ class CameraSettings:
     masks: Mapping[str, str] = field(default_factory=dict)
     """Topics of masks to score as one more variant, by the variant's name."""
     ground: GroundSettings = field(default_factory=GroundSettings)
-    """What the log does not know of the camera over the ground."""
+    """Its height, angles and lens, where the log does not have them."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ SIGNS: Final[Mapping[str, str]] = {
     "disagreement": "share of pixels on which another variant differs, mean over the others",
     "flicker": "share of pixels that change from the frame before",
 }
-"""What a mask's doubt is measured by; frames are ranked by the first that a variant has."""
+"""The signs of doubt, with their meanings; frames are ranked by the first that a variant has."""
 _STEP: Final = 4
 """Every so many rows and columns are looked at; frames rank as with every pixel (r > 0.998)."""
 

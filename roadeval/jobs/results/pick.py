@@ -137,7 +137,7 @@ def _shares(sizes: Sequence[int], count: int) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """What is asked for, see `pick`."""
+    """The options of `pick` for one drive: its share of the frames, and its folder."""
 
     count: int
     folder: Path

@@ -53,7 +53,7 @@ class Outcome:
     rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     """Those of the tables ``scores`` and ``effects``."""
     metres: tuple[Measured, ...] = ()
-    """What was measured on the ground; of one camera that is known."""
+    """The measures on the ground; empty of a rig, and of a camera that is not known."""
     judgements: tuple[Judgement, ...] = ()
     """Of the conditions that were given."""
 

@@ -67,7 +67,7 @@ class Picks:
     log: str | None
     """The log's digest, if it is known."""
     method: Mapping[str, Any]
-    """What made the masks: ``variant``, ``ranked_by``, and what identifies the run."""
+    """The ``variant`` that made the masks, the sign it is ``ranked_by``, the run's ``identity``."""
     seed: int
     drawn: int
     """Frames that were drawn by chance so far, in `roadeval.evaluation.stats.draw_order`."""

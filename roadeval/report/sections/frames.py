@@ -181,7 +181,7 @@ class FrameBrowser(Block):
     left_out: Sequence[str] = ()
     """Variants whose layers had no room."""
     titles: Sequence[str] = tuple(SHORT)
-    """What each variant has a column of."""
+    """The rates, or without truth the signs of doubt, of which each variant has a column."""
 
     @property
     def pictured(self) -> frozenset[int]:

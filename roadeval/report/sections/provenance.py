@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from roadeval.data.words import number
-from roadeval.report.blocks import Block, Command, Details, Heading, Table, Text
+from roadeval.report.blocks import Block, Command, Details, Heading, KeepTogether, Table, Text
 from roadeval.report.findings import Findings, FleetFindings
 from roadeval.results.facts import Facts
 
@@ -27,8 +27,9 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Text(f"Log: {facts.log.path}")
         yield Text(f"Digest of its index and checksums: {facts.log.digest}")
         if findings.commands and findings.commands.again:
-            yield Command(findings.commands.again(facts.log.path))
-            yield Text("The same log, configuration and versions give the same numbers.", "note")
+            same = "The same log, configuration and versions give the same numbers."
+            command = Command(findings.commands.again(facts.log.path))
+            yield KeepTogether([command, Text(same, "note")])
     for name, labels in facts.masks.items():
         yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
     yield from _methods(facts)
