@@ -7,7 +7,7 @@ from scipy import stats
 from roadeval.data import Output, Packed, Role, StageResult, VariantResult
 from roadeval.evaluation import score
 from roadeval.evaluation.score import Scoreboard, sign_of
-from roadeval.evaluation.score.unlabelled import Unlabelled, doubts_of, entropy
+from roadeval.evaluation.score.unlabelled import Unlabelled, chosen, doubts_of, entropy
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, pixels
 
@@ -97,3 +97,12 @@ def test_the_rank_is_that_of_the_worst_frames_by_another_column():
         seen(board, number, variant("a", pixels("#..."), np.full((1, 4), level, np.uint16)))
     rows = board.unlabelled.rows()
     assert score.worst(rows, "a", 3, 0, by="entropy")["frame"].tolist() == [1, 2, 0]
+
+
+def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():
+    stamps = np.arange(900) * 10**9 // 30
+    random, ranked = chosen(stamps, np.linspace(1, 2, 900), 60, seed=0)
+    assert len(random) == len(ranked) == 30
+    places = np.sort(np.concatenate([random, ranked]))
+    beside = np.minimum(np.diff(places, prepend=-900), np.diff(places, append=1800))
+    assert beside[np.isin(places, ranked)].min() >= 7  # a quarter of the 30 frames of a second
