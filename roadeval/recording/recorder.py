@@ -41,7 +41,7 @@ from roadeval.recording import views
 from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
-from roadeval.recording.rrd_file import MessageSums, indexed_chunks
+from roadeval.recording.rrd_file import indexed_messages
 from roadeval.runtime.files import NewFile, writing
 
 
@@ -294,7 +294,6 @@ class Recorder:
         self._finished = self._failed = self._foretold = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
-        self._sums = MessageSums(self.partial)
         self._shown: dict[str, set[str]] = {}
         self._pictured: dict[str, list[tuple[int, int]]] = {}
         self._blank: dict[str, EncodedFrame] = {}
@@ -459,12 +458,8 @@ class Recorder:
         for each in self._cameras.values():
             pictured = json.dumps(self._pictured.get(each.prefix, []))
             self._log_static([(at.SHOWN, [rr.TextDocument(pictured)])], each.prefix)
-        self._flush_stream()
-        self._log_static([(at.SUMS, [rr.TextDocument(self._sums.document())])])
-        self._flush_stream()
-        self._log_static([(self._sums.mark(), [rr.TextDocument("")])])
         self._close()
-        if indexed_chunks(self.partial) < self._chunks:
+        if indexed_messages(self.partial) < self._chunks:
             raise self._incomplete() from _failure(errno.EIO)
         self._finished = True
 
@@ -541,7 +536,6 @@ class Recorder:
         for _ in range(PATIENCE):
             try:
                 stream.flush(timeout_sec=PATIENCE_S)
-                self._sums.read_on()
                 return
             except OSError as error:
                 raise self._incomplete() from error

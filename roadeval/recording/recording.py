@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict, deque
-from collections.abc import Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -227,7 +227,8 @@ class Recording:
         for variant in self.variants:
             names = (*variant.stages, *[ERRORS.name] * scored)
             paths += (at.layer_path(variant.name, name) for name in names)
-        return all(self._payloads.holds(p, self._codecs[p].component, frame) for p in paths)
+        found = (self._payloads.get(path, self._codecs[path].component, frame) for path in paths)
+        return all(each is not None for each in found)
 
     @cached_property
     def _codecs(self) -> dict[str, Codec]:
@@ -258,77 +259,24 @@ class Recording:
             return codec.decode(payload)
 
 
-READ_AHEAD: Final = 8 << 20
-"""Bytes of an entity's images that are kept of a file without an index. Rerun reads the whole file
-to give any frame of it, so each pass keeps what lies around the frame: reading frames in order,
-forwards or backwards, takes one pass for as many frames as fit."""
-
-
-class Page(NamedTuple):
-    """Frames of a chunk, and the bytes of each."""
-
-    frames: list[int]
-    payloads: pa.ListArray
-
-
 class PayloadCache:
-    """Encoded images of a file's entities by frame; ``component`` is the one that holds them."""
+    """Encoded images of a file's entities by frame, of each those of the message read last.
+
+    ``component`` is the one that holds them.
+    """
 
     def __init__(self, file: RrdFile) -> None:
         self._file = file
-        self._seen: dict[str, tuple[Span, frozenset[int]]] = {}
-        self._payloads: dict[str, dict[int, pa.ListScalar]] = {}
-
-    def holds(self, path: str, component: str, frame: int) -> bool:
-        """Return whether the file has an image of the entity on a frame."""
-        if path not in self._seen or not self._seen[path][0].holds(frame):
-            self._read_around(path, component, frame)
-        return frame in self._seen[path][1]
+        self._kept: dict[str, tuple[Span, dict[int, pa.ListScalar]]] = {}
 
     def get(self, path: str, component: str, frame: int) -> bytes | None:
         """Return the encoded image of the entity on a frame; None if there is none."""
-        if not self.holds(path, component, frame):
-            return None
-        if frame not in self._payloads[path]:
-            self._read_around(path, component, frame)
-        blob = self._payloads[path][frame]
-        return bytes(np.from_dlpack(blob.values))
-
-    def _read_around(self, path: str, component: str, frame: int) -> None:
-        self._payloads.pop(path, None)
-        span, batches = self._file.around(path, component, frame)
-        pages = (
-            Page(batch.column(at.FRAME).to_pylist(), flat(batch.column(component)))
-            for batch in batches
-        )
-        frames, self._payloads[path] = around(frame, pages)
-        self._seen[path] = span, frames
-
-
-def around(frame: int, pages: Iterable[Page]) -> tuple[frozenset[int], dict[int, pa.ListScalar]]:
-    """Return all frames of the pages, and by frame the bytes of those around one frame.
-
-    The page with the frame is kept at any size, then those after it as far as they fit in
-    `READ_AHEAD`, then the nearest before it. No more are held at any time.
-    """
-    frames: set[int] = set()
-    before: deque[Page] = deque()
-    after: list[Page] = []
-    for page in pages:
-        frames.update(page.frames)
-        if not after and frame not in page.frames:
-            before.append(page)
-        elif not after or _size(after) + page.payloads.nbytes <= READ_AHEAD:
-            after.append(page)
-        while before and _size(before) + _size(after) > READ_AHEAD:
-            before.popleft()
-    payloads = {
-        number: payload
-        for page in (*before, *after)
-        for number, payload in zip(page.frames, page.payloads, strict=True)
-    }
-    return frozenset(frames), payloads
-
-
-def _size(pages: Iterable[Page]) -> int:
-    return sum(page.payloads.nbytes for page in pages)
+        if path not in self._kept or not self._kept[path][0].holds(frame):
+            span, batches = self._file.around(path, component, frame)
+            payloads: dict[int, pa.ListScalar] = {}
+            for batch in batches:
+                frames = batch.column(at.FRAME).to_pylist()
+                payloads |= zip(frames, flat(batch.column(component)), strict=True)
+            self._kept[path] = span, payloads
+        blob = self._kept[path][1].get(frame)
+        return None if blob is None else bytes(np.from_dlpack(blob.values))

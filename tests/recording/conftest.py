@@ -2,7 +2,6 @@
 
 import pytest
 
-from roadeval.recording import rrd_file
 from tests.recording.making import record, some_frames
 
 
@@ -15,9 +14,3 @@ def drive():
 @pytest.fixture(scope="package")
 def recording(drive, tmp_path_factory):
     return record(tmp_path_factory.mktemp("recording") / "out.rrd", drive)
-
-
-@pytest.fixture
-def untried(monkeypatch):
-    """Read files without checksums at once: to try them in a process takes half a second each."""
-    monkeypatch.setattr(rrd_file, "can_be_read", lambda path: True)

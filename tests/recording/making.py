@@ -29,7 +29,7 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.evaluation.metrics import METRICS
-from roadeval.recording import Layout, Recorder, Recording
+from roadeval.recording import Layout, Recorder, Recording, rrd_file
 from roadeval.recording.rrd_file import RrdFile
 from roadeval.results.schema import TABLES
 from tests.results.making import facts_of, lines
@@ -128,17 +128,15 @@ def unscored(number, role=Role.TRAINING):
 
 def rows_of(recording, path, component):
     """How many values each frame's row of an entity has: none where nothing is to be shown."""
-    # Of the file that is open: a partial one is tried out by another process whenever it is opened.
-    chunks = recording._file.stream()
-    chunks = chunks.filter(content=[path], components=[component], is_static=False)
-    batches = [chunk.to_record_batch() for chunk in chunks]
-    return {
-        frame: len(values)
-        for batch in batches
-        for frame, values in zip(
-            batch.column("frame").to_pylist(), batch.column(component).to_pylist(), strict=True
-        )
-    }
+    file, found = recording._file, {}
+    for place in file._places.get(path, ()):
+        with file.path.open("rb") as opened:
+            opened.seek(place.offset)
+            _, batch = rrd_file.rows_of(opened.read(place.size))
+        if not place.static and component in batch.schema.names:
+            values = batch.column(component).to_pylist()
+            found |= zip(batch.column("frame").to_pylist(), map(len, values), strict=True)
+    return found
 
 
 def some_frames():
@@ -159,7 +157,7 @@ def record(path, results, known=None, texts=None):
 
 def paths_of(recording):
     """The paths of all entities that hold something."""
-    return {str(chunk.entity_path) for chunk in RrdFile(recording).stream()}
+    return {*RrdFile(recording)._places}
 
 
 def rerun(*words):

@@ -7,8 +7,7 @@ import pytest
 
 from roadeval.data import RESERVED
 from roadeval.recording import Layout, RecordingError, RecordRule
-from roadeval.recording.rrd_file import RrdFile
-from tests.recording.making import VARIANT, layout
+from tests.recording.making import VARIANT, layout, paths_of
 
 
 def paths(**changes):
@@ -48,8 +47,7 @@ def test_a_variant_cannot_take_a_name_that_the_recording_uses_or_cannot_hold(nam
 
 
 def test_every_path_that_is_no_variants_begins_with_a_reserved_name(recording):
-    chunks = RrdFile(recording.path).stream()
-    tops = {str(chunk.entity_path).split("/")[1] for chunk in chunks}
+    tops = {path.split("/")[1] for path in paths_of(recording.path)}
     assert tops - {"filtered", "__properties"} < RESERVED
 
 

@@ -32,8 +32,6 @@ from tests.recording.making import (
 )
 from tests.results.making import lines
 
-pytestmark = pytest.mark.usefixtures("untried")
-
 
 def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
     with Recorder(tmp_path / "new" / "out.rrd", layout()) as recorder:

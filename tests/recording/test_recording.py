@@ -1,6 +1,5 @@
 """What was recorded is read back: images, numbers and texts."""
 
-import weakref
 from dataclasses import replace
 
 import cv2
@@ -11,7 +10,6 @@ import rerun as rr
 
 from roadeval.data import Health, Role
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, rrd_file
-from roadeval.recording.recording import Page, around
 from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import (
     HEIGHT,
@@ -211,25 +209,29 @@ def test_a_recording_by_another_program_is_told(tmp_path):
         Recording(tmp_path / "x.rrd")
 
 
-def test_a_torn_file_is_told_with_the_way_to_mend_it(recording, tmp_path):
-    whole = recording.path.read_bytes()
-    # In the middle of a picture: cut between two chunks, a file has nothing torn in it.
-    (tmp_path / "torn.rrd").write_bytes(whole[: whole.rindex(b"\x89PNG") + 30])
-    with pytest.raises(RecordingError, match="rerun rrd optimize --continue-on-error"):
-        Recording(tmp_path / "torn.rrd")
+def test_a_torn_file_is_read_to_the_last_whole_message(drive, recording, tmp_path):
+    whole, path = recording.path.read_bytes(), tmp_path / "torn.rrd"
+    # In the middle of a picture: cut between two messages, a file has nothing torn in it.
+    path.write_bytes(whole[: whole.rindex(b"\x89PNG") + 30])
+    torn = Recording(path)
+    assert not torn.complete
+    assert torn.frame_numbers == recording.frame_numbers
+    np.testing.assert_array_equal(torn.truth(0), drive[0].frame.truth)
 
 
-@pytest.mark.parametrize("read_ahead", [8 << 20, 0])
-def test_every_frame_comes_back_in_any_order(drive, recording, read_ahead, monkeypatch):
-    monkeypatch.setattr("roadeval.recording.recording.READ_AHEAD", read_ahead)
-    again = Recording(recording.path)
+@pytest.mark.parametrize("has_index", [True, False])
+def test_every_frame_comes_back_in_any_order(drive, recording, has_index, tmp_path):
+    path = tmp_path / "again.rrd"
+    path.write_bytes(recording.path.read_bytes()[: None if has_index else -1])
+    again = Recording(path)
+    assert again.complete == has_index
     for each in (*drive[9:], *reversed(drive)):
         np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
 
 
 def test_a_picture_costs_the_chunk_that_holds_it(drive, recording, monkeypatch):
-    again, read, unpacked = Recording(recording.path), [], rrd_file.unpacked
-    monkeypatch.setattr(rrd_file, "unpacked", lambda m: read.append(m) or unpacked(m))
+    again, read, unpacked = Recording(recording.path), [], rrd_file.rows_of
+    monkeypatch.setattr(rrd_file, "rows_of", lambda m: read.append(m) or unpacked(m))
     for each in drive:
         again.layer("filtered", "post", each.frame.number)
     chunks = [*read]
@@ -242,55 +244,13 @@ def test_a_picture_costs_the_chunk_that_holds_it(drive, recording, monkeypatch):
     assert again.frame_numbers == tuple(each.frame.number for each in drive)
 
 
-def pages_of(sizes):
-    """Pages of one frame each, of these many bytes, and the most of them that lived at once."""
-    made, most = [], [0]
-
-    def pages():
-        for number, size in enumerate(sizes):
-            blobs = pa.array([[0] * size], pa.list_(pa.uint8()))
-            made.append(weakref.ref(blobs))
-            most[0] = max(most[0], sum(each() is not None for each in made))
-            yield Page([number], blobs)
-            del blobs
-
-    return pages(), most
-
-
-def test_no_more_of_an_entity_is_held_than_is_read_ahead(monkeypatch):
-    monkeypatch.setattr("roadeval.recording.recording.READ_AHEAD", 500)
-    pages, most = pages_of([100] * 60)
-    there, payloads = around(30, pages)
-    assert len(there) == 60
-    assert 30 in payloads
-    assert most[0] <= 7
-
-
-@pytest.mark.parametrize(
-    ("frame", "sizes", "kept"),
-    [
-        (2, [10] * 9, [2, 3, 4, 5]),
-        (8, [10] * 9, [5, 6, 7, 8]),
-        (7, [10] * 9, [5, 6, 7, 8]),
-        (1, [10, 99, 10, 10], [1]),
-        (3, [10, 10, 99, 10], [3]),
-        (99, [10] * 3, [0, 1, 2]),
-    ],
-)
-def test_the_frames_after_one_are_kept_first_then_the_nearest_before(
-    frame, sizes, kept, monkeypatch
-):
-    one = pa.array([[0] * 10], pa.list_(pa.uint8())).nbytes
-    monkeypatch.setattr("roadeval.recording.recording.READ_AHEAD", 4 * one)
-    assert list(around(frame, pages_of(sizes)[0])[1]) == kept
-
-
 def test_rows_that_were_put_together_with_others_may_have_no_list_at_all(recording, monkeypatch):
     batch = pa.RecordBatch.from_pydict(
         {"frame": [1, 2, 3, 4], "Scalars:scalars": pa.array([[0.5], None, [], [0.25]])}
     )
     again = Recording(recording.path)
-    monkeypatch.setattr(rrd_file, "unpacked", lambda _: batch)
-    assert again.scalars("/metrics/filtered/post/ERR").to_dict() == {1: 0.5, 4: 0.25}
+    path = "/metrics/filtered/post/ERR"
+    monkeypatch.setattr(rrd_file, "rows_of", lambda _: (path, batch))
+    assert again.scalars(path).to_dict() == {1: 0.5, 4: 0.25}
     batch = batch.slice(0, 2)
-    assert again.scalars("/metrics/filtered/post/ERR").to_dict() == {1: 0.5}
+    assert again.scalars(path).to_dict() == {1: 0.5}

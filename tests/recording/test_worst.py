@@ -12,8 +12,6 @@ from roadeval.recording.recorder import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
 from tests.results.making import lines
 
-pytestmark = pytest.mark.usefixtures("untried")
-
 ERRORS = [0.1, 0.5, 0.3, 0.5, 0.2, 0.4, 0.0]
 
 
