@@ -8,9 +8,10 @@ from typing import Any, Final
 
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Document
-from roadeval.report.findings import Findings, FleetFindings
+from roadeval.report.findings import Findings
 from roadeval.report.sections import drive, drives, frames, ground, provenance, rig, summary
 from roadeval.report.sections.frames import FrameBrowser
+from roadeval.results.fleet import FleetFolder
 
 ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
@@ -26,9 +27,9 @@ RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
 """The sections of several cameras of a drive."""
 
 
-def document(findings: Findings | FleetFindings) -> Document:
+def document(findings: Findings | FleetFolder) -> Document:
     """Return the report of a drive, or of many."""
-    if isinstance(findings, FleetFindings):
+    if isinstance(findings, FleetFolder):
         parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
         return _of(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
     if findings.cameras:
@@ -39,10 +40,15 @@ def document(findings: Findings | FleetFindings) -> Document:
     return _of(findings, *scored, provenance.section, *gallery)
 
 
-def page_document(findings: Findings | FleetFindings, browsed: FrameBrowser | None) -> Document:
-    """Return the report as a page: with a browser of frames, or a table of all drives."""
-    if isinstance(findings, FleetFindings):
-        worst = partial(drives.worst, across=ACROSS)
+def page_document(
+    findings: Findings | FleetFolder, browsed: FrameBrowser | None, worst_frames: int = 0
+) -> Document:
+    """Return the report as a page: with a browser of frames, or a table of all drives.
+
+    That of many drives has at most so many of the worst frames.
+    """
+    if isinstance(findings, FleetFolder):
+        worst = partial(drives.worst, across=ACROSS, most=worst_frames)
         parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
         return _of(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     if findings.cameras:
@@ -51,13 +57,13 @@ def page_document(findings: Findings | FleetFindings, browsed: FrameBrowser | No
     return _of(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
 
 
-def _of(findings: Findings | FleetFindings, *sections: Section) -> Document:
-    of_fleet = isinstance(findings, FleetFindings)
+def _of(findings: Findings | FleetFolder, *sections: Section) -> Document:
+    of_fleet = isinstance(findings, FleetFolder)
     return Document(
         kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,
         subtitle=", ".join(_subtitle(findings)),
-        footer=f"{findings.name}, {findings.source}",
+        footer=f"{findings.name}, {findings.path}",
         blocks=[block for each in (summary.section, *sections) for block in each(findings)],
         keywords=[
             *("road recognition", "evaluation", *(["fleet"] if of_fleet else []), findings.name)
@@ -65,9 +71,9 @@ def _of(findings: Findings | FleetFindings, *sections: Section) -> Document:
     )
 
 
-def _subtitle(findings: Findings | FleetFindings) -> Iterator[str]:
+def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
     preset = findings.facts.run.get("preset")
-    if isinstance(findings, FleetFindings):
+    if isinstance(findings, FleetFolder):
         version = findings.facts.version
         yield f"{number(len(findings.facts.drives))} drives"
         yield f"{number(findings.facts.frames)} frames evaluated"

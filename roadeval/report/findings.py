@@ -1,39 +1,29 @@
-"""The content of a report on one drive or on many, as a job collects it."""
+"""The content of a report on one drive: its facts and tables, and the frames that a job picked."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import BASELINE, Rows
-from roadeval.data.words import defined
-from roadeval.evaluation.stats import Difference
-from roadeval.report.blocks import ImageFile
-from roadeval.report.charts.standard import Behind, Interval
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Rows
+from roadeval.data.result import Cells
+from roadeval.evaluation import score
+from roadeval.evaluation.metres import band_name
+from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.stats import mean_distribution
+from roadeval.report.charts.standard import BEHIND, WRONG, Interval
 from roadeval.report.images import ExampleFrame, LayerImage
-from roadeval.results.facts import Facts, FleetFacts, Totals
-from roadeval.results.rows import as_arrays
-from roadeval.results.schema import FAILED
+from roadeval.results.facts import Facts, Totals
+from roadeval.results.rows import as_arrays, window_rows
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PairedComparison:
-    """One variant's final mask against another's, frame by frame."""
-
-    treated: str
-    control: str
-    """Variants; differences are the first minus the second."""
-    differences: Mapping[str, Difference]
-    """By rate."""
-    frames: Rows
-    """See `roadeval.evaluation.score.pairs`."""
-    pixels: tuple[int, int, int] | None = None
-    """Newly right, newly wrong and labelled pixels; None of a run that was killed."""
+WINDOWS: Final = 30
+"""Points of the figures over the drive, at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,77 +49,45 @@ class NotableFrame:
     """A row a variant: its layers in the order of the stages."""
 
 
-@dataclass(frozen=True, slots=True)
-class Commands:
-    """Commands for a terminal, as they are typed.
-
-    ``again`` makes the results again from the log, whose path it is given, where the result holds
-    its configuration; ``inspect`` opens the viewer at a frame, whose number it is given.
-    """
-
-    again: Callable[[str], str] | None
-    inspect: Callable[[int], str]
-    of_camera: Callable[[str], Commands] | None = None
-    """Of a rig: makes those of a camera, by its name."""
+def no_rows(table: str) -> Rows:
+    """Return a table without a row."""
+    return as_arrays(table, ())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Findings:
     """Everything that a report of one drive shows."""
 
-    source: str
+    path: str
     """The recording or folder, as it was named."""
-    complete: bool
-    """Whether the run reached its end."""
-    commands: Commands | None
-    """What to type for more; None where the report is not made at a terminal."""
-    viewable: bool
-    """Whether ``commands`` open frames in the viewer: the recording is there."""
-    pictured: int
-    """Number of frames with pictures, of those evaluated, or without truth of all."""
     facts: Facts
     """Of an incomplete run, what its tables allow to compute."""
-    properties: Mapping[str, Any]
+    table: Callable[[str], Rows] = no_rows
+    """Returns the rows of a table by its name."""
+    complete: bool = True
+    """Whether the run reached its end."""
+    again: str = ""
+    """The command that makes the results again; empty where their configuration is lost."""
+    inspect: Callable[[int], str] | None = None
+    """Returns the command that opens a frame in the viewer; None without a recording."""
+    properties: Mapping[str, Any] = field(default_factory=dict)
     """The recording's own, about its origin."""
-    windows: Rows
-    """As ``windows.csv``, or longer windows for a long drive."""
-    paired: Sequence[PairedComparison]
-    """Each variant against unfiltered, if it was run; then each against the baseline."""
-    regions: Mapping[tuple[str, str], Mapping[str, float]]
-    """See `roadeval.evaluation.score.by_region`."""
-    overlap: Mapping[str, Mapping[str, Mapping[str, float]]]
-    """IoU, F1 and precision by variant and stage, pooled."""
-    changes: Mapping[tuple[str, str], tuple[float, float]]
-    """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
-    error_parts: Mapping[str, Mapping[str, float]]
-    """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.score.causes`."""
-    heatmaps: Mapping[str, npt.NDArray[np.float64]]
-    """By variant ``(2, rows, columns)``, how often FP and FN are there; NaN if never labelled."""
-    oracles: Sequence[Mapping[str, Any]]
-    """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
-    levels: Rows
-    """As ``probabilities.csv``; empty where no stage says how probable road is."""
-    examples: Sequence[ExampleFrame]
+    pictured: int = 0
+    """Number of frames with pictures, of those evaluated, or without truth of all."""
+    examples: Sequence[ExampleFrame] = ()
     """Frames for figure 2."""
-    thumbnails: Sequence[LayerImage]
+    thumbnails: Sequence[LayerImage] = ()
     """A few frames, evenly over the drive."""
-    worst: Sequence[NotableFrame]
-    helped: Sequence[NotableFrame]
-    harmed: Sequence[NotableFrame]
+    worst: Sequence[NotableFrame] = ()
+    helped: Sequence[NotableFrame] = ()
+    harmed: Sequence[NotableFrame] = ()
     """Frames to look at."""
-    coverage: Mapping[str, Mapping[int, float]]
+    coverage: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
     """Without truth: by variant and frame the share of the image called road."""
-    behind: Behind = field(default_factory=dict)
-    """The frames behind the numbers of stages and regions."""
     cameras: Mapping[str, Findings] = field(default_factory=dict)
-    """Of a rig: each camera's own, by its name. What is here is little beside facts and
-    differences, then."""
+    """Of a rig: each camera's own, by its name; there are no tables of all together."""
     camera: str = ""
     """Of a rig: which camera this is."""
-    metres: Rows = field(default_factory=partial(as_arrays, "metres", ()))
-    """As ``metres.csv``; empty where the camera is not known."""
-    by_distance: Mapping[tuple[str, str], Interval] = field(default_factory=dict)
-    """Mean ERR with its interval, by band of distance and variant."""
 
     @property
     def name(self) -> str:
@@ -155,71 +113,124 @@ class Findings:
         """Return the counts and rates of a variant's final mask."""
         return self.totals[variant][self.finals[variant]]
 
+    @cached_property
+    def windows(self) -> Rows:
+        """The rows of ``windows``; longer windows where the drive is long."""
+        size, windows = self.facts.evaluation.window, self.table("windows")
+        rows = self.table("frames")
+        count = -(-len(rows.distinct("frame")) // size)
+        if not count or (count <= WINDOWS and len(windows)):
+            return windows
+        size *= -(-count // WINDOWS)
+        return as_arrays("windows", window_rows(score.windows(rows, size)))
 
-Row = Mapping[str, Any]
+    @cached_property
+    def filtered(self) -> Rows:
+        """The filter's effect frame by frame: see `roadeval.evaluation.score.pairs`."""
+        return score.pairs(self.table("frames"), FILTERED, UNFILTERED)
 
+    @cached_property
+    def regions(self) -> Mapping[tuple[str, str], Mapping[str, float]]:
+        """See `roadeval.evaluation.score.by_region`."""
+        return score.by_region(self.table("regions"))
 
-@dataclass(frozen=True, slots=True)
-class WorstPicture:
-    """One of the worst frames over all drives; without a picture where none is left."""
-
-    rank: int
-    drive: str
-    frame: int
-    rates: Mapping[str, float]
-    picture: ImageFile | None
-
-
-@dataclass(frozen=True, slots=True)
-class FleetFindings:
-    """Everything that a report of many drives shows."""
-
-    name: str
-    source: str
-    """The fleet's folder."""
-    facts: FleetFacts
-    drives: Mapping[str, Row]
-    """Rows of ``drives`` by the drives' identity."""
-    names: Mapping[str, str]
-    """The drives' names for people, by their identity; no two are equal."""
-    effects: Mapping[tuple[str, str], Sequence[Row]]
-    """Rows of ``effects`` of the final masks' ERR, by base and variant."""
-    regions: Mapping[tuple[str, str], Mapping[str, float]]
-    """See `roadeval.evaluation.score.by_region`: of all drives together."""
-    scores: Sequence[Row]
-    """Rows of ``scores`` of the first variant's final mask, over all labelled pixels."""
-    worst: Sequence[WorstPicture] = ()
-    """The worst frames over all drives."""
-    inspect: Callable[[int], str] | None = None
-    """Returns the command that opens one of them, by its rank; None where the report is not made at
-    a terminal."""
-
-    @property
-    def finals(self) -> Mapping[str, str]:
-        """Each scored variant's final stage."""
-        return {row["variant"]: row["stage"] for row in self.facts.rates}
-
-    @property
-    def height(self) -> int:
-        """Height of the frames in pixels; 0 where drives differ."""
-        heights = {row["height"] or 0 for row in self.drives.values() if row["evaluated"]}
-        return heights.pop() if len(heights) == 1 else 0
-
-    def pages(self) -> dict[str, str]:
-        """Return where each drive's own page lies below that of a served fleet.
-
-        By the drives' identity; a drive that failed has none.
-        """
+    @cached_property
+    def overlap(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+        """IoU, F1 and precision by variant and stage, pooled."""
         return {
-            drive: f"drive/{place}/"
-            for place, (drive, row) in enumerate(self.drives.items())
-            if row["status"] != FAILED
+            variant: {stage: score.overlap(total) for stage, total in stages.items()}
+            for variant, stages in self.totals.items()
         }
 
+    @cached_property
+    def changes(self) -> Mapping[tuple[str, str], tuple[float, float]]:
+        """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
+        changes = self.table("changes")
+        known = (changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)
+        own = changes.take(known)
+        masks = zip(own["to_variant"].tolist(), own["to_stage"].tolist(), strict=True)
+        shares = ((own[name] / own["N"]).tolist() for name in ("repaired", "spoiled"))
+        return dict(zip(masks, zip(*shares, strict=True), strict=True))
 
-def worse_than_baseline(errors: Mapping[str, float | None]) -> list[str]:
-    """Return the variants with a higher ERR than the baseline, where that is known."""
-    blind = errors.get(BASELINE)
-    if not defined(blind):
-        return []
-    return [name for name, error in errors.items() if defined(error) and error > blind]
+    @cached_property
+    def pixels(self) -> tuple[int, int, int] | None:
+        """Pixels that the filter made right and wrong, and labelled ones; None of a killed run."""
+        changes = self.table("changes")
+        chosen = (changes["from_variant"] == UNFILTERED) & (changes["to_variant"] == FILTERED)
+        own = changes.take(chosen & (changes["N"] > 0))
+        columns = (own[name].tolist() for name in ("repaired", "spoiled", "N"))
+        return next(zip(*columns, strict=True), None)
+
+    @cached_property
+    def error_parts(self) -> Mapping[str, Mapping[str, float]]:
+        """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.score.causes`."""
+        rows = self.table("frames")
+        names = [name for name in rows.distinct("variant") if name != BASELINE]
+        return {name: score.causes(rows, name).means() for name in names}
+
+    @cached_property
+    def heatmaps(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """By variant ``(2, rows, columns)``, how often FP and FN are there; NaN if not labelled."""
+        heat, found = self.table("heat"), {}
+        for name in heat.distinct("variant"):
+            cells = heat.of_variant(name)
+            rows, columns = (cells[edge] // cells["side"][0] for edge in ("top", "left"))
+            found[name] = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
+            for share, outcome in zip(found[name], ("FP", "FN"), strict=True):
+                share[rows, columns] = cells[outcome] / cells["labelled"]
+        return found
+
+    @cached_property
+    def oracles(self) -> Sequence[Mapping[str, Any]]:
+        """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
+        return [*score.perfect_stages(self.table("oracles"), self.table("frames"))]
+
+    @cached_property
+    def levels(self) -> Rows:
+        """The rows of ``probabilities``; none where no stage says how probable road is."""
+        return self.table("probabilities")
+
+    @cached_property
+    def metres(self) -> Rows:
+        """The rows of ``metres``; none where the camera is not known."""
+        return self.table("metres")
+
+    @cached_property
+    def behind(self) -> Mapping[tuple[str, str, str], Sequence[int]]:
+        """The frames behind the rates of stages, and behind the errors in regions."""
+        return dict(_behind(self.table("frames"), score.finals(self.table("regions"))))
+
+    @cached_property
+    def by_distance(self) -> Mapping[tuple[str, str], Interval]:
+        """Mean ERR with its interval, by band of distance and variant."""
+        rows, settings = score.finals(self.table("regions")), self.facts.evaluation
+        found: dict[tuple[str, str], Interval] = {}
+        for variant in rows.distinct("variant"):
+            own = rows.of_variant(variant)
+            for band in (band_name(*ends) for ends in pairwise(settings.distances)):
+                there = own.take((own["region"] == band) & (own["N"] > 0))
+                errors = (there["FP"] + there["FN"]) / there["N"]
+                if len(errors):
+                    low = high = None
+                    if len(errors) >= settings.least_frames and np.ptp(errors):
+                        low, high = mean_distribution(errors).interval(settings.confidence)
+                    found[band, variant] = float(errors.mean()), low, high
+        return found
+
+
+def _behind(rows: Rows, regions: Rows) -> Iterator[tuple[tuple[str, str, str], list[int]]]:
+    def most(frames: Cells, values: Cells) -> list[int]:
+        ranked = np.argsort(-np.nan_to_num(values), kind="stable")[:BEHIND]
+        found: list[int] = frames[ranked[values[ranked] > 0]].tolist()
+        return found
+
+    for variant, stage, places in rows.masks():
+        own = rows.take(places)
+        for rate, metric in SHORT.items():
+            values = 1 - own[rate] if metric.higher_is_better else own[rate]
+            yield (variant, stage, rate), most(own["frame"], values)
+    for variant in regions.distinct("variant"):
+        own = regions.of_variant(variant)
+        for region in own.distinct("region"):
+            there = own.take(own["region"] == region)
+            yield (variant, region, WRONG), most(there["frame"], there["FP"] + there["FN"])

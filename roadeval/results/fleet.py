@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
+import shlex
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
@@ -20,6 +21,8 @@ import numpy as np
 
 from roadeval.data import Rows, is_plain
 from roadeval.evaluation.comparison import Condition, Judgement
+from roadeval.evaluation.regions import ALL
+from roadeval.evaluation.score import TESTED, by_region
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.comparison import judged, junit_xml
 from roadeval.results.facts import (
@@ -37,6 +40,7 @@ from roadeval.results.facts import (
 )
 from roadeval.results.over_drives import (
     drive_cases,
+    final_rows,
     flat_metrics,
     judge_drives,
     scores_of,
@@ -167,6 +171,73 @@ class FleetFolder:
         names, first, counts = np.unique(rows["drive"], return_index=True, return_counts=True)
         ends = zip(names.tolist(), first.tolist(), counts.tolist(), strict=True)
         return {name: rows.take(slice(begin, begin + count)) for name, begin, count in ends}
+
+    @property
+    def finals(self) -> dict[str, str]:
+        """Each scored variant's final stage."""
+        return {row["variant"]: row["stage"] for row in self.facts.rates}
+
+    @cached_property
+    def first_scores(self) -> dict[str, dict[str, Any]]:
+        """By drive the row of ``scores`` of the first variant's final mask, on all pixels."""
+        first = next(iter(self.finals), None)
+        rows = final_rows(self.table("scores")) if first else []
+        return {row["drive"]: row for row in rows if row["variant"] == first}
+
+    @cached_property
+    def regions(self) -> dict[tuple[str, str], dict[str, float]]:
+        """See `roadeval.evaluation.score.by_region`: of all drives together."""
+        rows = parquet_rows(self.table("scores"), "scores")
+        return by_region(rows.take(rows["final"] & (rows["region"] != ALL)))
+
+    @cached_property
+    def effects(self) -> dict[tuple[str, str], list[dict[str, Any]]]:
+        """Rows of ``effects`` of the final masks' ERR, where it is known, by base and variant."""
+        found: defaultdict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
+        for row in final_rows(self.table("effects")):
+            if row["metric"] == TESTED and row["mean"] is not None:
+                found[row["base"], row["variant"]].append(row)
+        return dict(found)
+
+    @cached_property
+    def worst(self) -> list[dict[str, Any]]:
+        """The rows of ``worst``: the worst frames over all drives."""
+        rows: list[dict[str, Any]] = self.table("worst").to_pylist()
+        return rows
+
+    def picture(self, frame: Mapping[str, Any]) -> bytes | None:
+        """Return the JPEG of a row of ``worst``; None of one from elsewhere, or that is cut."""
+        path = self.path / (frame["picture"] or "")
+        if not path.resolve().is_relative_to(self.path.resolve()):
+            return None
+        with suppress(OSError):
+            content = path.read_bytes()
+            if content.startswith(b"\xff\xd8\xff") and content.rstrip(b"\0").endswith(b"\xff\xd9"):
+                return content
+        return None
+
+    def inspect(self, frame: Mapping[str, Any]) -> str:
+        """Return the command that opens a row of ``worst`` in the viewer."""
+        kept = recording_path(self.path, frame["drive"]).exists()
+        words = ["roadeval", "inspect", str(self.path), "--worst", str(frame["rank"])]
+        return shlex.join([*words, *([] if kept else ["--trust-sources"])])
+
+    @property
+    def height(self) -> int:
+        """Height of the frames in pixels; 0 where drives differ."""
+        heights = {row["height"] or 0 for row in self.drives.values() if row["evaluated"]}
+        return heights.pop() if len(heights) == 1 else 0
+
+    def pages(self) -> dict[str, str]:
+        """Return where each drive's own page lies below that of a served fleet.
+
+        By the drives' identity; a drive that failed has none.
+        """
+        return {
+            drive: f"drive/{place}/"
+            for place, (drive, row) in enumerate(self.drives.items())
+            if row["status"] != FAILED
+        }
 
     def frames(self, drive: str) -> pa.Table:
         """Read the rows of a drive's frames; a FileNotFoundError if none was scored."""

@@ -8,7 +8,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts
 from roadeval.data.words import defined
@@ -32,6 +32,9 @@ from roadeval.results.sentences import verdict
 from roadeval.results.tables import read_parquet
 from roadeval.version import VERSION
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 WARNINGS: Final = 5
 """Kinds of warnings of single drives that are listed."""
 POOLED: Final = tuple(f"pooled_{name}" for name in METRICS)
@@ -49,7 +52,7 @@ def summarise(
 ) -> FleetFacts:
     """Make the facts of a fleet of the tables in its folder, and the rows of ``drives``."""
     found: defaultdict[Key, Rows] = defaultdict(list)
-    for row in final_rows(folder / "effects.parquet"):
+    for row in final_rows(read_parquet(folder / "effects.parquet", "effects")):
         found[row["base"], row["variant"], row["metric"]].append(row)
     rows = dict(found)
     # Drives whose log has the digest of another one's, and the first of these.
@@ -204,7 +207,7 @@ def _rates(folder: Path) -> Rows:
     """Return the rates of each final mask: the drives' mean, and of all pixels together."""
     masks: defaultdict[tuple[str, str], Rows] = defaultdict(list)
     columns = ["variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
-    for row in final_rows(folder / "scores.parquet", columns):
+    for row in final_rows(read_parquet(folder / "scores.parquet", "scores", columns)):
         masks[row["variant"], row["stage"]].append(row)
     return [
         {"variant": variant, "stage": stage, **_over_all(own)}
@@ -223,11 +226,10 @@ def _over_all(rows: Rows) -> dict[str, Any]:
     }
 
 
-def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
+def final_rows(table: pa.Table) -> Rows:
     """Return the rows of the final masks, on all pixels where the table has regions."""
     from pyarrow import compute
 
-    table = read_parquet(path, path.stem, None if columns is None else [*columns])
     table = table.filter(table["final"])
     if "region" in table.column_names:
         table = table.filter(compute.equal(table["region"], ALL))

@@ -515,21 +515,6 @@ def test_without_a_script_everything_is_there(drive, watched):
     assert not shown(tab, ".filters, .tools, .stage, .find, .scripted")
 
 
-def test_with_assets_the_script_is_in_a_file_and_works_as_well(demo, tmp_path, watched):
-    run = here("report", demo.recording, "-o", tmp_path / "page.html", "--assets", "--pictures", 3)
-    assert run.returncode == 0, run.stderr
-    text = (tmp_path / "page.html").read_text()
-    assert not re.search(r"<script>|<style>|sha256-|data:image", text)
-    seen = watched((tmp_path / "page.html").as_uri())
-    assert seen.complaints == []
-    assert seen.tab.locator(".strip").count() == 3
-    wait_until(seen.tab, "document.querySelector('.views .above').naturalWidth > 0")
-    before = frame(seen.tab)
-    seen.tab.keyboard.press("ArrowLeft")
-    seen.tab.keyboard.press("ArrowRight")
-    assert frame(seen.tab) >= before
-
-
 # --- Fleets, folders, what is wrong usage ---------------------------------------------------------
 
 

@@ -197,7 +197,7 @@ def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetc
 
 
 @pytest.mark.parametrize(
-    "words", [("-o", "page.txt"), ("--pictures", 3), ("-o", "a.pdf", "--assets")]
+    "words", [("-o", "page.txt"), ("--pictures", 3), ("-o", "a.pdf", "--pictures", 3)]
 )
 def test_what_goes_with_a_page_alone_is_wrong_usage_elsewhere(words, demo, tmp_path):
     run = here("report", demo.recording, *words, cwd=tmp_path)

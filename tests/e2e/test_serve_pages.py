@@ -105,11 +105,11 @@ def test_behind_a_place_of_a_map_are_the_worst_of_all_frames_that_are_wrong_ther
     assert seen.complaints == []
 
 
-def test_without_a_script_a_frame_is_a_page_of_its_own(address, watched):
-    tab = watched(f"{address}0/", java_script_enabled=False).tab
-    tab.locator(".frames tr.pictured a").first.click()
-    tab.wait_for_load_state()  # with its pictures
-    wait_until(tab, "document.querySelector('.strip .tile img').naturalWidth > 0")
+def test_the_address_of_a_frame_leads_to_the_page_that_shows_it(address, watched):
+    tab = watched(f"{address}0/frame/40").tab
+    tab.wait_for_url(f"{address}0/#frame-40")
+    tab.locator("#frame-40 .tile img").first.wait_for()
+    assert frame(tab) == 40
 
 
 def test_where_there_is_no_screen_the_page_says_what_to_do_instead(demo, watched, monkeypatch):
@@ -182,13 +182,3 @@ def test_a_fleet_leads_to_its_drives_and_they_lead_back(fleet, watched):
         assert seen.complaints == []
         assert status(f"{address}0/drive/2/") == 404
         assert status(f"{address}0/drive/0/frame/10/view", method="POST") == 403
-
-
-def test_without_a_script_a_frames_page_opens_the_viewer(demo, watched, monkeypatch):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with serving(demo.recording) as (address, _):
-        tab = watched(f"{address}0/frame/40", java_script_enabled=False).tab
-        tab.get_by_role("button", name="Open in viewer").click()
-        tab.get_by_text("No screen to open a window on").wait_for()
-        assert status(f"{address}0/frame/40/show", method="POST") == 403

@@ -18,7 +18,7 @@ def page_of(base, new):
     """What the page tells of the frames of two results without pictures."""
     sides = [a_side("base", base), a_side("new", new)]
     compared = Compared(compare(sides, EvaluationSettings()), (), tuple(sides), {})
-    return browsed(compared, None, lambda _: 0)
+    return browsed(compared, lambda _: 0)
 
 
 def test_frames_that_both_results_have_stand_in_order_with_both_rates():
@@ -54,5 +54,5 @@ def test_a_fleet_whose_rows_name_their_drives_stands_beside_a_drive():
     named = replace(part, rows=with_drive)
     sides = Side("fleet", [named]), Side("drive", [part])
     compared = Compared(compare(sides, EvaluationSettings()), (), sides, {})
-    assert browsed(compared, None, lambda _: 0).variants == ["fleet: net", "drive: net"]
+    assert browsed(compared, lambda _: 0).variants == ["fleet: net", "drive: net"]
     assert len(over_drive(compared)) == 1

@@ -50,9 +50,9 @@ def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
     recording, monkeypatch
 ):
     result = DriveResult(recording)
-    (strip,), _ = strips_of(result, None, 1)
+    (strip,), _ = strips_of(result, 1)
     monkeypatch.setattr(report_frames, "BYTES", FEWEST * bytes_of(strip) - 1)
-    strips, left_out = strips_of(result, None)
+    strips, left_out = strips_of(result)
     assert left_out == ["third", "fourth"]
     assert layered(strips[0]) == ["filtered", "unfiltered"]
     assert sum(map(bytes_of, strips)) <= report_frames.BYTES
@@ -64,7 +64,7 @@ def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
 
 def test_who_asks_for_a_number_gets_it_with_all_layers(recording, monkeypatch):
     monkeypatch.setattr(report_frames, "BYTES", 0)
-    strips, left_out = strips_of(DriveResult(recording), None, 5)
+    strips, left_out = strips_of(DriveResult(recording), 5)
     assert len(strips) == 5
     assert left_out == []
     assert len(layered(strips[0])) == 4

@@ -4,6 +4,7 @@ import io
 import math
 import re
 from dataclasses import fields, replace
+from functools import cached_property
 
 import numpy as np
 from pypdf import PdfReader
@@ -11,7 +12,7 @@ from pypdf import PdfReader
 from roadeval.data import Rows
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Details, Document
-from roadeval.report.findings import Commands, Findings, PairedComparison
+from roadeval.report.findings import Findings
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 from roadeval.results.rows import as_arrays
 
@@ -33,7 +34,6 @@ def text(content):
 
 
 NO_WINDOWS = as_arrays("windows", [])
-NO_LEVELS = as_arrays("probabilities", [])
 
 
 VARIANTS = ("filtered", "unfiltered", "blind")
@@ -59,25 +59,29 @@ def a_difference(mean, low=None, high=None):
     return Difference(mean, low, high, p, 0.95, "frames", units, needed=needed, **known)
 
 
-def a_pair(changes, wrong, pixels=(30, 10, 1000), control="unfiltered"):
-    """Filtered against another, by the frames' changes of ERR and of wrong pixels."""
+def pairs(changes, wrong):
+    """Filtered against unfiltered, by the frames' changes of ERR and of wrong pixels."""
     places = np.arange(len(changes))
     columns = {"ERR": np.array(changes, float), "wrong": np.array(wrong)}
-    frames = Rows({"frame": places, "stamp_ns": places, **columns})
-    won = {"better": sum(each < 0 for each in changes), "worse": sum(each > 0 for each in changes)}
-    found = replace(a_difference(-0.02, -0.03, -0.01), **won)
-    differences = dict.fromkeys(("ERR", "FPR", "FNR"), found)
-    return PairedComparison("filtered", control, differences, frames, pixels)
+    return Rows({"frame": places, "stamp_ns": places, **columns})
+
+
+def by_rate(better=0, worse=0, err=None):
+    """What changed in each rate, on so many frames."""
+    found = replace(a_difference(-0.02, -0.03, -0.01), better=better, worse=worse)
+    return dict.fromkeys(("ERR", "FPR", "FNR"), found) | ({"ERR": err} if err else {})
 
 
 OVERLAP = {"IoU": 0.7, "mIoU": 0.65, "F1": 0.6, "precision": 0.7}
-FACTS = {each.name for each in fields(Facts)} - {each.name for each in fields(Findings)}
+FIELDS = {each.name for each in fields(Findings)}
+COMPUTED = {name for name, each in vars(Findings).items() if isinstance(each, cached_property)}
+FACTS = {each.name for each in fields(Facts)} - FIELDS - COMPUTED
 
 
 def some_findings(**changes):
     """Findings of a drive whose numbers all differ: of two variants and the baseline.
 
-    Changes are of the findings or of their facts, by name.
+    Changes are of the findings, of what they compute, or of their facts, by name.
     """
     totals = {
         "filtered": {"svm": a_total(0.20, 0.21, 0.22), "post": a_total(0.10, 0.11, 0.12)},
@@ -90,34 +94,21 @@ def some_findings(**changes):
         "frames": FrameAccount(1210, evaluated=1200, skipped={"trained on": 10}),
         "totals": totals,
     }
-    plain = {
-        "source": "drive.rrd",
-        "complete": True,
-        "commands": Commands("repeat {}".format, "open frame {}".format),
-        "viewable": True,
-        "pictured": 1200,
-        "facts": Facts(**facts | {n: value for n, value in changes.items() if n in FACTS}),
-        "properties": {},
-        "windows": NO_WINDOWS,
-        "paired": [],
-        "regions": {},
-        "overlap": {
-            name: {stage: OVERLAP | {"IoU": 0.5 + place / 10} for stage in own}
-            for place, (name, own) in enumerate(totals.items())
-        },
-        "changes": {},
-        "error_parts": {},
-        "heatmaps": {},
-        "oracles": [],
-        "levels": NO_LEVELS,
-        "examples": [],
-        "thumbnails": [],
-        "worst": [],
-        "helped": [],
-        "harmed": [],
-        "coverage": {},
+    made = Findings(
+        "drive.rrd",
+        Facts(**facts | {n: value for n, value in changes.items() if n in FACTS}),
+        again="repeat street.mcap",
+        inspect="open frame {}".format,
+        pictured=1200,
+    )
+    made = replace(made, **{n: value for n, value in changes.items() if n in FIELDS})
+    overlap = {
+        name: {stage: OVERLAP | {"IoU": 0.5 + place / 10} for stage in own}
+        for place, (name, own) in enumerate(made.totals.items())
     }
-    return Findings(**plain | {n: value for n, value in changes.items() if n not in FACTS})
+    computed = {n: value for n, value in changes.items() if n in COMPUTED}
+    vars(made).update({"overlap": overlap} | computed)
+    return made
 
 
 def the(kind, blocks):

@@ -1,7 +1,5 @@
 """The report of a drive: which sections it has, and what stands above them."""
 
-from dataclasses import replace
-
 from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.frames import FrameBrowser
@@ -21,8 +19,7 @@ def headings(made):
 def test_a_page_has_the_sections_of_the_report():
     row = {"variant": "filtered", "region": "lit", "pixels": 1.0, "ERR": 0.1, "errors": 1.0}
     findings = thresholded()
-    findings = replace(
-        findings,
+    vars(findings).update(
         regions={("interior", name): row for name in VARIANTS},
         error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
         overlap={

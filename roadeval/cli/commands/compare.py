@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from roadeval.cli import arguments, console, messages
-from roadeval.cli.commands.report import inspect_command
 from roadeval.cli.exit_codes import ExitCode
 
 
@@ -88,7 +87,7 @@ def compare(
     with holding(*(output or ()), *filter(None, [junit]), inputs=results):
         compared = comparing.attempt(results, variants=variant, fail_if=fail_if or [])
         for path in output or []:
-            comparing.write(compared, path, paper=size, inspect=inspect_command)
+            comparing.write(compared, path, paper=size)
         if junit:
             comparing.write_junit(compared, junit)
     console.to_step_summary(lambda: comparing.comment(compared))

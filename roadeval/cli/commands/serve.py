@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from roadeval.cli import arguments, console, messages
-from roadeval.cli.commands.report import commands_of
 from roadeval.cli.exit_codes import ExitCode
 
 
@@ -32,7 +31,7 @@ def serve(
     """
     from roadeval.jobs.serve import pages as job
 
-    job.serve(results, _tell, trust_sources=trust_sources, commands=commands_of)
+    job.serve(results, _tell, trust_sources=trust_sources)
     return ExitCode.DONE
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 from roadeval.cli import console
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
-from roadeval.jobs.results.report import collect_fleet
 from roadeval.report.blocks import Heading
 from roadeval.report.sections.drives import drives_table
 from roadeval.report.sections.summary import drives_account, effects_table, fleet_rates_table
@@ -40,10 +39,8 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     out.print()
     if facts.rates:
         blocks = [fleet_rates_table(facts), *([effects_table(facts)] if facts.effects else [])]
-        found = collect_fleet(FleetFolder(outcome.folder), worst=0)
-        tables.show(
-            [*blocks, Heading("Drives with the highest ERR"), drives_table(found, WORST)], out
-        )
+        worst = drives_table(FleetFolder(outcome.folder), WORST)
+        tables.show([*blocks, Heading("Drives with the highest ERR"), worst], out)
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
     listed = [f"roadeval inspect {outcome.folder} --list"] if facts.rates else []

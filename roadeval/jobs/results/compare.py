@@ -45,10 +45,6 @@ if TYPE_CHECKING:
     from roadeval.report.blocks import Document
 
 
-Inspect = Callable[[Path, int], str]
-"""Returns the command that opens a frame of a recording."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
     """A comparison with its judged conditions."""
@@ -175,20 +171,16 @@ def _labels(paths: Sequence[Path]) -> list[str]:
     return labels
 
 
-def write(
-    compared: Compared, path: Path, *, paper: Paper = Paper.A4, inspect: Inspect | None = None
-) -> Path:
+def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
     """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
 
-    ``paper`` is that of a PDF; ``inspect`` returns the command that opens a frame of a recording,
-    for the reader to type. A `RoadevalError` if the ending is another, or the file cannot be
-    written.
+    A `RoadevalError` if the ending is another, or the file cannot be written.
     """
     match path.suffix.lower():
         case ".pdf":
-            content = pdf(_document(compared, inspect), paper)
+            content = pdf(_document(compared), paper)
         case ".html":
-            content = as_page(compared, inspect)
+            content = as_page(compared)
         case ".md":
             from roadeval.report.comparison import markdown
 
@@ -200,35 +192,32 @@ def write(
     return write_file(path, content)
 
 
-def as_page(compared: Compared, inspect: Inspect | None = None, home: str = "") -> bytes:
+def as_page(compared: Compared, home: str = "") -> bytes:
     """Return a comparison as a page that is whole by itself.
 
-    ``inspect`` is that of `write`; ``home`` is the address of the page above, or empty.
+    ``home`` is the address of the page above, or empty.
     """
     from roadeval.report.page.render import Place, page
 
-    place = Place(home=home)
-    made = _document(compared, inspect)
+    place, made = Place(home=home), _document(compared)
 
     def rendered(frames: FrameBrowser) -> bytes:
         return page(replace(made, blocks=[*made.blocks, *browser(frames)]), place)
 
-    frames = browsed(compared, inspect, lambda frames: len(rendered(frames)))
+    frames = browsed(compared, lambda frames: len(rendered(frames)))
     return page(made, place) if frames is None else rendered(frames)
 
 
-def _document(compared: Compared, inspect: Inspect | None) -> Document:
+def _document(compared: Compared) -> Document:
     from roadeval.report.comparison import document
 
     def command(result: str, frame: int) -> str:
         drive = compared.recordings.get(result)
-        return inspect(drive.path, frame) if inspect and drive else ""
+        return drive.inspect(frame) if drive else ""
 
     return document(
-        compared.comparison,
-        compared.judgements,
-        over_drive(compared),
-        command if inspect and compared.recordings else None,
+        *(compared.comparison, compared.judgements, over_drive(compared)),
+        command if compared.recordings else None,
     )
 
 
@@ -316,15 +305,12 @@ def over_drive(compared: Compared) -> list[Chart]:
     return over_windows(windows, [TESTED], _looks_of(masks) | looks([BASELINE]))
 
 
-def browsed(
-    compared: Compared, inspect: Inspect | None, taken: Callable[[FrameBrowser], int]
-) -> FrameBrowser | None:
+def browsed(compared: Compared, taken: Callable[[FrameBrowser], int]) -> FrameBrowser | None:
     """Collect the frames that all results have of a variant, all their masks side by side.
 
-    None where no variant is in all of them, or several drives are compared. ``inspect`` returns the
-    command that opens a frame. ``taken`` returns the bytes of a page with these frames and none of
-    their pictures: of those as many are there as keep it below
-    `roadeval.jobs.results.frames.BYTES`.
+    None where no variant is in all of them, or several drives are compared. ``taken`` returns the
+    bytes of a page with these frames and none of their pictures: of those as many are there as keep
+    it below `roadeval.jobs.results.frames.BYTES`.
     """
     if (found := compared_masks(compared.sides)) is None:
         return None
@@ -332,12 +318,11 @@ def browsed(
     facts = {each.frame: each for each in _facts(rows, masks)}
     opened = compared.recordings
     newest = opened.get(masks[-1].result)
-    command = (lambda frame: inspect(newest.path, frame)) if inspect and newest else None
     without = FrameBrowser(
         rows=[*facts.values()],
         variants=[mask.name for mask in masks],
         charts=over_frames(rows, [*SHORT], _looks_of(masks)),
-        inspect=command,
+        command=newest.inspect("{}") if newest else "",
     )
     masks = [mask for mask in masks if mask.result in opened]
     numbers = [each.frame for each in compared.comparison.moved]
@@ -347,7 +332,7 @@ def browsed(
         for frame in dict.fromkeys(numbers)
         if opened and frame in facts and all(frame in each.pictured for each in opened.values())
     ]
-    made = (_strip(each, masks, opened, command) for each in pictured[:PICTURED])
+    made = (_strip(each, masks, opened, without.command) for each in pictured[:PICTURED])
     strips = sorted(fitting(made, BYTES - taken(without)), key=lambda each: each.frame)
     return replace(without, strips=strips)
 
@@ -368,7 +353,7 @@ def _strip(
     facts: FrameRow,
     masks: Sequence[ComparedMask],
     opened: Mapping[str, DriveResult],
-    command: Callable[[int], str] | None,
+    command: str,
 ) -> Strip:
     """Return a frame with its pictures."""
     *_, last = (mask.name for mask in masks if mask.name in facts.rates)
@@ -383,4 +368,4 @@ def _strip(
     )
     images = [*outcomes(first, frame, errors)]
     found = NotableFrame(frame, facts.stamp_ns, last, facts.rates, images=images)
-    return strip(found, [*facts.rates], command(facts.frame) if command else "")
+    return strip(found, [*facts.rates], command.replace("{}", str(frame)))

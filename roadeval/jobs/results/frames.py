@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from threading import Lock
@@ -31,7 +31,7 @@ from roadeval.jobs.results.result import DriveResult
 from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
-from roadeval.report.findings import NotableFrame, PairedComparison
+from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, faded
 from roadeval.report.sections.frames import SMALL, FrameBrowser, FrameRow, strip, wrong_cells
 from roadeval.results.sentences import notes
@@ -113,10 +113,6 @@ class FramePicker:
         self._scored = frozenset(result.rows["frame"].tolist())
         self._causes = {name: score.causes(result.rows, name) for name in self._variants}
 
-    def error_parts(self) -> dict[str, dict[str, float]]:
-        """Return the parts of each variant's mean ERR by stage."""
-        return {name: causes.means() for name, causes in self._causes.items()}
-
     def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
         """Return frames for figure 2."""
         return [self._example(self._recording, n) for n in numbers] if self._recording else []
@@ -144,30 +140,25 @@ class FramePicker:
             for row in zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True)
         ]
 
-    def moved(
-        self, paired: Sequence[PairedComparison], shown: Sequence[NotableFrame], *, harmed: bool
-    ) -> list[NotableFrame]:
+    def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
         """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
-        for pair in paired:
-            if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
-                stamps, changes = pair.frames["stamp_ns"], pair.frames["ERR"]
-                places = score.most_changed(
-                    *(stamps, changes, MOVED),
-                    harmed=harmed,
-                    apart_ns=score.scene_ns(stamps),
-                    besides=[frame.stamp_ns for frame in shown],
-                )
-                rows = pair.frames.take(places)
-                columns = (rows[name].tolist() for name in ("frame", "stamp_ns", "ERR"))
-                return [self._notable(*row) for row in zip(*columns, strict=True)]
-        return []
+        pairs = score.pairs(self._result.rows, FILTERED, UNFILTERED)
+        places = score.most_changed(
+            *(pairs["stamp_ns"], pairs["ERR"], MOVED),
+            harmed=harmed,
+            apart_ns=score.scene_ns(pairs["stamp_ns"]),
+            besides=[frame.stamp_ns for frame in shown],
+        )
+        rows = pairs.take(places)
+        columns = (rows[name].tolist() for name in ("frame", "stamp_ns", "ERR"))
+        return [self._notable(*row) for row in zip(*columns, strict=True)]
 
-    def strip(self, frame: int, inspect: Callable[[int], str] | None, layers: int = SMALL) -> Strip:
+    def strip(self, frame: int, layers: int = SMALL) -> Strip:
         """Return a frame with its pictures, those of layers of at most so many pixels across."""
-        command, made = inspect(frame) if inspect else "", self._pictured(frame)
+        made = self._pictured(frame)
         above = [*self._from_above(made)]
         made = replace(made, layers=[*made.layers, *([above] if above else [])])
-        return strip(made, self._all, command, layers)
+        return strip(made, self._all, self._result.inspect(frame), layers)
 
     def _from_above(self, made: NotableFrame) -> Iterator[LayerImage]:
         """Yield camera, truth and errors of a frame as they look from above, on known ground."""
@@ -280,7 +271,7 @@ class FramePicker:
         return ExampleFrame(frame, recording.image(frame), truth, there)
 
 
-def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> FrameBrowser:
+def browsed(result: DriveResult) -> FrameBrowser:
     """Collect the frames of a result for a page, without their pictures."""
     frames, names = result.rows, [*SHORT]
     if not len(frames):
@@ -293,7 +284,7 @@ def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> FrameB
         titles=names,
         served=frozenset(result.pictured),
         charts=over_frames(frames, names) if len(frames) else [],
-        inspect=inspect if result.recording is not None else None,
+        command=result.inspect("{}") if result.recording else "",
         masks=[f"{each.name}: {each.stages[-1]}" for each in there],
     )
 
@@ -352,7 +343,6 @@ def _much_shadow(result: DriveResult) -> set[int]:
 
 def strips_of(
     result: DriveResult,
-    inspect: Callable[[int], str] | None,
     count: int | None = None,
     taken: int = 0,
     on_progress: OnProgress = ignore,
@@ -368,13 +358,13 @@ def strips_of(
     left_out: list[str] = []
     chosen, room = _chosen(result, PICTURED if count is None else count), BYTES - taken
     picker = FramePicker(result, None, None)
-    if count is None and chosen and FEWEST * bytes_of(picker.strip(chosen[0], inspect)) > room:
+    if count is None and chosen and FEWEST * bytes_of(picker.strip(chosen[0])) > room:
         picker = FramePicker(result, None, LAYERS)
         left_out = [variant.name for variant in result.recording.variants[LAYERS:]]
 
     def each() -> Iterator[Strip]:
         for done, frame in enumerate(chosen, 1):
-            yield picker.strip(frame, inspect)
+            yield picker.strip(frame)
             on_progress(Progress(done, len(chosen), "reading"))
 
     made = each()

@@ -62,10 +62,9 @@ def worst_frames(
     every frame, or there is no such variant.
     """
     if fleet := result.fleet:
-        rows = fleet.table("worst").to_pylist()
-        if not rows:
+        if not fleet.worst:
             raise _nothing_scored(fleet.path)
-        return [_of_fleet(fleet, row) for row in rows[:count]]
+        return [_of_fleet(fleet, row) for row in fleet.worst[:count]]
     cameras = result.rig.cameras if result.rig else [each for each in [result.drive] if each]
     found = [frame for each in cameras for frame in _ranked(each, count or LISTED, variant)]
     found = sorted(found, key=lambda each: -(each.rates[each.by] or 0.0))[: count or LISTED]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -82,12 +83,19 @@ class DriveResult:
         return f"{self.name}, {self.camera}" if self.camera else self.name
 
     @property
-    def configuration(self) -> Path | None:
-        """The file that holds the run's configuration; None where a run left none."""
-        if self.recording is not None:
-            return self.path if self.recording.result("run") else None
-        path = self.path / RUN
-        return path if path.exists() else None
+    def again(self) -> str:
+        """The command that makes the results again; empty where a run left no configuration."""
+        path = self.path if self.recording else self.path / RUN
+        known = self.recording.result("run") if self.recording else path.exists()
+        if not known or self.facts.log is None:
+            return ""
+        return shlex.join(["roadeval", "replay", self.facts.log.path, "--config", str(path)])
+
+    def inspect(self, frame: int | str) -> str:
+        """Return the command that opens a frame in the viewer."""
+        camera = ["--camera", self.camera] if self.camera else []
+        words = ["roadeval", "inspect", str(self.viewable or self.path), *camera]
+        return f"{shlex.join(words)} --frame {frame}"
 
     @cached_property
     def viewable(self) -> Path | None:

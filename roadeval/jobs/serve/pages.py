@@ -31,15 +31,12 @@ from roadeval.recording.viewer import WindowViewer
 from roadeval.report.blocks import CELLS, Cell, Document, Heading, LinkList, Strip, Table
 from roadeval.report.charts.standard import BEHIND
 from roadeval.report.document import page_document
-from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page, part
 from roadeval.report.sections.frames import LARGE
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import Paths, listed, own_names
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told
 
-MakeCommands = Callable[[Result], Commands]
-"""Returns the commands that the page of a result names."""
 PAIRS: Final = 20
 """Pairs of results that the list of results offers to compare."""
 STRIPS: Final = 40
@@ -51,34 +48,27 @@ _HOME: Final = Place("", "", "{}")
 
 
 def serve(
-    results: Paths,
-    on_address: Callable[[str], None],
-    *,
-    trust_sources: bool = False,
-    commands: MakeCommands | None = None,
+    results: Paths, on_address: Callable[[str], None], *, trust_sources: bool = False
 ) -> None:
     """Serve results as pages on 127.0.0.1 until the process is interrupted, as by Ctrl-C.
 
     ``on_address`` is called with the address to open, before anything is answered: it holds a token
     without which nothing is. With ``trust_sources`` a fleet's drives may be replayed from where its
-    folder says that their logs lie. ``commands`` makes the commands that pages name; none by
-    default. A `RoadevalError` if a result cannot be read.
+    folder says that their logs lie. A `RoadevalError` if a result cannot be read.
     """
-    with serving(results, trust_sources=trust_sources, commands=commands) as server:
+    with serving(results, trust_sources=trust_sources) as server:
         on_address(server.address)
         server.serve_forever(0.1)
 
 
 @contextmanager
-def serving(
-    results: Paths, *, trust_sources: bool = False, commands: MakeCommands | None = None
-) -> Iterator[LocalServer]:
+def serving(results: Paths, *, trust_sources: bool = False) -> Iterator[LocalServer]:
     """Yield a server of results, as of `serve`; what it started ends with the block."""
     with ExitStack() as stack:
         replayer, viewer = Replayer(), WindowViewer()
         whole = [Result(path, trust_sources=trust_sources) for path in listed(results)]
         opened = [own for each in whole for own in (each, *each.cameras.values())]
-        site = _Site([_served(each, commands, replayer) for each in opened], viewer)
+        site = _Site([_served(each, replayer) for each in opened], viewer)
         stack.callback(viewer.close)
         stack.callback(replayer.cancel)
         server = LocalServer(site.answer)
@@ -147,23 +137,21 @@ class _Site:
         return _page(as_page(found, home="../../"), Place())
 
 
-def _served(result: Result, commands: MakeCommands | None, replayer: Replayer) -> _Served:
+def _served(result: Result, replayer: Replayer) -> _Served:
     if result.fleet:
-        return _ServedFleet(result, commands, result.fleet, replayer)
+        return _ServedFleet(result, result.fleet, replayer)
     if result.drive is None:
-        return _Served(result, commands, Place("pictures/", "../", None, "../"))
-    return _ServedDrive(result, commands, result.drive)
+        return _Served(result, Place("pictures/", "../", None, "../"))
+    return _ServedDrive(result, result.drive)
 
 
 class _Served:
-    """The page of a result, with its pictures, and the commands that it names."""
+    """The page of a result, with its pictures."""
 
-    def __init__(self, result: Result, make_commands: MakeCommands | None, place: Place) -> None:
+    def __init__(self, result: Result, place: Place) -> None:
         (self.path,) = result.paths
         self.title: Final = result.drive.title if result.drive else result.name
         self._result: Final = result
-        self._make_commands: Final = make_commands
-        self._commands: Final = make_commands(result) if make_commands else None
         self._lock: Final = Lock()
         self._place: Final = place
 
@@ -190,11 +178,10 @@ class _Served:
 
     @cached_property
     def _document(self) -> Document:
-        inspect = self._commands.inspect if self._commands else None
         drive = self._result.drive
         with self._lock:
-            findings = findings_of(self._result, self._commands, PICTURED_OF_FLEET)
-            return page_document(findings, browsed(drive, inspect) if drive else None)
+            frames = browsed(drive) if drive else None
+            return page_document(findings_of(self._result), frames, PICTURED_OF_FLEET)
 
     @cached_property
     def _page(self) -> bytes:
@@ -222,18 +209,14 @@ class _ServedDrive(_Served):
     def __init__(
         self,
         result: Result,
-        make_commands: MakeCommands | None,
         drive: DriveResult,
         site: str = "../",
         above: tuple[str, str] = ("../", "All results"),
     ) -> None:
-        super().__init__(result, make_commands, Place("pictures/", site, "frame/{}", *above))
+        super().__init__(result, Place("pictures/", site, "frame/{}", *above))
         self._drive: Final = drive
         self._strips: Final[OrderedDict[int, Strip]] = OrderedDict()
         self._frames: Final = frozenset(drive.pictured)
-        self._frame_place: Final = Place(
-            *("../pictures/", f"../{site}", "../frame/{}", "../", self.title), forms=True
-        )
 
     def _more(self, request: Request, viewer: WindowViewer) -> Response:
         match request.parts:
@@ -274,8 +257,7 @@ class _ServedDrive(_Served):
     def _strip(self, frame: int) -> Strip:
         with self._lock:
             if frame not in self._strips:
-                inspect = self._commands.inspect if self._commands else None
-                self._strips[frame] = self._picker.strip(frame, inspect, LARGE)
+                self._strips[frame] = self._picker.strip(frame, LARGE)
                 while len(self._strips) > STRIPS:
                     self._strips.popitem(last=False)
             self._strips.move_to_end(frame)
@@ -288,28 +270,17 @@ class _ServedDrive(_Served):
             case ("part",), False:
                 return Response(part(self._strip(frame), self._place), PAGE)
             case (), False:
-                blocks = [Heading(f"Frame {frame}"), self._strip(frame)]
-                made = Document("frame", self.title, f"frame {frame}", "", blocks)
-                return _page(page(made, self._frame_place), self._frame_place)
+                return _moved(f"../#frame-{frame}")
             case ("view",), True:
                 return _viewed(viewer, self.path, frame)
-            case ("show",), True:
-                shown = _viewed(viewer, self.path, frame)
-                return _moved("../..") if shown.succeeded else shown
         return NOT_FOUND
 
 
 class _ServedFleet(_Served):
     """A fleet, the pages of its drives, and its worst frames in the viewer."""
 
-    def __init__(
-        self,
-        result: Result,
-        make_commands: MakeCommands | None,
-        fleet: FleetFolder,
-        replayer: Replayer,
-    ) -> None:
-        super().__init__(result, make_commands, Place("pictures/", "../", "frame/{}", "../"))
+    def __init__(self, result: Result, fleet: FleetFolder, replayer: Replayer) -> None:
+        super().__init__(result, Place("pictures/", "../", "frame/{}", "../"))
         self._fleet: Final = fleet
         self._replayer: Final = replayer
         self._drives: Final[dict[Path, _ServedDrive]] = {}
@@ -332,7 +303,7 @@ class _ServedFleet(_Served):
 
     @cached_property
     def _worst(self) -> Mapping[int, WorstFrame]:
-        if not self._fleet.table("worst", ["rank"]).num_rows:
+        if not self._fleet.worst:
             return {}
         return {each.rank: each for each in worst_frames(self._result, PICTURED_OF_FLEET)}
 
@@ -344,9 +315,7 @@ class _ServedFleet(_Served):
             if path not in self._drives:
                 opened, above = Result(path), ("../../", self.title)
                 assert opened.drive is not None
-                self._drives[path] = _ServedDrive(
-                    opened, self._make_commands, opened.drive, "../../../", above
-                )
+                self._drives[path] = _ServedDrive(opened, opened.drive, "../../../", above)
             return self._drives[path]
 
     def _view(self, frame: WorstFrame, viewer: WindowViewer) -> Response:

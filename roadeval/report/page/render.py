@@ -13,7 +13,6 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
@@ -60,8 +59,6 @@ class Place:
     home: str = ""
     """Address of the page above, or empty."""
     home_title: str = "All results"
-    forms: bool = False
-    """Whether a form of the page may ask its server to open the viewer, as without a script."""
 
     @property
     def policy(self) -> str:
@@ -74,13 +71,12 @@ class Place:
                 f"script-src {_hash(script()) if self.code is None else _BESIDE}",
                 *(["connect-src 'self'"] if self.frames else []),
                 "base-uri 'none'",
-                f"form-action {_BESIDE if self.forms else _NOWHERE}",
+                "form-action 'none'",
             ]
         )
 
 
 _BESIDE: Final = "'self'"
-_NOWHERE: Final = "'none'"
 INSIDE: Final = Place()
 
 
@@ -152,7 +148,6 @@ def _rendered(template: str, place: Place, document: Document | None, **given: A
             variant_of=partial(_variant_of, variants),
             unknown=_unknown,
             is_live=place.frames is not None,
-            has_forms=place.forms,
             # A picture inside the page is there already, and paper shows it only if it is loaded.
             loading="eager" if place.pictures is None else "lazy",
             **given,
@@ -285,26 +280,13 @@ def _name(text: str, taken: set[str]) -> str:
     return name
 
 
-class Beside(StrEnum):
-    """The files in a folder beside a page: none, its pictures, or its script and style, too."""
+def write_page(path: Path, document: Document, *, beside: bool = False) -> Path:
+    """Write a document as a page, perhaps with its pictures in a folder beside it.
 
-    NOTHING = "nothing"
-    PICTURES = "pictures"
-    ALL = "all"
-
-
-def write_page(path: Path, document: Document, beside: Beside = Beside.NOTHING) -> Path:
-    """Write a document as a page; what it needs is replaced with it, as one.
-
-    A `ReportError` if it cannot be written.
+    They are replaced with it, as one. A `ReportError` if it cannot be written.
     """
-    files = dict(document.files() if beside is not Beside.NOTHING else {})
-    files |= code() if beside is Beside.ALL else {}
-    at = f"{companion_name(path, files)}/" if files else None
-    place = Place(
-        pictures=None if beside is Beside.NOTHING else at,
-        code=at if beside is Beside.ALL else None,
-    )
+    files = document.files() if beside else {}
+    place = Place(pictures=f"{companion_name(path, files)}/") if files else INSIDE
     with writing(path, ReportError, "; choose another place"):
         put_with(path, page(document, place), files)
     return path

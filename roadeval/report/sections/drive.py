@@ -11,7 +11,7 @@ from roadeval.data.words import DASH, MINUS, defined, number, percent, points
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import BINS, FILTER, merged
+from roadeval.evaluation.score import BINS, FILTER, Effect, merged
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -30,7 +30,7 @@ from roadeval.report.charts.standard import (
     difference,
     figures_over_drive,
 )
-from roadeval.report.findings import Findings, FleetFindings, PairedComparison
+from roadeval.report.findings import Findings
 from roadeval.report.images import variants_of
 from roadeval.report.sections.common import (
     example_pictures,
@@ -38,6 +38,7 @@ from roadeval.report.sections.common import (
     variant_cell,
 )
 from roadeval.results.facts import Totals
+from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import CLAIMED, correction, marked_interval
 
 
@@ -85,27 +86,28 @@ def _claims(findings: Findings) -> Iterator[Block]:
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield what the filter and each variant change, and how much masks flicker."""
-    if findings.paired:
+    effects = [each for each in findings.facts.effects if each.final]
+    if effects:
         yield Heading("What the filter and the variants change")
-        yield _differences(findings)
-        yield Text(_method(findings.paired), "note")
-    for pair in findings.paired:
-        if (pair.treated, pair.control) != (FILTERED, UNFILTERED) or not len(pair.frames):
+        yield _differences(findings, effects)
+        yield Text(_method(effects), "note")
+    pairs = findings.filtered
+    for each in effects if len(pairs) else ():
+        if (each.variant, each.base) != (FILTERED, UNFILTERED):
             continue
-        if not defined((change := pair.differences["ERR"]).mean):
+        if not defined((change := each.rates["ERR"]).mean):
             yield Text("ERR is undefined on every frame, so what the filter does to it is unknown.")
             continue
-        if pair.pixels is not None:
-            yield Text(pixels_changed(pair))
-        columns = pair.frames["frame"], pair.frames["ERR"]
-        drawn = difference(*columns, pair.treated, pair.control, change)
-        yield Figure([drawn], f"ERR of {pair.treated} minus {pair.control}, frame by frame.")
+        if findings.pixels:
+            yield Text(pixels_changed(*findings.pixels, int(pairs["wrong"].sum())))
+        drawn = difference(pairs["frame"], pairs["ERR"], FILTERED, UNFILTERED, change)
+        yield Figure([drawn], f"ERR of {FILTERED} minus {UNFILTERED}, frame by frame.")
     yield from _over_time(findings)
 
 
-def _differences(findings: Findings) -> Table:
+def _differences(findings: Findings, effects: Sequence[Effect]) -> Table:
     """Tabulate each variant's final mask against unfiltered and the baseline, a row each."""
-    names, pairs = [*findings.finals], findings.paired
+    names = [*findings.finals]
     others = [rate for rate in SHORT if rate != "ERR"]
     return Table(
         [
@@ -115,30 +117,25 @@ def _differences(findings: Findings) -> Table:
         [
             [
                 replace(
-                    variant_cell(pair.treated, names),
-                    text=f"{pair.treated} {MINUS} {pair.control}",
+                    variant_cell(each.variant, names), text=f"{each.variant} {MINUS} {each.base}"
                 ),
-                *(percent(findings.total(name)["ERR"]) for name in (pair.control, pair.treated)),
-                Cell(points((change := pair.differences["ERR"]).mean), bold=True),
+                *(percent(findings.total(name)["ERR"]) for name in (each.base, each.variant)),
+                Cell(points((change := each.rates["ERR"]).mean), bold=True),
                 marked_interval(change),
-                *(points(pair.differences[rate].mean) for rate in others),
+                *(points(each.rates[rate].mean) for rate in others),
                 *(number(count or 0) for count in (change.better, change.worse)),
                 DASH if change.effective is None else f"{change.effective:.0f}",
             ]
-            for pair in pairs
+            for each in effects
         ],
-        breaks=[
-            place
-            for place, (above, below) in enumerate(pairwise(pairs), 1)
-            if above.control != below.control
-        ],
+        breaks=[place for place, (a, b) in enumerate(pairwise(effects), 1) if a.base != b.base],
         groups=[("", 1), ("ERR", 4), ("", len(others)), ("frames", 3)],
         small=True,
     )
 
 
-def _method(pairs: Sequence[PairedComparison]) -> str:
-    changes = [pair.differences["ERR"] for pair in pairs]
+def _method(effects: Sequence[Effect]) -> str:
+    changes = [each.rates["ERR"] for each in effects]
     told = [
         f"Final masks. {BASELINE}: a guess that never looks at the image, the training frames' "
         "mean truth thresholded at one half."
@@ -154,11 +151,11 @@ def _method(pairs: Sequence[PairedComparison]) -> str:
     return " ".join(filter(None, [*told, correction(changes)]))
 
 
-def pixels_changed(pair: PairedComparison) -> str:
-    """Return which share of the pixels the filter made right and wrong, and what remains."""
-    assert pair.pixels is not None
-    right, wrong, labelled = pair.pixels
-    net = int(pair.frames["wrong"].sum())
+def pixels_changed(right: int, wrong: int, labelled: int, net: int) -> str:
+    """Return which share of the pixels the filter made right and wrong, and what remains.
+
+    ``net`` is the change of wrong pixels, frame by frame.
+    """
     change = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
     return (
         f"Of the labelled pixels of all evaluated frames, {percent(right / labelled)} % are "
@@ -209,7 +206,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     yield Details("From one frame to the next", [table, meaning])
 
 
-def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
+def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     """Yield in which parts of the image the errors are, of a drive or of many together."""
     if not findings.regions:
         return
@@ -243,7 +240,7 @@ def regions(findings: Findings | FleetFindings) -> Iterator[Block]:
         )
 
 
-def _regions_note(findings: Findings | FleetFindings, names: Mapping[str, str]) -> str:
+def _regions_note(findings: Findings | FleetFolder, names: Mapping[str, str]) -> str:
     width = findings.facts.run.get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
     shadow = "Shadow is what the filter took for shadow, right or wrong. "

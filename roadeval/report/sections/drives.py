@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import DASH, first_of, interval, number, percent, points
@@ -17,14 +17,15 @@ from roadeval.report.blocks import (
     Cell,
     Details,
     Heading,
+    ImageFile,
     ImageGrid,
     LongTable,
     Table,
     Text,
 )
 from roadeval.report.charts.standard import ForestRow, forest
-from roadeval.report.findings import FleetFindings, Row, WorstPicture
 from roadeval.results.facts import OverDrives, StratumFacts
+from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
 from roadeval.results.sentences import MARK, is_significant
 from roadeval.runtime.text import elided
@@ -38,12 +39,13 @@ TAGS: Final = 48
 _LIGHT: Final = {column.name for column in LIGHT}
 _WORDS: Final = ("drive", "state", "group", "tags")
 _SHOWN: Final = ("ERR", "FPR", "FNR")
+Row = Mapping[str, Any]
 
 
-def plots(findings: FleetFindings) -> Iterator[Block]:
+def plots(findings: FleetFolder) -> Iterator[Block]:
     """Yield the plots of the filter and of the best variant against blind, and the worst drives."""
     chosen = list(plotted(findings))
-    if not findings.scores:
+    if not findings.first_scores:
         return
     yield Heading("Drive by drive")
     for place, (effect, title) in enumerate(chosen):
@@ -53,7 +55,7 @@ def plots(findings: FleetFindings) -> Iterator[Block]:
     yield Details("Drives with the highest error rate", [drives_table(findings, NAMED), units])
 
 
-def plotted(findings: FleetFindings) -> Iterator[tuple[OverDrives, str]]:
+def plotted(findings: FleetFolder) -> Iterator[tuple[OverDrives, str]]:
     """Yield the differences that have a plot: of the filter, and of the best against blind."""
     known = [each for each in findings.facts.effects if each.metric == TESTED and each.units]
     for each in known:
@@ -66,7 +68,7 @@ def plotted(findings: FleetFindings) -> Iterator[tuple[OverDrives, str]]:
         yield best, f"What {best.variant}{which} gains over {best.base}"
 
 
-def _plot(findings: FleetFindings, effect: OverDrives) -> Iterator[Block]:
+def _plot(findings: FleetFolder, effect: OverDrives) -> Iterator[Block]:
     rows = [
         ForestRow(
             findings.names[row["drive"]],
@@ -81,19 +83,19 @@ def _plot(findings: FleetFindings, effect: OverDrives) -> Iterator[Block]:
         yield forest(rows, effect, f"ERR of {effect.variant} minus that of {effect.base}")
 
 
-def _differences(findings: FleetFindings) -> dict[str, dict[str, float]]:
+def _differences(findings: FleetFolder) -> dict[str, dict[str, float]]:
     """Return by base the differences by drive of the first variant, or the first that has any."""
     found = {}
     for base in BASES:
         variants = [variant for other, variant in findings.effects if other == base]
         if variants:
-            first = findings.scores[0]["variant"]
+            first = next(iter(findings.finals))
             rows = findings.effects[base, first if first in variants else variants[0]]
             found[base] = {row["drive"]: row["mean"] for row in rows}
     return {base: values for base, values in found.items() if values}
 
 
-def _tags(findings: FleetFindings) -> dict[str, str]:
+def _tags(findings: FleetFolder) -> dict[str, str]:
     """Return the drives' tags in one line each, cut where they are many."""
     lines = {
         each.drive: ", ".join(f"{key}: {value}" for key, value in each.tags.items())
@@ -105,7 +107,7 @@ def _tags(findings: FleetFindings) -> dict[str, str]:
     }
 
 
-def table(findings: FleetFindings) -> Iterator[Block]:
+def table(findings: FleetFolder) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
     yield LongTable(drives_table(findings), "Find drives, tags, states:")
@@ -116,13 +118,12 @@ def table(findings: FleetFindings) -> Iterator[Block]:
     )
 
 
-def drives_table(findings: FleetFindings, worst: int | None = None) -> Table:
+def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     """Tabulate every drive with its state, its rates, its light and its tags.
 
     Or the ``worst`` ones, those with the highest ERR, without state, group and light.
     """
-    scores = {row["drive"]: row for row in findings.scores}
-    differences = _differences(findings) if scores else {}
+    scores, differences = findings.first_scores, _differences(findings)
     tags, pages = _tags(findings), findings.pages()
     columns: dict[str, Callable[[str], Cell | str]] = {
         "drive": lambda drive: Cell(findings.names[drive], leads=pages.get(drive, "")),
@@ -136,7 +137,7 @@ def drives_table(findings: FleetFindings, worst: int | None = None) -> Table:
     }
     shown = [*findings.drives]
     if worst is not None:
-        known = (row for row in findings.scores if row[TESTED] is not None)
+        known = (row for row in scores.values() if row[TESTED] is not None)
         ranked = sorted(known, key=lambda row: (-row[TESTED], row["drive"]))
         shown = [row["drive"] for row in ranked[:worst]]
         unused = ["state", "group", *_LIGHT, *([] if any(tags.values()) else ["tags"])]
@@ -157,12 +158,12 @@ def _point(values: Mapping[str, float], drive: str) -> str:
     return points(values.get(drive))
 
 
-def _light(findings: FleetFindings, name: str, drive: str) -> str:
+def _light(findings: FleetFolder, name: str, drive: str) -> str:
     value = findings.drives[drive][name]
     return DASH if value is None else f"{value:.2f}"
 
 
-def missing(findings: FleetFindings) -> Iterator[Block]:
+def missing(findings: FleetFolder) -> Iterator[Block]:
     """Yield the drives that failed by reason, those without truth, and losses."""
     failed = [row for row in findings.drives.values() if row["status"] == FAILED]
     unscored = [row for row in findings.drives.values() if row["status"] == UNSCORED]
@@ -181,7 +182,7 @@ def missing(findings: FleetFindings) -> Iterator[Block]:
             yield Text(f"{number(len(damaged) - NAMED)} more: see drives.parquet.", "note")
 
 
-def _reasons(findings: FleetFindings, rows: list[Row]) -> Iterator[Block]:
+def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
     """Yield a table of reasons, the most frequent first."""
     by_reason: defaultdict[str, list[str]] = defaultdict(list)
     for row in rows:
@@ -208,7 +209,7 @@ def _reason(row: Row) -> str:
     return rest if rest and begin.rpartition("/")[2].startswith(row["name"]) else reason
 
 
-def _losses(findings: FleetFindings, rows: list[Row]) -> Table:
+def _losses(findings: FleetFolder, rows: Sequence[Row]) -> Table:
     lost = []
     for row in rows[:NAMED]:
         first, *rest = row["losses"].splitlines()
@@ -221,7 +222,7 @@ STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""
 
 
-def strata(findings: FleetFindings) -> Iterator[Block]:
+def strata(findings: FleetFolder) -> Iterator[Block]:
     """Yield a table of parts for each difference that has a plot.
 
     Thirds by light are shown where one of them has drives enough for an interval.
@@ -325,62 +326,52 @@ LONGEST = 20
 """Letters of a drive's name below a picture."""
 
 
-def worst(findings: FleetFindings, across: int = ACROSS) -> Iterator[Block]:
-    """Yield the worst frames, so many pictures beside each other."""
-    if not findings.worst:
+def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iterator[Block]:
+    """Yield the worst frames, at most so many, and so many pictures beside each other."""
+    rows = findings.worst[:most]
+    if not rows:
         return
     yield Heading("The worst frames over all drives")
-    pictures = [
-        (_worst_caption(findings, frame), frame.picture)
-        for frame in findings.worst
-        if frame.picture is not None
-    ]
+    pictures, lacking = [], []
+    for row in rows:
+        name = findings.names[row["drive"]]
+        title = f"{row['rank']}. {elided(name, LONGEST)}, frame {row['frame']}"
+        if (content := findings.picture(row)) is None:
+            lacking.append(f"{name} frame {row['frame']}")
+        else:
+            error = f"ERR {percent(row['ERR'], 1)} %"
+            pictures.append((f"{title}: {error}", ImageFile(content)))
     if pictures:
         yield ImageGrid(pictures[:SEEN], across)
     if more := pictures[SEEN:]:
         yield Details(f"{len(more)} more", [ImageGrid(more, across)])
-    yield Text(_worst_legend(findings, len(pictures)), "note")
-    if findings.inspect is not None:
-        yield commands_table(findings, findings.inspect)
+    legend = (
+        "By ERR of the first variant's final mask; of a drive at most three, a second apart. "
+        "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
+        "grey: ignored."
+    )
+    if lacking:
+        named = first_of(lacking, LACKING)
+        legend += f" Pictures of {len(lacking)} are not in the folder: {named}."
+    yield Text(legend, "note")
+    yield _commands_table(findings, rows)
 
 
-def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Table:
+def _commands_table(findings: FleetFolder, rows: Sequence[Row]) -> Table:
     """Tabulate the worst frames with the command that opens each in the viewer."""
     pages = findings.pages()
     return Table(
         ["", "drive", "frame", "ERR, %", "in the viewer"],
         [
             [
-                str(frame.rank),
-                Cell(findings.names[frame.drive], leads=pages[frame.drive]),
-                Cell(
-                    str(frame.frame),
-                    leads=f"{pages[frame.drive]}#frame-{frame.frame}",
-                ),
-                Cell(percent(frame.rates["ERR"]), bold=True),
-                Cell(inspect(frame.rank), opens=f"worst/{frame.rank}"),
+                str(row["rank"]),
+                Cell(findings.names[row["drive"]], leads=pages[row["drive"]]),
+                Cell(str(row["frame"]), leads=f"{pages[row['drive']]}#frame-{row['frame']}"),
+                Cell(percent(row["ERR"]), bold=True),
+                Cell(findings.inspect(row), opens=f"worst/{row['rank']}"),
             ]
-            for frame in findings.worst
+            for row in rows
         ],
         text_columns=(0, 1, 4),
         small=True,
     )
-
-
-def _worst_caption(findings: FleetFindings, frame: WorstPicture) -> str:
-    name = elided(findings.names[frame.drive], LONGEST)
-    return f"{frame.rank}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
-
-
-def _worst_legend(findings: FleetFindings, shown: int) -> str:
-    missing = len(findings.worst) - shown
-    legend = (
-        "By ERR of the first variant's final mask; of a drive at most three, a second apart. "
-        "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
-        "grey: ignored."
-    )
-    if missing:
-        lacking = [frame for frame in findings.worst if frame.picture is None]
-        named = [f"{findings.names[each.drive]} frame {each.frame}" for each in lacking]
-        legend += f" Pictures of {missing} are not in the folder: {first_of(named, LACKING)}."
-    return legend

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -65,7 +65,7 @@ def worst_frames(findings: Findings) -> Iterator[Block]:
     if stepped := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
         rule += f" Below the errors are the steps of {listing(stepped)}, from left to right."
     head = [Heading("The worst frames"), Text(rule, "note")]
-    if findings.commands and not findings.viewable:
+    if not findings.inspect:
         head.append(Text(NO_COMMAND, "note"))
     yield from _frames(findings, head, findings.worst)
     helped, harmed = (
@@ -105,8 +105,8 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     for row in frame.layers:
         pictures = [(image.title, jpeg(image, SMALL)) for image in row]
         yield ImageGrid(pictures, columns, skip=columns - len(row))
-    if findings.viewable and findings.commands:
-        yield Command(findings.commands.inspect(frame.frame))
+    if findings.inspect:
+        yield Command(findings.inspect(frame.frame))
 
 
 def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
@@ -170,8 +170,8 @@ class FrameBrowser(Block):
     """Those that were scored, or without truth are in doubt."""
     charts: Sequence[Chart]
     """Rates along the drive."""
-    inspect: Callable[[int], str] | None = None
-    """Return the command that opens a frame; None without one."""
+    command: str = ""
+    """Opens a frame in the viewer, with ``{}`` for its number; empty without a recording."""
     served: frozenset[int] = frozenset()
     """Frames that a server has the pictures of."""
     strips: Sequence[Strip] = ()
@@ -228,11 +228,6 @@ class FrameBrowser(Block):
         errors = [f"{name}: errors" for name in scored if name != BASELINE]
         first, *others = errors or [*self.masks] or ["camera"]
         return first, next(iter(others), "camera")
-
-    @property
-    def command(self) -> str:
-        """Return the command that opens a frame, with ``{}`` for its number; empty without one."""
-        return self.inspect(0).replace(" --frame 0", " --frame {}") if self.inspect else ""
 
     @property
     def note(self) -> str:

@@ -8,8 +8,9 @@ from typing import Any, Final
 
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Command, Details, Heading, KeepTogether, Table, Text
-from roadeval.report.findings import Findings, FleetFindings
+from roadeval.report.findings import Findings
 from roadeval.results.facts import Facts
+from roadeval.results.fleet import FleetFolder
 
 TABLES: Final = ("topics", "labels", "frames", "training", "evaluation")
 """Of the run's configuration, beside its stages: what can change a number."""
@@ -26,10 +27,9 @@ def section(findings: Findings) -> Iterator[Block]:
     if facts.log:
         yield Text(f"Log: {facts.log.path}")
         yield Text(f"Digest of its index and checksums: {facts.log.digest}")
-        if findings.commands and findings.commands.again:
+        if findings.again:
             same = "The same log, configuration and versions give the same numbers."
-            command = Command(findings.commands.again(facts.log.path))
-            yield KeepTogether([command, Text(same, "note")])
+            yield KeepTogether([Command(findings.again), Text(same, "note")])
     for name, labels in facts.masks.items():
         yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
     yield from _methods(facts)
@@ -53,7 +53,7 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Details("Topics, versions, milliseconds, settings", about, on_paper=False)
 
 
-def of_drives(findings: FleetFindings) -> Iterator[Block]:
+def of_drives(findings: FleetFolder) -> Iterator[Block]:
     """Yield the settings, version, models and folds behind the results of many drives."""
     facts = findings.facts
     yield Heading("What was run")
@@ -63,7 +63,7 @@ def of_drives(findings: FleetFindings) -> Iterator[Block]:
         dealt = ", ".join(f"fold {fold}: {number(n)}" for fold, n in sorted(folds.items()))
         yield Text(f"Drives by the fold whose model scored them, which never saw them: {dealt}.")
     yield Text(
-        f"run.toml in {findings.source} has the whole configuration, drives.parquet each log's "
+        f"run.toml in {findings.path} has the whole configuration, drives.parquet each log's "
         "SHA-256. The same logs, configuration and version give the same numbers.",
         "note",
     )
@@ -72,7 +72,7 @@ def of_drives(findings: FleetFindings) -> Iterator[Block]:
     yield Details("Settings", [settings], on_paper=False)
 
 
-def _models(findings: FleetFindings) -> str:
+def _models(findings: FleetFolder) -> str:
     models = {row["model"] for row in findings.drives.values() if row["model"]}
     if not models:
         return "each drive trained its own model"

@@ -20,11 +20,12 @@ from roadeval.report.blocks import (
     TableOfContents,
     Text,
 )
-from roadeval.report.findings import Findings, FleetFindings, worse_than_baseline
+from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
 from roadeval.report.sections.common import variant_cell
 from roadeval.report.sections.drives import WORST_AT
 from roadeval.results.facts import FleetFacts, OverDrives
+from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account, of_seeds, seeds_in_words, spread_in_words
 
@@ -45,10 +46,10 @@ ROWS: Final = 24
 """Variants that the tables of many drives have, at most."""
 
 
-def section(findings: Findings | FleetFindings) -> Iterator[Block]:
+def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     """Yield the first page."""
     yield Heading("Summary")
-    if isinstance(findings, FleetFindings):
+    if isinstance(findings, FleetFolder):
         yield from _of_drives(findings)
     else:
         yield from _of_a_drive(findings)
@@ -81,20 +82,18 @@ def _next(findings: Findings) -> Iterator[LinkList]:
         if frame.rates:
             wrong = percent(frame.rates[frame.variant]["ERR"], 1)
             title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
-        command = findings.commands.inspect(frame.frame) if findings.commands else ""
-        links = [(title, f"#frame-{frame.frame}")]
-        yield LinkList(links, command if findings.viewable else "")
+        command = findings.inspect(frame.frame) if findings.inspect else ""
+        yield LinkList([(title, f"#frame-{frame.frame}")], command)
 
 
-def _of_drives(findings: FleetFindings) -> Iterator[Block]:
+def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     facts = findings.facts
     yield Text(facts.verdict, "verdict")
     if findings.worst:
         frame = findings.worst[0]
-        where = f"{findings.names[frame.drive]}, frame {frame.frame}"
-        title = f"Worst frame: {where} (ERR {percent(frame.rates['ERR'], 1)} %)"
-        command = findings.inspect(frame.rank) if findings.inspect else ""
-        yield LinkList([(title, WORST_AT)], command)
+        where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
+        title = f"Worst frame: {where} (ERR {percent(frame['ERR'], 1)} %)"
+        yield LinkList([(title, WORST_AT)], findings.inspect(frame))
     if note := _how_sure_over_drives(facts):
         yield Text(note, "note")
     if facts.rates:
@@ -274,10 +273,11 @@ def warnings(findings: Findings) -> Iterator[str]:
 
 def _worse_than_baseline(errors: Mapping[str, float | None]) -> str:
     """Name the variants with a higher ERR than the baseline; empty without any."""
-    worse = worse_than_baseline(errors)
+    blind = errors.get(BASELINE)
+    known = {name: error for name, error in errors.items() if defined(error) and defined(blind)}
+    worse = [name for name, error in known.items() if error > known[BASELINE]]
     verb = "is" if len(worse) == 1 else "are"
-    blind = percent(errors.get(BASELINE))
-    return f"{listing(worse)} {verb} worse than {BASELINE} (ERR {blind} %)" if worse else ""
+    return f"{listing(worse)} {verb} worse than {BASELINE} (ERR {percent(blind)} %)" * bool(worse)
 
 
 def _undefined(findings: Findings) -> Iterator[str]:
@@ -290,7 +290,7 @@ def _undefined(findings: Findings) -> Iterator[str]:
             yield f"{variant}: undefined on some of {frames} frames, and left out: {listing(many)}."
 
 
-def fleet_warnings(findings: FleetFindings) -> Iterator[str]:
+def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
     """Yield what a reader must know before believing the numbers of many drives."""
     facts = findings.facts
     if failed := facts.counts.get(FAILED):

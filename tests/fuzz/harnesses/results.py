@@ -13,6 +13,8 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs.results.report import collect
 from roadeval.jobs.results.result import DriveResult
 from roadeval.recording import Recording
+from roadeval.report.document import document
+from roadeval.results.folder import RUN
 from tests.compatibility.make import RECORDING, RESULTS, unpack, versions
 from tests.fuzz.harness import Harness, scratch
 
@@ -32,8 +34,8 @@ def read(result: DriveResult) -> None:
     """Read all that a result holds: what a report needs, its configuration, its pictures."""
     readers: list[Callable[[], Any]] = [
         lambda: result.table("regions"),
-        lambda: collect(result),
-        lambda: result.configuration and load_config(result.configuration),
+        lambda: document(collect(result)),
+        lambda: load_config(result.path if result.recording else result.path / RUN),
     ]
     if result.recording is not None:
         readers += pictures(result.recording)

@@ -29,7 +29,7 @@ from roadeval.report.blocks import (
     TwoColumns,
 )
 from roadeval.report.chart import Chart, ChartKind, Look, Series
-from roadeval.report.page.render import Beside, page, write_page
+from roadeval.report.page.render import page, write_page
 from roadeval.report.sections.frames import FrameBrowser, FrameRow
 from tests.report.making import a_document
 
@@ -187,13 +187,12 @@ def test_equal_documents_give_equal_bytes():
     assert rendered(*every_block("word")) == rendered(*every_block("word"))
 
 
-def test_pictures_and_code_beside_a_page_are_named_by_it_and_replaced_with_it(tmp_path):
+def test_pictures_beside_a_page_are_named_by_it_and_replaced_with_it(tmp_path):
     path = tmp_path / "page.html"
-    write_page(path, a_document(ImageGrid([("a", JPEG)], 1)), Beside.ALL)
+    write_page(path, a_document(ImageGrid([("a", JPEG)], 1)), beside=True)
     (folder,) = (each for each in tmp_path.iterdir() if each.is_dir())
     made = Reader(path.read_bytes())
-    named = [own["src"] for tag in ("img", "script") for own in made.all(tag) if "src" in own]
-    named += [own["href"] for own in made.all("link") if own["rel"] == "stylesheet"]
+    named = [own["src"] for own in made.all("img") if "src" in own]
     assert {tmp_path / name for name in named} == set(folder.iterdir())
-    write_page(path, a_document(Text("other")), Beside.NOTHING)
+    write_page(path, a_document(Text("other")))
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]

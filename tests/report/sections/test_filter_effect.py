@@ -8,7 +8,7 @@ import pytest
 from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Details, Table, Text
 from roadeval.report.sections.drive import filter_effect, pixels_changed
-from tests.report.making import a_difference, a_pair, plain_rows, some_findings, the
+from tests.report.making import a_difference, by_rate, pairs, plain_rows, some_findings, the
 
 
 def texts(findings):
@@ -19,7 +19,7 @@ def texts(findings):
     ("wrong", "told"), [([1500, -200], "1,300 more"), ([-1500, 200], "1,300 fewer")]
 )
 def test_more_wrong_pixels_are_more_and_fewer_are_fewer(wrong, told):
-    sentence = pixels_changed(a_pair([0.1, -0.1], wrong))
+    sentence = pixels_changed(30, 10, 1000, sum(wrong))
     assert sentence == (
         "Of the labelled pixels of all evaluated frames, 3.00 % are newly right with the "
         "filter and 1.00 % newly wrong; over all frames that leaves "
@@ -33,9 +33,11 @@ def table_of(findings):
 
 
 def test_each_difference_has_both_errors_how_sure_it_is_and_the_frames_it_won():
-    changes = [-0.1, -0.2, -0.3, 0.1, 0.0, math.nan]
-    other = replace(a_pair([0.1, -0.1], [0, 0], control="blind"), treated="unfiltered")
-    table = table_of(some_findings(paired=[a_pair(changes, [0] * 6), other]))
+    effects = {
+        "difference": {"post": by_rate(3, 1)},
+        "against_blind": {"unfiltered": by_rate(1, 1)},
+    }
+    table = table_of(some_findings(**effects))
     change = (f"{MINUS}2.00", f"{MINUS}3.00 to {MINUS}1.00 *", f"{MINUS}2.00", f"{MINUS}2.00")
     assert plain_rows(table) == [
         [f"filtered {MINUS} unfiltered", "15.00", "10.00", *change, "3", "1", "40"],
@@ -46,18 +48,13 @@ def test_each_difference_has_both_errors_how_sure_it_is_and_the_frames_it_won():
 
 
 def test_where_there_is_no_interval_the_reason_is_given():
-    pair = a_pair([-0.1], [-1])
-    pair.differences["ERR"] = a_difference(-0.02)
-    assert any(
-        "No interval for ERR: 1200 frames are too few" in text
-        for text in texts(some_findings(paired=[pair]))
-    )
+    found = some_findings(difference={"post": by_rate(err=a_difference(-0.02))})
+    assert any("No interval for ERR: 1200 frames are too few" in text for text in texts(found))
 
 
 def test_where_err_is_undefined_nothing_is_said_about_frames():
-    pair = a_pair([math.nan], [0])
-    pair.differences["ERR"] = a_difference(None)
-    *_, text = texts(some_findings(paired=[pair]))
+    unknown = {"post": by_rate(err=a_difference(None))}
+    *_, text = texts(some_findings(difference=unknown, filtered=pairs([math.nan], [0])))
     assert text.startswith("ERR is undefined on every frame")
 
 
@@ -82,6 +79,5 @@ def test_flicker_stands_beside_the_truths_own_and_how_long_a_mask_errs():
 
 
 def test_an_unknown_number_of_effective_frames_is_a_dash():
-    pair = a_pair([-0.1], [-1])
-    pair.differences["ERR"] = replace(pair.differences["ERR"], effective=None)
-    assert plain_rows(table_of(some_findings(paired=[pair])))[0][-1] == DASH
+    unknown = by_rate(err=replace(a_difference(-0.02, -0.03, -0.01), effective=None))
+    assert plain_rows(table_of(some_findings(difference={"post": unknown})))[0][-1] == DASH

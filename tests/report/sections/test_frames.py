@@ -86,7 +86,7 @@ def test_equal_phases_of_the_variants_stand_below_each_other():
 
 
 def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is_told():
-    (blocks,) = shown(some_findings(worst=[a_frame(7)], viewable=False))
+    (blocks,) = shown(some_findings(worst=[a_frame(7)], inspect=None))
     assert not [block for block in blocks if isinstance(block, Command)]
     assert NO_COMMAND in [block.text for block in blocks if isinstance(block, Text)]
 

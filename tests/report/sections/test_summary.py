@@ -1,13 +1,12 @@
 """The first page: which numbers stand out, and what a reader is warned of."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from roadeval.data.words import DASH
 from roadeval.report.blocks import BulletList, LinkList, Table, Text
-from roadeval.report.findings import Commands, NotableFrame
+from roadeval.report.findings import NotableFrame
 from roadeval.report.sections.summary import rates_table, section, warnings
 from roadeval.results.facts import FrameAccount, TrainingFacts
 from tests.report.making import a_total, column, plain_rows, some_findings
@@ -140,12 +139,12 @@ def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
 def test_below_the_verdict_are_the_worst_frame_and_the_command_that_opens_it():
     rates = {"filtered": {"ERR": 0.312}}
     frame = NotableFrame(80, 0, "filtered", rates)
-    commands = Commands(None, "roadeval inspect drive.rrd --frame {}".format)
-    found = replace(some_findings(), worst=[frame], commands=commands, viewable=True)
+    found = some_findings(worst=[frame])
     blocks = list(section(found))
     links = [("Worst frame: 80, where filtered gets 31.2 % wrong", "#frame-80")]
-    assert blocks[2] == LinkList(links, "roadeval inspect drive.rrd --frame 80")
-    gone = [each for each in section(replace(found, viewable=False)) if isinstance(each, LinkList)]
+    assert blocks[2] == LinkList(links, "open frame 80")
+    unseen = some_findings(worst=[frame], inspect=None)
+    gone = [each for each in section(unseen) if isinstance(each, LinkList)]
     assert gone == [LinkList(links)]
 
 

@@ -1,7 +1,5 @@
 """Over thresholds: curves, and what is quoted of them beside the mask as it is."""
 
-from dataclasses import replace
-
 import pandas as pd
 import pytest
 
@@ -31,8 +29,9 @@ LEVELS = [("filtered", "post", 20, 2, 8, 31), ("filtered", "post", 230, 4, 1, 17
 COLUMNS = ["variant", "stage", "level", "road", "other", "worst_frame"]
 
 
-def findings(**quoted):
+def findings(behind=None, **quoted):
     made = some_findings(
+        behind=behind or {},
         levels=rows_of(pd.DataFrame(LEVELS, columns=COLUMNS)),
         overlap={"filtered": {"post": {"F1": 0.81, "precision": 0.82, "IoU": 0.7}}},
         curves={"filtered": {"post": QUOTED | quoted}},
@@ -70,7 +69,7 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
 
 
 def test_behind_a_mask_are_its_worst_frames_and_behind_a_threshold_the_worst_one():
-    found = replace(findings(), behind={("filtered", "post", "ERR"): [7, 3]})
+    found = findings({("filtered", "post", "ERR"): [7, 3]})
     (figure,) = (block for block in opened(thresholds(found)) if isinstance(block, Figure))
     recall, roc, reliability = figure.charts
     for chart in (recall, roc):

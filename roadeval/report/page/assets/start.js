@@ -74,7 +74,7 @@ for (const button of document.querySelectorAll(".opens")) {
     button.after(told);
   });
 }
-for (const image of document.querySelectorAll(".grid img, figure.picture img, section > .strip img")) {
+for (const image of document.querySelectorAll(".grid img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }
 // What was closed had no width to fit a chart's numbers into.
