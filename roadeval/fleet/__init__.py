@@ -9,7 +9,7 @@ from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.fleet.entry import DriveEntry, FleetError, shown
-    from roadeval.fleet.remote import readable, staged, stamp
+    from roadeval.fleet.remote import readable, stamp
     from roadeval.fleet.sources import find_drives
 
 if not TYPE_CHECKING:  # there every name is known

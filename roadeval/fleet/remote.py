@@ -1,4 +1,4 @@
-"""Drives in object stores and on web servers: listed, copied, and checked for changes.
+"""Drives in object stores and on web servers: listed, read by parts, and checked for changes.
 
 obstore reads them. For ``s3://`` and ``gs://`` it takes credentials, endpoint and region from the
 environment, as ``AWS_ACCESS_KEY_ID``, ``AWS_ENDPOINT_URL``, ``AWS_ALLOW_HTTP`` for an endpoint
@@ -13,17 +13,14 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, wait
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from http import HTTPStatus
 from os import PathLike
 from pathlib import Path, PurePosixPath
-from tempfile import TemporaryDirectory
 from threading import Thread
 from typing import IO, Any, Final, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
@@ -60,10 +57,8 @@ _PART: Final = 64 << 10
 """Least bytes of a part that is read: a chunk's message indexes, and the next one's head."""
 _PATIENCE_S: Final = 0.2
 """Between two looks whether an answer has come."""
-_BLOCK: Final = 4 << 20
-"""Bytes that are in memory at once."""
 _NAME: Final = 100
-"""Letters of a name that a copy keeps."""
+"""Letters of a file's name that are kept."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
 _REASONS: Final = (
     (r"dns error", "no host of this name is known"),
@@ -82,32 +77,6 @@ _STATUSES: Final = {
     404: "there is no such file",
     412: "it changed while it was read",
 }
-
-
-@contextmanager
-def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
-    """Yield a drive as a file or folder of this machine.
-
-    A URL is copied into a folder of its own, which is removed when the block ends. A URL that ends
-    in ``/`` is a rosbag2 folder. Copies are made in ``folder``, by default the system's for
-    temporary files. A `FleetError` if it cannot be read, its copy is not whole, or the disk is
-    full.
-    """
-    if not is_url(source) or scheme_of(source) == "file":
-        yield file_of(source) if is_url(source) else Path(source)
-        return
-    try:
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-        stage = TemporaryDirectory(prefix="roadeval-", dir=folder, ignore_cleanup_errors=True)
-    except OSError as error:
-        raise FleetError(_no_copy(source, error)) from error
-    with stage as name:
-        try:
-            copy = _copy(source, Path(name))
-        except OSError as error:
-            raise FleetError(_no_copy(source, error)) from error
-        yield copy
 
 
 def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
@@ -265,47 +234,12 @@ def _facts(place: _Place) -> tuple[int, str | None]:
     return meta["size"], meta["e_tag"]
 
 
-def _copy(url: str, stage: Path) -> Path:
-    target = stage / _file_name(url)
-    if not url.endswith("/"):
-        _copy_file(url, target)
-        return target
-    target.mkdir()
-    for file in _files(url):
-        _copy_file(file, target / _file_name(file))
-    return target
-
-
-def _copy_file(url: str, target: Path) -> None:
-    import obstore
-
-    place, arrived = _place(url), 0
-    result = place.ask(obstore.get, place.store, place.key)
-    size, free = result.meta["size"], shutil.disk_usage(target.parent).free
-    if size > free:
-        raise FleetError(
-            f"{shown(url)}: no copy of its {size >> 20} MiB fits in {target.parent}, where "
-            f"{free >> 20} MiB are free; TMPDIR names another folder"
-        )
-    blocks = iter(result.stream(_BLOCK))
-    with target.open("wb") as file:
-        while block := place.ask(next, blocks, b""):
-            arrived += file.write(block)
-    if arrived != size:
-        raise FleetError(f"{shown(url)}: ended early, after {arrived} of {size} bytes")
-
-
 def _file_name(url: str) -> str:
-    """Return the name of a copy: as in the URL, as far as every system allows it."""
+    """Return the name of a file: as in the URL, as far as every system allows it."""
     name = re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|]', "_", last_part(url))
     stem, dot, suffix = name.rpartition(".")
     short = f"{stem[:_NAME]}{dot}{suffix[:_NAME]}" if stem else name[:_NAME]
     return short if short.strip(".") else "drive"
-
-
-def _no_copy(url: str, error: OSError) -> str:
-    at = f" {error.filename}" if error.filename else ""
-    return f"{shown(url)}: cannot be copied to this machine:{at}: {error.strerror or error}"
 
 
 def _place(url: str) -> _Place:

@@ -7,6 +7,7 @@ does, too: ``/bucket/key`` is an object of its bucket.
 from __future__ import annotations
 
 import hashlib
+import re
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
@@ -14,8 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 CONTENT = bytes(range(256)) * 40_000
-"""Ten megabytes: several blocks of a stream."""
-HALF = len(CONTENT) // 2
+"""Ten megabytes."""
 SLOW = 5.0
 """Seconds for which a server stalls."""
 
@@ -52,30 +52,23 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = length is None
 
     def _content(self, kind: str, *, body: bool) -> None:
-        start = self._start(kind)
         headers = {
             "ETag": f'"{hashlib.md5(CONTENT).hexdigest()}"',
             "Last-Modified": "Wed, 21 Oct 2015 07:28:00 GMT",
         }
-        if start:
-            headers["Content-Range"] = f"bytes {start}-{len(CONTENT) - 1}/{len(CONTENT)}"
-        self._head(206 if start else 200, len(CONTENT) - start, **headers)
-        if body:
-            self._send(kind, start)
-
-    def _start(self, kind: str) -> int:
-        """Return where a stream goes on that broke; only some servers can do that."""
-        asked = self.headers.get("Range", "bytes=0-").removeprefix("bytes=")
-        return int(asked.partition("-")[0]) if kind == "resumed" else 0
-
-    def _send(self, kind: str, start: int) -> None:
-        if kind in ("early", "stalled", "resumed") and not start:
+        begin, end, size = 0, len(CONTENT), len(CONTENT)
+        asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        if asked is not None and kind != "early":
+            begin, end = int(asked[1]), int(asked[2]) + 1
+            headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
+        self._head(206 if "Content-Range" in headers else 200, end - begin, **headers)
+        if body and kind in ("early", "stalled", "resumed") and not begin:
             self.close_connection = True
-            self.wfile.write(CONTENT[:HALF])
+            self.wfile.write(CONTENT[: end // 2])
             self.wfile.flush()
             time.sleep(SLOW if kind == "stalled" else 0)
-        else:
-            self.wfile.write(CONTENT[start:])
+        elif body:
+            self.wfile.write(CONTENT[begin:end])
 
     def log_message(self, *_: Any) -> None:
         """Stay silent."""

@@ -25,7 +25,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import Light, final_stages, light_of
 from roadeval.fleet.entry import DriveEntry, FleetError
-from roadeval.fleet.remote import staged, stamp
+from roadeval.fleet.remote import readable, stamp
 from roadeval.jobs.run.prepared import asked, content_of, software
 from roadeval.jobs.run.replay import replay
 from roadeval.logs import METADATA
@@ -232,15 +232,14 @@ def _made(task: DriveTask) -> tuple[Record, bool]:
     before, earlier = seen(task.entry, task.config), _usable(task)
     attempts(task).write_text(str(_begun(task) + 1))
     try:
-        with staged(task.entry.source) as path:
-            if (
-                earlier is not None
-                and not earlier.failed
-                and (earlier.stamp or {}).get(METADATA) == (before or {}).get(METADATA)
-                and content_of(path, task.config, task.model) == earlier.value("identity")
-            ):
-                return replace(earlier, stamp=before), True
-            return _replayed(task, path, before), False
+        if (
+            earlier is not None
+            and not earlier.failed
+            and (earlier.stamp or {}).get(METADATA) == (before or {}).get(METADATA)
+            and content_of(task.entry.source, task.config, task.model) == earlier.value("identity")
+        ):
+            return replace(earlier, stamp=before), True
+        return _replayed(task, before), False
     except Exception as error:
         if _disk_failure(error):
             raise
@@ -250,7 +249,7 @@ def _made(task: DriveTask) -> tuple[Record, bool]:
         return failed(task, reason, 1 if known else 70), False
 
 
-def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> Record:
+def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
     memory.forget_peak()
     started = time.perf_counter()
     drive, folder = task.entry.id, task.folder
@@ -263,7 +262,7 @@ def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> 
     )
     own_config = replace(task.config, drives=(), output=output, run=ExecutionSettings(jobs=1))
     with FrameGatherer(folder, drive) as gatherer:
-        outcome = replay(path, own_config, on_frame=gatherer.add)
+        outcome = replay(task.entry.source, own_config, on_frame=gatherer.add)
         _remove(task, PICTURES, *(() if task.recorded else (RECORDINGS,)))
         gatherer.finish()
     if not outcome.facts.frames.evaluated:
@@ -278,9 +277,7 @@ def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> 
             "identity": asked(
                 task.config, task.model, of=outcome.facts.log_digest or "", masks=masks
             ),
-            "size_bytes": sum(
-                each.stat().st_size for each in ([path] if path.is_file() else path.iterdir())
-            ),
+            "size_bytes": _size_of(task.entry),
             "attempts": _begun(task),
             "seconds": time.perf_counter() - started,
             "peak_memory_mib": memory.peak_mib(),
@@ -290,6 +287,14 @@ def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> 
     key = Key(drive, outcome.facts.drive.camera)
     rows = {table: cells(table, key, each) for table, each in own.items()}
     return Record(drive, task.asked, before, rows)
+
+
+def _size_of(entry: DriveEntry) -> int:
+    """Return the bytes of a drive's files."""
+    if entry.path is None:
+        return sum(size for size, _ in stamp(entry.source).values())
+    files = entry.path.iterdir() if entry.path.is_dir() else [entry.path]
+    return sum(each.stat().st_size for each in files)
 
 
 def _remove(task: DriveTask, *folders: str) -> None:
@@ -455,7 +460,7 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
 
 def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[Frame]:
     """Decode the training frames of a drive, and hold them as long as there is room."""
-    with staged(entry.source) as path, logs.open_log(path, replace(own, masks={})) as log:
+    with logs.open_log(readable(entry.source), replace(own, masks={})) as log:
         selection = log.select()
         if selection.truth is None:
             return

@@ -12,7 +12,6 @@ from typing import Final
 from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import is_url, shown
-from roadeval.fleet.remote import staged
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import model_path
 from roadeval.jobs.run.replay import replay
@@ -88,11 +87,11 @@ def _replayed(
     The fleet's results stay as they are.
     """
     record = FEWEST if config.output.record == "none" else config.output.record
-    with tempfile.TemporaryDirectory(prefix="roadeval-") as reports, staged(source) as path:
+    with tempfile.TemporaryDirectory(prefix="roadeval-") as reports:
         output = OutputSettings(
             save=str(recording), reports=str(Path(reports, "reports")), record=record, figures=False
         )
-        made = replay(path, replace(config, output=output), on_progress=on_progress)
+        made = replay(source, replace(config, output=output), on_progress=on_progress)
         return made.facts.log_digest
 
 
