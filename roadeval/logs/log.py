@@ -327,7 +327,8 @@ class LogDescription:
     problem: str
     """Why a replay could not pick, or empty."""
     oddities: tuple[str, ...]
-    """Several sizes and repetitions of the images that a replay would pick, a sentence each."""
+    """Several sizes and repetitions of the images that a replay would pick, a sentence each; of a
+    log that was read whole."""
     damage: tuple[str, ...]
     losses: tuple[str, ...]
     """The damage of the files, and the losses by it, a sentence each."""
@@ -360,14 +361,14 @@ def describe(
         picks: tuple[str, ...] = ()
         oddities: tuple[str, ...] = ()
         problem = ""
+        verified = verify or log.size <= SMALL
         try:
             selection = log.select()
-            images = selection.camera.images
-            odd = survey(images, selection.image.size)
-            picks, oddities = selection.reasons, tuple(f"{images.name}: {each}" for each in odd)
+            picks, images = selection.reasons, selection.camera.images
+            odd = survey(images, selection.image.size) if verified else ()
+            oddities = tuple(f"{images.name}: {each}" for each in odd)
         except LogError as error:
             problem = str(error)
-        verified = verify or log.size <= SMALL
         sha256 = log.verify(on_bytes) if verified else None
         return LogDescription(
             path=log.source,

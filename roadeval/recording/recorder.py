@@ -12,7 +12,7 @@ import math
 import os
 import shutil
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
@@ -61,6 +61,11 @@ class EncodedFrame:
     """Sentences, each with its level."""
     worst_error: float = -1.0
     """By what frames are ranked, see `worst_error`."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of its images."""
+        return sum(map(len, self.payloads.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,78 +172,39 @@ def worst_error(result: FrameResult, layout: Layout) -> float:
 
 
 class WorstFrames:
-    """The images of the frames with the highest ERR, one file a frame, in a folder of its own.
+    """The images of the frames with the highest ERR, at most ``most`` and those that fit in `HELD`.
 
-    The folder is made for the first frame, and holds at most ``most`` of them.
+    They are held as they are written, until the last frame is known.
     """
 
-    def __init__(self, folder: Path, most: int) -> None:
-        self._folder: Final = folder
+    def __init__(self, most: int) -> None:
         self._most: Final = most
-        self._heap: list[tuple[float, int, str]] = []
-        """ERR, minus the number and the camera of each frame, the least first."""
-        self._sizes: Final[dict[tuple[int, str], tuple[EncodedFrame, dict[str, int]]]] = {}
-        """By number and camera: the frame without images, texts and numbers, and its images'
-        sizes."""
-
-    @property
-    def least(self) -> float:
+        self._bytes = 0
+        self._heap: list[tuple[float, int, str, EncodedFrame]] = []
+        """ERR, minus the number, and the camera of each frame, the least first; and the frame with
+        its images alone."""
+        self.least = 0.0
         """The least ERR that can still be among the worst; for any thread."""
-        heap = self._heap
-        return heap[0][0] if len(heap) == self._most else 0.0
 
     def offer(self, encoded: EncodedFrame) -> None:
-        """Keep a frame's images if they are among the worst; of equals the earlier ones.
-
-        A `RecordingError` if they cannot be written.
-        """
+        """Keep a frame's images if they are among the worst; of equals the earlier ones."""
         number, camera = encoded.when[0], encoded.camera
-        with self._explained():
-            self._folder.mkdir(exist_ok=True)
-            self._file(number, camera).write_bytes(b"".join(encoded.payloads.values()))
-        sizes = {path: len(payload) for path, payload in encoded.payloads.items()}
-        self._sizes[number, camera] = EncodedFrame(encoded.when, {}, camera), sizes
-        heapq.heappush(self._heap, (encoded.worst_error, -number, camera))
-        if len(self._heap) > self._most:
-            _, minus, camera = heapq.heappop(self._heap)
-            del self._sizes[-minus, camera]
-            with self._explained():
-                self._file(-minus, camera).unlink()
+        bare = EncodedFrame(encoded.when, encoded.payloads, camera)
+        heapq.heappush(self._heap, (encoded.worst_error, -number, camera, bare))
+        self._bytes += bare.size
+        while len(self._heap) > self._most or self._bytes > HELD:
+            self._bytes -= heapq.heappop(self._heap)[-1].size
+            self.least = self._heap[0][0] if self._heap else 0.0
 
     def take(self) -> Iterator[EncodedFrame]:
         """Yield the frames in order, with their images alone, and forget each.
 
-        After an interrupt it can be called again. A `RecordingError` if they cannot be read.
+        After an interrupt it can be called again.
         """
-        # Not in place: a worker thread may look at the heap.
-        self._heap = sorted(self._heap, key=itemgetter(1))
+        self._heap.sort(key=itemgetter(1))
         while self._heap:
-            _, minus, camera = self._heap[-1]
-            encoded = self._read(-minus, camera)
+            yield self._heap[-1][-1]
             self._heap.pop()
-            yield encoded
-
-    def _read(self, number: int, camera: str) -> EncodedFrame:
-        bare, sizes = self._sizes[number, camera]
-        with self._explained(), self._file(number, camera).open("rb") as file:
-            return replace(bare, payloads={path: file.read(size) for path, size in sizes.items()})
-
-    def clear(self) -> None:
-        """Remove the folder, as far as that is possible."""
-        shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _file(self, number: int, camera: str) -> Path:
-        return self._folder / f"{number}{camera.replace('/', '-')}"
-
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise RecordingError(
-                f"{self._folder}: the images put aside cannot be written or read ({error}); "
-                "is the disk full?"
-            ) from error
 
 
 ALL: Final = RecordRule()
@@ -253,6 +219,8 @@ LEAST_FREE: Final = 64 << 20
 """Bytes that must stay free on the disk beside what waits. Checked before each chunk but the last,
 for which it is meant: the partial recording then ends whole."""
 
+HELD: Final = 256 << 20
+"""Bytes of images of the worst frames that are held until the end."""
 WORTH_SAYING: Final = 100_000_000
 """Bytes of a recording whose expected size is said."""
 
@@ -267,8 +235,8 @@ class Recorder:
     A context manager: after `finish` the recording takes its name at the end. Left by an exception
     it closes the partial recording, which stays readable. ``path`` is the name of the complete
     recording: a file of that name is replaced at the end only. ``rule`` says which images are kept,
-    any but ``none``; those of ``worst:K`` wait on disk until the end. Of a rig there is a layout
-    for each camera, by its name.
+    any but ``none``; those of ``worst:K`` wait until the end. Of a rig there is a layout for each
+    camera, by its name.
     """
 
     def __init__(
@@ -298,8 +266,7 @@ class Recorder:
         self._pictured: dict[str, list[tuple[int, int]]] = {}
         self._blank: dict[str, EncodedFrame] = {}
         self._stream: rr.RecordingStream | None = None
-        images = self.partial.with_name(f"{self.partial.name}-images")
-        self._worst = WorstFrames(images, rule.number)
+        self._worst = WorstFrames(rule.number)
 
     def __enter__(self) -> Self:
         """Open the partial file; a `RecordingError` if it cannot be written."""
@@ -341,7 +308,6 @@ class Recorder:
                 error = failed
                 raise
         finally:
-            self._worst.clear()
             if error is not None and self.partial.exists():
                 error.add_note(f"the partial recording is {self.partial}")
 
@@ -386,7 +352,6 @@ class Recorder:
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
         if put_aside:
-            self.check_disk_space()
             self._worst.offer(encoded)
 
     def forecast(self, encoded: EncodedFrame, frames: int) -> str:
@@ -401,7 +366,10 @@ class Recorder:
             RuleKind.WORST: min(self._rule.number, frames),
             RuleKind.EVERY: math.ceil(frames / max(self._rule.number, 1)),
         }.get(self._rule.kind, frames)
-        size, disk = shown * sum(map(len, encoded.payloads.values())), self._disk()
+        size, disk = shown * encoded.size, self._disk()
+        if self._rule.kind is RuleKind.WORST and size > HELD:
+            kept = f"{HELD >> 20} MiB of memory, about {HELD // encoded.size}"
+            return f"`output.record` worst:{self._rule.number} keeps those that fit in {kept}"
         said = f"the recording will take about {size / 1e6:.0f} MB"
         if disk.total and size > disk.free - LEAST_FREE:
             return (

@@ -146,11 +146,7 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
     tabs.append(rrb.Vertical(*map(stage_times, layout.variants), name="Timing"))
     if layout.ground:
         tabs.insert(1, _on_the_ground(layout, layout.ground))
-    results = (
-        (at.OVERVIEW, "Results"),
-        ("windows", "Windows (CSV)"),
-        (at.SUMMARY, "Summary (JSON)"),
-    )
+    results = ("windows", "Windows (CSV)"), (at.SUMMARY, "Summary (JSON)")
     texts = (document(at.result_path(name), title) for name, title in results)
     tabs.append(rrb.Horizontal(*texts, name="Results"))
     return tabs
@@ -385,10 +381,6 @@ image.
 _NO_TRUTH: Final = """\
 The log has no truth for the road: there is nothing to score, only what was computed.
 """
-_RATES: Final = "In percent: means of the frames' rates; *pooled*: of all pixels."
-_SHOWN: Final = {name: name for name in SHORT} | {"pooled_ERR": "pooled ERR"}
-_OF_CURVES: Final = {name: name for name in ("AP", "AUC", "MaxF", "threshold", "ECE")}
-_QUOTED: Final = "In percent, of all pixels; the threshold is the one of MaxF."
 _HANDLING: Final = """\
 **Space** plays. The tabs above hold every layer, every number and the results.
 """
@@ -537,7 +529,6 @@ def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData
     for variant in layout.variants:
         final = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
         yield at.guide_path(variant.name), [_markdown(_header(variant, final))]
-    yield at.result_path(at.OVERVIEW), [_markdown(results_in_words(layout, summary))]
     yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
     kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
     for name, text in {**texts, **kept}.items():
@@ -572,47 +563,3 @@ def _header(variant: VariantLayout, rates: Mapping[str, Any] | None = None) -> s
     parts = [f"**{as_markdown(variant.name)}**", as_markdown(variant.title)]
     parts += [f"{name} {percent(rates[name])} %" for name in SHORT if rates and name in rates]
     return "\n\n".join(parts) + "\n"
-
-
-def results_in_words(layout: Layout, summary: Mapping[str, Any]) -> str:
-    """Return the results for people, from the content of ``summary.json``."""
-    return "\n".join(
-        [
-            f"# {as_markdown(layout.drive)}",
-            *("", as_markdown(str(summary.get("verdict", "")))),
-            *_list("Warnings", summary.get("warnings", ())),
-            *_list("Lost", summary.get("losses", ())),
-            *_table("Rates", _RATES, _SHOWN, summary.get("totals", {})),
-            *_table("Over thresholds", _QUOTED, _OF_CURVES, summary.get("curves", {})),
-            *_list("Frames", _accounts(summary.get("frames", {}))),
-            *_list("Provenance", (f"{k}: {v}" for k, v in layout.properties.items())),
-            "",
-        ]
-    )
-
-
-def _table(
-    title: str, note: str, columns: Mapping[str, str], found: Mapping[str, Any]
-) -> Iterator[str]:
-    """Yield a table in percent, a row a variant and stage; nothing without rows."""
-    if found:
-        yield from ("", f"## {title}", "", note, "")
-        yield f"| variant | stage | {' | '.join(columns.values())} |"
-        yield f"|---|---|{'---|' * len(columns)}"
-    for variant, stages in found.items():
-        for stage, own in stages.items():
-            cells = " | ".join(percent(own.get(name)) for name in columns)
-            yield f"| {as_markdown(variant)} | {stage} | {cells} |"
-
-
-def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
-    for name, count in frames.items():
-        if isinstance(count, Mapping):
-            yield from (f"{name}, {reason}: {n}" for reason, n in count.items())
-        else:
-            yield f"{name}: {count}".replace("_", " ")
-
-
-def _list(title: str, items: Iterable[Any]) -> list[str]:
-    lines = [f"- {as_markdown(item)}" for item in items]
-    return ["", f"## {title}", "", *lines] if lines else []

@@ -245,13 +245,13 @@ def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
 def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
     tmp_path, monkeypatch, rule, shown
 ):
-    for free, said in ((10**12, ""), (10**9, ", and only 1000 MB are free: `output.record` masks")):
+    for free, said in ((10**12, ""), (10**8, ", and only 100 MB are free: `output.record` masks")):
         with Recorder(tmp_path / "out.rrd", layout(), RecordRule.parse(rule)) as recorder:
             leave_free(monkeypatch, free)
             first = recorder.encode(result(0), 0)
             assert recorder.forecast(replace(first, payloads={}), 1000) == ""
-            large = replace(first, payloads={"/camera": bytes(24_000_000)})
-            expected = f"the recording will take about {24 * shown} MB{said}"
+            large = replace(first, payloads={"/camera": bytes(5_000_000)})
+            expected = f"the recording will take about {5 * shown} MB{said}"
             assert recorder.forecast(large, 1000).startswith(expected)
             assert recorder.forecast(large, 1000) == ""
             leave_free(monkeypatch, 10**12)

@@ -1,6 +1,5 @@
 """Which frames' images are kept by a rule, whatever ends the run."""
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 from roadeval.data import Doubt
 from roadeval.recording import EncodedFrame, Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording import recorder as recorder_module
 from roadeval.recording.recorder import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
 from tests.results.making import lines
@@ -71,16 +71,6 @@ def test_flushed_pictures_are_the_worst(tmp_path):
     assert list(Recording(recorder.path).frame_numbers) == [1, 3]
 
 
-def test_images_wait_in_a_folder_that_is_gone_at_the_end(tmp_path):
-    with selective(tmp_path / "out.rrd", "worst:3") as recorder:
-        partial = recorder.partial.name
-        assert names(tmp_path) == [partial]
-        write(recorder)
-        assert names(tmp_path) == [partial, f"{partial}-images"]
-        recorder.finish(RESULTS)
-    assert names(tmp_path) == ["out.rrd"]
-
-
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit, ValueError])
 def test_a_run_that_is_stopped_keeps_the_worst_so_far(stop, tmp_path):
     def stopped(recorder):
@@ -98,12 +88,11 @@ def test_a_run_that_is_stopped_keeps_the_worst_so_far(stop, tmp_path):
 
 
 @pytest.mark.parametrize("at", [1, 2, 3])
-@pytest.mark.parametrize("owner", [(WorstFrames, "_read"), (Recorder, "_end_frame")])
 def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
-    owner, at, tmp_path, monkeypatch
+    at, tmp_path, monkeypatch
 ):
     calls = []
-    usual = getattr(*owner)
+    usual = Recorder._end_frame
 
     def interrupted(*given):
         calls.append(given)
@@ -114,7 +103,7 @@ def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
     def stopped(recorder):
         with recorder:
             write(recorder)
-            monkeypatch.setattr(*owner, interrupted)
+            monkeypatch.setattr(Recorder, "_end_frame", interrupted)
             recorder.finish(RESULTS)
 
     recorder = selective(tmp_path / "out.rrd", "worst:3")
@@ -127,34 +116,20 @@ def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
     assert shown == {1: 1, 2: 0, 3: 1, 4: 0, 5: 1, 6: 0}
 
 
-def test_a_name_that_is_too_long_for_the_folder_alone_will_do_where_no_image_waits(tmp_path):
-    path = tmp_path / f"{232 * 'a'}.rrd"
-    assert keep(path, "all").complete
-
-
-def test_memory_holds_few_pictures_however_many_are_kept(tmp_path):
-    size, count = 1 << 20, 40
+def test_no_more_is_held_than_there_is_room_for_and_the_run_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorder_module, "HELD", 3 << 20)
     with selective(tmp_path / "out.rrd", "worst:40") as recorder:
         plain = recorder.encode(result(0), 0)
-        tracemalloc.start()
-        for number in range(count):
-            large = {path: payload.ljust(size, b"0") for path, payload in plain.payloads.items()}
-            recorder.write(replace(plain, when=(number,) * 3, payloads=large))
-        del large
-        held, _ = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-    assert held < 2 * size * len(plain.payloads)
-
-
-def test_frames_that_are_dropped_take_no_room(tmp_path):
-    with selective(tmp_path / "out.rrd", "worst:2") as recorder:
-        plain = recorder.encode(result(0), 0)
-        for number in range(50):
-            large = {"/camera": bytes(1 << 20)}
-            recorder.write(
-                replace(plain, when=(number,) * 3, payloads=large, worst_error=number / 50)
+        for number, err in enumerate([0.1, 0.5, 0.3, 0.5, 0.2, 0.4]):
+            payloads = {"/camera": b"0" * (1 << 20)}
+            each = replace(plain, when=(number,) * 3, payloads=payloads, worst_error=err)
+            said = recorder.forecast(each, 6)
+            assert said.endswith("worst:40 keeps those that fit in 3 MiB of memory, about 3") or (
+                number and not said
             )
-        assert len(names(tmp_path / f"{recorder.partial.name}-images")) == 2
+            recorder.write(each)
+        recorder.finish(RESULTS)
+    assert Recording(recorder.path).frame_numbers == (1, 3, 5)
 
 
 def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp_path, monkeypatch):
@@ -174,38 +149,12 @@ def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp
 
 
 PAYLOADS = {"/camera": b"jpeg", "/filtered/post": b""}
-ONE_LINE = r"^.*/images: the images put aside cannot be written or read \(.*\); is the disk full\?$"
 
 
-@pytest.fixture
-def worst(tmp_path):
-    return WorstFrames(tmp_path / "images", 1)
-
-
-def test_a_frame_comes_back_with_its_images_alone(worst):
+def test_a_frame_comes_back_with_its_images_alone():
+    worst = WorstFrames(1)
     worst.offer(EncodedFrame((7, 70, 70), PAYLOADS, scalars={"/metrics": 0.5}))
     (back,) = worst.take()
     assert (back.when, back.payloads) == ((7, 70, 70), PAYLOADS)
     assert list(back.payloads) == list(PAYLOADS)
     assert not back.scalars
-
-
-def test_nothing_is_left_when_it_is_cleared(worst, tmp_path):
-    worst.clear()
-    for number in (1, 2):
-        worst.offer(EncodedFrame((number,) * 3, PAYLOADS, worst_error=number))
-    assert [path.name for path in (tmp_path / "images").iterdir()] == ["2"]
-    worst.clear()
-    assert not list(tmp_path.iterdir())
-
-
-def test_images_that_were_lost_are_one_line(worst, tmp_path):
-    worst.offer(EncodedFrame((7, 70, 70), PAYLOADS))
-    (tmp_path / "images" / "7").unlink()
-    with pytest.raises(RecordingError, match=ONE_LINE):
-        list(worst.take())
-
-
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
-    with pytest.raises(RecordingError, match=ONE_LINE):
-        WorstFrames(tmp_path / "missing" / "images", 1).offer(EncodedFrame((7, 70, 70), PAYLOADS))

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from roadeval.logs import FrameSettings, LabelSettings, LogConfig, describe, open_log
+import pytest
+
+from roadeval.logs import FrameSettings, LabelSettings, LogConfig, describe, log, open_log
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 
 SIZES = [(8, 6)] * 3 + [(16, 12)] * 2 + [(4, 3)]
@@ -23,8 +25,8 @@ def repeated(path: Path, *, apart: int = 0) -> Path:
 
 def oddities(path: Path, **asked: int) -> tuple[str, ...]:
     """Return what is told after all frames were read."""
-    with open_log(path, LogConfig(frames=FrameSettings(**asked))) as log:
-        stream = log.frames(log.select())
+    with open_log(path, LogConfig(frames=FrameSettings(**asked))) as opened:
+        stream = opened.frames(opened.select())
         for frame in stream:
             frame.decode()
         return stream.oddities
@@ -44,6 +46,15 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path) ->
         told = "3 of the 7 images repeat an earlier one, by stamp and content"
         assert oddities(path)[0].startswith(told)
         assert describe(path).oddities[0].startswith(f"/camera: {told}")
+
+
+def test_of_a_large_log_they_are_told_only_where_it_was_read_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = repeated(tmp_path / "large.mcap")
+    monkeypatch.setattr(log, "SMALL", 0)
+    assert describe(path).oddities == ()
+    assert len(describe(path, verify=True).oddities) == 1
 
 
 def test_an_ordinary_log_has_no_oddities(tmp_path: Path) -> None:
