@@ -1,8 +1,10 @@
-"""What picked labels are worth: ``python -m benchmarks.picking --drives FOLDER``.
+"""What picked labels are worth: ``python -m benchmarks.picking --drives FOLDER --idd FOLDER``.
 
 The truth of drives is held back, frames are picked as `roadeval pick` does, and the number for the
 whole drive is held against the true one, 200 times with another draw. The table is that of
-``docs/how-to/pick.md``. ``FOLDER`` holds the two drives of CamVid; synthetic drives are rendered.
+``docs/how-to/pick.md``. ``--drives`` holds the two drives of CamVid, ``--idd`` is ``idd20k_lite``,
+of whose train part half of the drives teach, and the frames of the others are taken as one drive;
+synthetic drives are rendered.
 """
 
 from __future__ import annotations
@@ -19,13 +21,20 @@ import numpy.typing as npt
 import pandas as pd
 
 import roadeval
+from benchmarks.tables import idd
 from benchmarks.world import RenderSettings, write_drive
+from roadeval.data import IGNORE, ROAD
 from roadeval.evaluation.score import chosen
+from roadeval.evaluation.score.unlabelled import entropy
 from roadeval.evaluation.stats import Estimate, draw_order, estimate
+from roadeval.pipeline.stage import View
+from roadeval.training import fit
 
 DRAWS: Final = 200
 LABELS: Final = (10, 20, 50)
 WORST: Final = 10
+SECOND: Final = 1_000_000_000
+"""Nanoseconds between two frames of IDD, whose stamps are not known."""
 SEEDS: Final = (1, 2, 3)
 CAMVID: Final = {
     "camvid_0016E5_15hz": {"labels": {"road": [3], "ignore": [11]}},
@@ -64,6 +73,25 @@ def measured(path: Path, preset: str, tables: dict[str, object]) -> Drive:
     return Drive(f"{path.stem}, {preset} ({sign})", *columns)
 
 
+def of_idd(folder: Path) -> Drive:
+    """Return the frames of one half of IDD Lite's drives, by a model that the other half taught."""
+    config = roadeval.configure({"preset": "robust"})
+    (taught, scored), _ = idd.both_ways(folder)
+    frames = [frame for drive in taught.values() for frame in drive]
+    model = fit(frames, {"it": config.pipeline}, config.training)
+    chain = config.pipeline.bind(model.parameters["it"])
+    found = []
+    for frame in (frame for drive in scored.values() for frame in drive):
+        assert frame.truth is not None
+        outputs = [output for _, output in chain.run(View.of(frame.image))]
+        codes = next(each.probability for each in outputs if each.probability is not None)
+        mask = outputs[-1].mask.pixels()
+        if (known := frame.truth != IGNORE).any():
+            found.append((entropy(codes), np.mean((mask == ROAD)[known] != frame.truth[known])))
+    stamps = np.arange(len(found)) * SECOND
+    return Drive("IDD Lite, robust taught by other drives (entropy)", stamps, *np.array(found).T)
+
+
 def tried(drive: Drive, labels: int) -> dict[str, tuple[float, float, float]]:
     """Return coverage, median width and worst frames found, in percent, by strategy."""
     count, truth = len(drive.errors), drive.errors.mean()
@@ -79,14 +107,15 @@ def tried(drive: Drive, labels: int) -> dict[str, tuple[float, float, float]]:
 
     for seed in range(DRAWS):
         random, ranked = chosen(drive.stamps, drive.scores, labels, seed)
+        random = np.sort(random)
         own = estimate(drive.errors[random], drive.scores[random], drive.scores)
         note("pick", np.union1d(random, ranked), own)
-        drawn = draw_order(count, seed)[:labels]
+        drawn = np.sort(draw_order(count, seed)[:labels])
         note("random", drawn, estimate(drive.errors[drawn], unknown[drawn], unknown))
         start = np.random.default_rng(seed).uniform()
         even = ((np.arange(labels) + start) * count / labels).astype(np.int64)
         note("uniform", even, estimate(drive.errors[even], unknown[even], unknown))
-    doubtful = np.argsort(-drive.scores)[:labels]
+    doubtful = np.sort(np.argsort(-drive.scores)[:labels])
     note("doubtful", doubtful, estimate(drive.errors[doubtful], unknown[doubtful], unknown))
     percent = {name: 100 * np.array(own, float).T for name, own in found.items()}
     return {
@@ -121,11 +150,13 @@ STRATEGIES: Final = ("pick", "random", "uniform", "doubtful")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--drives", type=Path, required=True, metavar="FOLDER")
+    parser.add_argument("--idd", type=Path, required=True, metavar="FOLDER")
     options = parser.parse_args()
     drives = []
     for name, tables in CAMVID.items():
         path = options.drives / f"{name}.mcap"
         drives += [measured(path, preset, tables) for preset in ("robust", "paper")]
+    drives.append(of_idd(options.idd))
     with TemporaryDirectory() as folder:
         for seed in SEEDS:
             path = Path(folder, f"synthetic_{seed}.mcap")

@@ -1,6 +1,7 @@
 """From no truth to a number: pick frames, label them, replay with them, pick on."""
 
 import json
+import shlex
 import shutil
 
 import numpy as np
@@ -8,6 +9,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+import roadeval
 from roadeval import logs
 from roadeval.config import configure
 from roadeval.logs import Picks, Proposal, Why, proposal_files
@@ -31,6 +33,7 @@ def begun(tmp_path_factory):
     assert done.returncode == 0, done.stderr
     assert "10 frames to label: 5 drawn at random of" in done.stdout
     assert "5 most in doubt (by entropy)" in done.stdout
+    assert "roadeval replay street.mcap --config out.rrd --truth to_label" in done.stdout
     return folder
 
 
@@ -194,13 +197,20 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert Picks.read(work / "at_once").stamps_of(Why.RANDOM) == after.stamps_of(Why.RANDOM)
 
 
-def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work):
+def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
     shutil.copy(work / "street.mcap", work / "second.mcap")
     words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 20)
     done = here("pick", "street.mcap", "second.mcap", *words, cwd=work)
     assert done.returncode == 0, done.stderr
     assert {each.name for each in (work / "both").iterdir()} == {"street", "second"}
     assert len(Picks.read(work / "both" / "second").picked) == 3
+    for name in ("street", "second"):
+        label(work / "both" / name, truths)
+    command = shlex.split(done.stdout.rpartition("next")[2])
+    assert here(*command[1:], cwd=work).returncode == 0
+    scored = roadeval.Result(work / "labelled").frames
+    picks = [Picks.read(work / "both" / name) for name in ("street", "second")]
+    assert {*scored.stamp_ns} == picks[0].stamps_of(Why.RANDOM) | picks[1].stamps_of(Why.RANDOM)
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from shlex import join, quote
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import Given, takes
+
+if TYPE_CHECKING:
+    from roadeval.jobs.results.pick import Outcome
 
 
 @takes(
@@ -76,12 +81,20 @@ def pick(
         of = f"{random} drawn at random of {len(each.picks.stamps):,}"
         console.emit(f"{each.folder}: {len(each.added)} frames to label: {of}{doubt}")
     if found and not quiet:
-        first = found[0]
         out = console.results()
-        out.print(f"Correct {first.folder}/proposals, and put the results into labels/.")
-        console.show_next(out, f"roadeval replay {first.log} --truth {first.folder}")
+        out.print(f"Correct {found[0].folder}/proposals, and put the results into labels/.")
+        console.show_next(out, _next(found, output))
     messages.loops_missing()
     return ExitCode.DONE
+
+
+def _next(found: Sequence[Outcome], output: Path) -> str:
+    """Return the command that scores the logs with their labels, in the way they were replayed."""
+    logs, config = join(each.log for each in found), quote(str(found[0].config))
+    if len(found) == 1:
+        return f"roadeval replay {logs} --config {config} --truth {quote(str(output))}"
+    truth = quote(f"{output}/{{drive}}")
+    return f"roadeval fleet {logs} --config {config} --truth {truth} -o labelled"
 
 
 COMMAND: Final = pick

@@ -73,14 +73,17 @@ def estimate(
 
     The drawn frames' mean is moved by how far their mean score is from that of all (a regression
     estimator [1]_, section 7); its variance is that of the residuals, each divided by one minus its
-    leverage as the jackknife does, as of a simple random sample, which is cautious for one that is
-    stratified. With fewer than `REGRESSION_FROM` labels it is the plain mean. The interval is
+    leverage as the jackknife does. The draw is stratified along the drive, so its chance lies in
+    how neighbours among the drawn frames differ ([2]_, section 8.2, v2). The more of all frames are
+    drawn, the less evenly their gaps lie: of the variance of a simple random sample as large a
+    share is added. With fewer than `REGRESSION_FROM` labels it is the plain mean. The interval is
     Student's of the logarithm: error rates are skewed to the right.
 
     Parameters
     ----------
     values
-        ``(m,)``: the rate of the labelled ones among the frames that were drawn at random.
+        ``(m,)``: the rate of the labelled ones among the frames that were drawn at random, in the
+        order of the drive.
     scores, every_score
         ``(m,)`` theirs, and ``(n,)`` those of all frames: any number that was known before, as how
         unsure a mask is. Where one is NaN, none is used.
@@ -88,6 +91,7 @@ def estimate(
     References
     ----------
     .. [1] W. G. Cochran, Sampling Techniques, 3rd edition, 1977.
+    .. [2] K. M. Wolter, Introduction to Variance Estimation, 2nd edition, 2007.
     """
     labels, frames = len(values), len(every_score)
     mean, centred = float(values.mean()), scores - scores.mean()
@@ -103,11 +107,14 @@ def estimate(
             residuals = residuals - slope * centred
             weights = 1 + labels * off * centred / spread
             left = np.maximum(left - centred**2 / spread, LEAST_LEFT)
-    unseen = 1 - labels / frames
+    share = labels / frames
     if labels <= 1:
         return Estimate(mean, None, None, confidence, labels, frames, None)
-    error = math.sqrt(unseen * float(((weights * residuals / left) ** 2).sum())) / labels
-    if not error and unseen:
+    parts = weights * residuals / left
+    along = float((np.diff(parts) ** 2).sum()) / (2 * (labels - 1))
+    simple = float(parts @ parts) / labels
+    error = math.sqrt((1 - share) * (along + share * simple) / labels)
+    if not error and share < 1:
         return Estimate(mean, None, None, confidence, labels, frames, None)
     reach = _student(confidence, labels - fitted) * error / mean if mean else 0.0
     low, high = mean * math.exp(-reach), min(mean * math.exp(min(reach, 700.0)), 1.0)

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.config import RunConfig
+from roadeval.config import RunConfig, run_toml
 from roadeval.data import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
@@ -24,7 +24,9 @@ from roadeval.logs import Picked, Picks, Proposal, Why, digest_of, proposal_file
 from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, as_read
 from roadeval.results.facts import is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
+from roadeval.results.folder import RUN
 from roadeval.runtime.files import AnyPath, put, writing
+from roadeval.version import VERSION
 
 PNG: Final = "png"
 """The format of masks as images, 255 where there is road."""
@@ -41,6 +43,8 @@ class Outcome:
     """Frames to label that this command has added."""
     log: str
     """Where the log lies."""
+    config: Path
+    """What repeats its replay: the recording, or the configuration of a log replayed here."""
 
     @property
     def added(self) -> list[Picked]:
@@ -90,26 +94,27 @@ def pick(
 
     given = [source] if isinstance(source, str | PathLike) else [*source]
     with TemporaryDirectory(prefix="roadeval-") as place:
-        drives = []
+        drives, config = [], config or RunConfig()
+        masks = config.override({"output": {"record": "masks", "figures": False}})
         for number, each in enumerate(part for one in given for part in _parts(Path(one))):
-            made = each
+            made, run = each, None
             if each.suffix != ".rrd":
-                made = Path(place, f"{number}.rrd")
-                output = {"record": "masks", "figures": False}
-                own = (config or RunConfig()).override({"output": output})
+                made, run = Path(place, f"{number}.rrd"), run_toml(config, each.name, VERSION)
                 own_reports = Path(place, "reports")
-                replay(each, own, save=made, reports=own_reports, on_progress=on_progress)
-            drives.append(_drive(made))
+                replay(each, masks, save=made, reports=own_reports, on_progress=on_progress)
+            drives.append((_drive(made), run))
         if not drives:
             raise RoadevalError(f"{given[0]}: no recording was kept; replay it with --keep all")
         many = len(drives) > 1
-        names = [drive.name for drive in drives]
+        names = [drive.name for drive, _ in drives]
         if len({*names}) < len(names):
             raise RoadevalError("two drives have the same name; pick from each into its own folder")
-        shares = _shares([len(drive.table("unlabelled")) for drive in drives], count)
+        shares = _shares([len(drive.table("unlabelled")) for drive, _ in drives], count)
         return [
-            _picked(drive, _Wanted(own, Path(folder, *[drive.name] * many), labels, variant, seed))
-            for drive, own in zip(drives, shares, strict=True)
+            _picked(
+                drive, _Wanted(own, Path(folder, *[drive.name] * many), labels, variant, seed, run)
+            )
+            for (drive, run), own in zip(drives, shares, strict=True)
             if own
         ]
 
@@ -144,6 +149,8 @@ class _Wanted:
     labels: str
     variant: str | None
     seed: int
+    run: str | None
+    """What repeats the replay of a log that was replayed here, as TOML."""
 
 
 def _drive(source: Path) -> DriveResult:
@@ -186,7 +193,8 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     picks, new = _with(known, random, ranked, digests)
     _write(drive, picks, [(each, masks[each.frame]) for each in new], wanted)
     log = drive.facts.log
-    return Outcome(wanted.folder, picks, len(new), log.path if log else drive.name)
+    repeats = wanted.folder / RUN if wanted.run else drive.path
+    return Outcome(wanted.folder, picks, len(new), log.path if log else drive.name, repeats)
 
 
 def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Picks:
@@ -228,6 +236,8 @@ def _write(
             path = folder / PROPOSALS / name
             wave = new[0][0].wave if path.exists() else ""
             path.with_name(f"{wave}{name}").write_bytes(content)
+        if wanted.run:
+            put(folder / RUN, wanted.run.encode())
         put(folder / PICK, picks.text().encode())
 
 

@@ -1,9 +1,11 @@
 """Rates of a drive from frames drawn at random: the order of drawing, and the interval."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import statsmodels.api as sm
-from scipy import stats
+from scipy import signal, stats
 
 from roadeval.evaluation.stats import draw_order, estimate
 from roadeval.evaluation.stats.sampling import REGRESSION_FROM
@@ -42,18 +44,44 @@ def a_drive(seed, frames=91, slope=1.0):
     return scores, slope * scores + rng.gamma(1.5, 0.01, frames)
 
 
+def judged(rates, scores, mean_score, frames):
+    """The mean by statsmodels, and its error of HC3 and of neighbours among the labels."""
+    fit = sm.OLS(rates, sm.add_constant(scores)).fit(cov_type="HC3")
+    at = np.array([1, mean_score])
+    simple, share = at @ fit.cov_params() @ at, len(rates) / frames
+    hat = fit.get_influence().hat_matrix_diag
+    parts = fit.model.exog @ fit.normalized_cov_params @ at * fit.resid / (1 - hat)
+    pairs = [(one - other) ** 2 / 2 for one, other in pairwise(parts)]
+    along = np.mean(pairs) * len(rates)
+    return float(fit.predict(at[None])[0]), np.sqrt((1 - share) * (along + share * simple))
+
+
 @pytest.mark.parametrize("labels", [REGRESSION_FROM, 25])
-def test_mean_and_error_are_those_of_statsmodels_with_hc3(labels):
+def test_mean_and_error_are_those_of_statsmodels(labels):
     scores, rates = a_drive(0)
-    drawn = draw_order(91, 1)[:labels]
+    drawn = np.sort(draw_order(91, 1)[:labels])
     found = estimate(rates[drawn], scores[drawn], scores)
-    fit = sm.OLS(rates[drawn], sm.add_constant(scores[drawn])).fit(cov_type="HC3")
-    at = np.array([1, scores.mean()])
-    assert found.mean == pytest.approx(float(fit.predict(at[None])[0]))
-    error = np.sqrt(at @ fit.cov_params() @ at * (1 - labels / 91))
-    reach = stats.t.ppf(0.975, labels - 2) * error / found.mean
-    assert found.low == pytest.approx(found.mean * np.exp(-reach))
-    assert found.high == pytest.approx(found.mean * np.exp(reach))
+    mean, error = judged(rates[drawn], scores[drawn], scores.mean(), 91)
+    assert found.mean == pytest.approx(mean)
+    reach = stats.t.ppf(0.975, labels - 2) * error / mean
+    assert found.low == pytest.approx(mean * np.exp(-reach))
+    assert found.high == pytest.approx(mean * np.exp(reach))
+
+
+def test_neighbours_that_are_alike_narrow_the_interval_which_still_holds():
+    held, widths, simple_widths = 0, [], []
+    for seed in range(100):
+        noise = np.random.default_rng(seed).normal(size=2000)
+        level = signal.lfilter([0.05], [1, -0.995], noise)
+        rates, unknown = 0.03 * np.exp(level - level.mean()), np.full(2000, np.nan)
+        drawn = np.sort(draw_order(2000, seed)[:20])
+        found = estimate(rates[drawn], unknown[drawn], unknown)
+        held += found.low <= rates.mean() <= found.high
+        widths.append(found.high - found.low)
+        error = rates[drawn].std(ddof=1) / np.sqrt(20)
+        simple_widths.append(2 * stats.t.ppf(0.975, 19) * error)
+    assert held >= 93
+    assert np.median(widths) < 0.8 * np.median(simple_widths)
 
 
 def test_few_labels_or_an_unknown_score_give_the_plain_mean():
@@ -69,7 +97,7 @@ def test_the_interval_holds(labels):
     held = 0
     for seed in range(300):
         scores, rates = a_drive(seed)
-        drawn = draw_order(91, seed)[:labels]
+        drawn = np.sort(draw_order(91, seed)[:labels])
         found = estimate(rates[drawn], scores[drawn], scores)
         held += found.low <= rates.mean() <= found.high
     assert held >= 0.93 * 300
@@ -78,7 +106,7 @@ def test_the_interval_holds(labels):
 def test_a_score_that_goes_with_the_rate_narrows_the_interval():
     def width(slope):
         scores, rates = a_drive(5, slope=slope)
-        drawn = draw_order(91, 5)[:20]
+        drawn = np.sort(draw_order(91, 5)[:20])
         found = estimate(rates[drawn], scores[drawn], scores)
         plain = estimate(rates[drawn], scores[drawn], np.full(91, np.nan))
         return (found.high - found.low) / (plain.high - plain.low)
