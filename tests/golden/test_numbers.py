@@ -181,7 +181,7 @@ def flowing(lines: Sequence[str]) -> str:
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_every_frame_is_accounted_for_alike_in_summary_terminal_report_and_guide(run, told, lines):
+def test_every_frame_is_accounted_for_alike_in_summary_terminal_and_report(run, told, lines):
     account = ACCOUNTS[run]
     skipped = {name: n for name, was_skipped, n in accounted(run) if was_skipped and n}
     kept = {name.replace(" ", "_"): account[name] for name in KEPT}
@@ -197,11 +197,6 @@ def test_every_frame_is_accounted_for_alike_in_summary_terminal_report_and_guide
     first = told.out(OUTS[run]).partition("\n\n")[0]
     assert " ".join(first.split()) == f"tiny: {sentence}"
     assert sentence in flowing(lines[run])
-
-    guide = texts.documents(told.folder / f"{run}.rrd")["/results/overview"].splitlines()
-    for name, was_skipped, count in accounted(run):
-        if count or not was_skipped:
-            assert f"- {'skipped, ' if was_skipped else ''}{name}: {count}" in guide
 
 
 def test_what_json_prints_is_the_file_s_text_and_the_recording_s(told):
@@ -506,14 +501,6 @@ def test_the_report_shows_the_worst_the_most_helped_and_the_most_harmed(told, li
 
 
 # --- The recording --------------------------------------------------------------------------------
-
-
-def test_the_guide_s_table_of_rates(told):
-    guide = texts.documents(told.folder / "printed.rrd")["/results/overview"].splitlines()
-    for (variant, stage), total in totals(told.table("frames", "printed")).items():
-        rates = (total[name] for name in ("ERR", "FPR", "FNR", "pooled_ERR"))
-        cells = [percent(rate) for rate in rates]
-        assert f"| {' | '.join([variant, stage, *cells])} |" in guide
 
 
 @pytest.mark.parametrize("run", RUNS)

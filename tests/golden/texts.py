@@ -76,10 +76,10 @@ def by_frame(path: Path, component: str) -> dict[str, list[tuple[int, Any]]]:
 
 
 def words(path: Path) -> str:
-    """What the viewer shows in words: guide, overview, notes, states, the lines' names."""
+    """What the viewer shows in words: guide, notes, states, the lines' names."""
     lines: list[str] = []
     for place, text in sorted(documents(path).items()):
-        if place.startswith(("/results/guide", "/results/overview")):
+        if place.startswith("/results/guide"):
             lines += [f"=== {place}", text]
     lines.append("=== how each line is drawn")
     for place, columns, is_static in sorted(_chunks(path, "recordings"), key=lambda c: c[0]):
