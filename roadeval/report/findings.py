@@ -135,14 +135,6 @@ class Findings:
         return score.by_region(self.table("regions"))
 
     @cached_property
-    def overlap(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
-        """IoU, F1 and precision by variant and stage, pooled."""
-        return {
-            variant: {stage: score.overlap(total) for stage, total in stages.items()}
-            for variant, stages in self.totals.items()
-        }
-
-    @cached_property
     def changes(self) -> Mapping[tuple[str, str], tuple[float, float]]:
         """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
         changes = self.table("changes")

@@ -307,6 +307,11 @@ class Facts(_Document):
         return found
 
     @property
+    def final_effects(self) -> list[Effect]:
+        """Those of final masks."""
+        return [each for each in self.effects if each.final]
+
+    @property
     def log_digest(self) -> str | None:
         """What tells the log from another, where it is known."""
         return self.log.digest if self.log else None
@@ -403,6 +408,28 @@ class FleetFacts(_Document):
     conditions: list[ConditionFacts] = field(default_factory=list)
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
+
+    @property
+    def totals(self) -> Totals:
+        """The rates by variant and final stage."""
+        return {row["variant"]: {row["stage"]: row} for row in self.rates}
+
+    @property
+    def finals(self) -> dict[str, str]:
+        """Each scored variant's final stage."""
+        return {row["variant"]: row["stage"] for row in self.rates}
+
+    @property
+    def final_effects(self) -> list[Effect]:
+        """The differences, those of two masks together."""
+        found: dict[tuple[str, str], dict[str, Difference]] = {}
+        for each in self.effects:
+            found.setdefault((each.base, each.variant), {})[each.metric] = each
+        last = self.finals
+        return [
+            Effect(base, last[base], variant, last[variant], final=True, rates=rates)
+            for (base, variant), rates in found.items()
+        ]
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN

@@ -175,7 +175,7 @@ class FleetFolder:
     @property
     def finals(self) -> dict[str, str]:
         """Each scored variant's final stage."""
-        return {row["variant"]: row["stage"] for row in self.facts.rates}
+        return self.facts.finals
 
     @cached_property
     def first_scores(self) -> dict[str, dict[str, Any]]:

@@ -4,7 +4,7 @@ from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.facts import DriveFacts, FrameAccount
-from tests.report.making import OVERLAP, VARIANTS, some_findings
+from tests.report.making import VARIANTS, some_findings
 from tests.report.sections.test_thresholds import findings as thresholded
 
 
@@ -22,9 +22,6 @@ def test_a_page_has_the_sections_of_the_report():
     vars(findings).update(
         regions={("interior", name): row for name in VARIANTS},
         error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
-        overlap={
-            variant: dict.fromkeys(stages, OVERLAP) for variant, stages in findings.totals.items()
-        },
     )
     frames = FrameBrowser([], [], [])
     paper, page = sections(findings), headings(page_document(findings, frames))
@@ -34,14 +31,14 @@ def test_a_page_has_the_sections_of_the_report():
 
 def test_of_a_run_that_was_cut_the_evaluated_frames_are_counted():
     account = FrameAccount(evaluated=17, trained_on=10)
-    findings = some_findings(totals={}, overlap={}, frames=account)
+    findings = some_findings(totals={}, frames=account)
     assert document(findings).subtitle.startswith("17 frames")
 
 
 def test_the_drives_facts_stand_below_its_name():
     drive = DriveFacts("street", width=40, height=20, rate_hz=14.9999)
     about = {"versions": {"roadeval": "1.2"}, "run": {"preset": "paper"}}
-    page = document(some_findings(totals={}, overlap={}, drive=drive, **about))
+    page = document(some_findings(totals={}, drive=drive, **about))
     assert page.title == "street"
     assert page.subtitle == "1210 frames, 40 × 20, 15 Hz, preset paper, roadeval 1.2"  # noqa: RUF001
     assert page.footer == "street, drive.rrd"

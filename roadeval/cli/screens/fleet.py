@@ -11,7 +11,8 @@ from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
 from roadeval.report.blocks import Heading
 from roadeval.report.sections.drives import drives_table
-from roadeval.report.sections.summary import drives_account, effects_table, fleet_rates_table
+from roadeval.report.sections.summary import drives_account
+from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     out.print(facts.verdict)
     out.print()
     if facts.rates:
-        blocks = [fleet_rates_table(facts), *([effects_table(facts)] if facts.effects else [])]
+        blocks = [rates_table(facts), *([differences_table(facts)] if facts.effects else [])]
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show([*blocks, Heading("Drives with the highest ERR"), worst], out)
         out.print()

@@ -65,8 +65,8 @@ def show_table(table: Table, out: Console) -> None:
 
 
 def _texts(table: Table, place: int) -> list[str]:
-    """Return a column's texts; numbers in ASCII."""
-    texts = [plain(row[place]) for row in table.rows]
+    """Return a column's texts; numbers, and what is subtracted, in ASCII."""
+    texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
     return texts if place in table.text_columns else [*map(ascii_of, texts)]
 
 

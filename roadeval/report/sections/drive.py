@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from itertools import pairwise
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import DASH, MINUS, defined, number, percent, points
+from roadeval.data.words import DASH, defined, number, percent, points
 from roadeval.evaluation.metres import ABOVE
-from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
+from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.score import BINS, FILTER, Effect, merged
 from roadeval.report.blocks import (
@@ -32,14 +30,10 @@ from roadeval.report.charts.standard import (
 )
 from roadeval.report.findings import Findings
 from roadeval.report.images import variants_of
-from roadeval.report.sections.common import (
-    example_pictures,
-    rate_cells,
-    variant_cell,
-)
-from roadeval.results.facts import Totals
+from roadeval.report.sections.common import example_pictures
+from roadeval.report.tables import differences_table, stages_table, thresholds_table, variant_cell
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.sentences import CLAIMED, correction, marked_interval
+from roadeval.results.sentences import CLAIMED, correction
 
 
 def over_drive(findings: Findings) -> Iterator[Block]:
@@ -86,10 +80,10 @@ def _claims(findings: Findings) -> Iterator[Block]:
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield what the filter and each variant change, and how much masks flicker."""
-    effects = [each for each in findings.facts.effects if each.final]
+    effects = findings.facts.final_effects
     if effects:
         yield Heading("What the filter and the variants change")
-        yield _differences(findings, effects)
+        yield differences_table(findings.facts)
         yield Text(_method(effects), "note")
     pairs = findings.filtered
     for each in effects if len(pairs) else ():
@@ -103,35 +97,6 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         drawn = difference(pairs["frame"], pairs["ERR"], FILTERED, UNFILTERED, change)
         yield Figure([drawn], f"ERR of {FILTERED} minus {UNFILTERED}, frame by frame.")
     yield from _over_time(findings)
-
-
-def _differences(findings: Findings, effects: Sequence[Effect]) -> Table:
-    """Tabulate each variant's final mask against unfiltered and the baseline, a row each."""
-    names = [*findings.finals]
-    others = [rate for rate in SHORT if rate != "ERR"]
-    return Table(
-        [
-            *("difference", "from, %", "to, %", "ERR, pp", "interval, pp"),
-            *(*(f"{rate}, pp" for rate in others), "better", "worse", "effective"),
-        ],
-        [
-            [
-                replace(
-                    variant_cell(each.variant, names), text=f"{each.variant} {MINUS} {each.base}"
-                ),
-                *(percent(findings.total(name)["ERR"]) for name in (each.base, each.variant)),
-                Cell(points((change := each.rates["ERR"]).mean), bold=True),
-                marked_interval(change),
-                *(points(each.rates[rate].mean) for rate in others),
-                *(number(count or 0) for count in (change.better, change.worse)),
-                DASH if change.effective is None else f"{change.effective:.0f}",
-            ]
-            for each in effects
-        ],
-        breaks=[place for place, (a, b) in enumerate(pairwise(effects), 1) if a.base != b.base],
-        groups=[("", 1), ("ERR", 4), ("", len(others)), ("frames", 3)],
-        small=True,
-    )
 
 
 def _method(effects: Sequence[Effect]) -> str:
@@ -261,7 +226,7 @@ def stages(findings: Findings) -> Iterator[Block]:
     )
     yield _parts_table(findings)
     yield Text(_parts_note(findings), "note")
-    numbers: list[Block] = [stages_table(findings)]
+    numbers: list[Block] = [stages_table(findings.totals, findings.changes)]
     if findings.changes:
         note = (
             "Repaired and spoiled: labelled pixels that the stage has right and the mask before it "
@@ -270,34 +235,6 @@ def stages(findings: Findings) -> Iterator[Block]:
         numbers.append(Text(note, "note"))
     yield Details("Every stage in numbers", numbers)
     yield from _oracles(findings)
-
-
-def stages_table(findings: Findings) -> Table:
-    """Tabulate the rates of every stage, and the pixels that it repaired and spoiled."""
-    rows: list[list[Cell | str]] = []
-    breaks = []
-    for variant, stages in findings.totals.items():
-        breaks.append(len(rows))
-        for place, (stage, total) in enumerate(stages.items()):
-            repaired, spoiled = findings.changes.get((variant, stage), (None, None))
-            rows.append(
-                [
-                    variant_cell(variant, [*findings.totals]) if place == 0 else "",
-                    stage,
-                    *rate_cells(total, bold=stage == findings.finals[variant]),
-                    *(percent(findings.overlap[variant][stage][name]) for name in SHORT_OVERLAP),
-                    percent(repaired),
-                    percent(spoiled),
-                ]
-            )
-    meanings = "; ".join(f"{name}: {metric.in_words}" for name, metric in SHORT.items())
-    return Table(
-        ["variant", "stage", *SHORT, *SHORT_OVERLAP, "repaired", "spoiled"],
-        rows,
-        text_columns=(0, 1),
-        breaks=breaks[1:],
-        caption=f"Percent. {meanings}.",
-    )
 
 
 def _parts_table(findings: Findings) -> Table:
@@ -409,44 +346,9 @@ def thresholds(findings: Findings) -> Iterator[Block]:
         "the pixels; 0 if probabilities are what they say.",
         "note",
     )
-    table = _thresholds_table(findings, quoted)
+    table = thresholds_table(quoted, findings.totals)
     yield Details(
         "Curves, areas and calibration", [Figure(charts, CURVES_CAPTION), table, meanings]
-    )
-
-
-def _thresholds_table(findings: Findings, quoted: Totals) -> Table:
-    """Tabulate areas, MaxF and calibration beside the rates of the mask as it is."""
-    rows: list[list[Cell | str]] = []
-    for variant, stages in quoted.items():
-        for stage, own in stages.items():
-            mask = findings.overlap[variant][stage]
-            total = findings.totals[variant][stage]
-            rows.append(
-                [
-                    variant_cell(variant, [*findings.totals]),
-                    stage,
-                    number(own["frames"]),
-                    *(percent(own[name]) for name in ("AP", "AUC", "ECE")),
-                    Cell(percent(own["MaxF"]), bold=True),
-                    *(percent(own[name]) for name in ("threshold", "precision", "recall")),
-                    *(percent(mask[name]) for name in ("F1", "precision")),
-                    percent(total["pooled_TPR"]),
-                ]
-            )
-    return Table(
-        [
-            *("variant", "stage", "frames", "AP", "AUC", "ECE", "MaxF", "threshold"),
-            *("precision", "recall", "F1", "precision", "recall"),
-        ],
-        rows,
-        text_columns=(0, 1),
-        groups=[
-            *(("", 3), ("over all thresholds", 3)),
-            *(("at the best threshold", 4), ("the mask as it is", 3)),
-        ],
-        caption="Percent.",
-        small=True,
     )
 
 

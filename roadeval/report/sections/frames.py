@@ -32,7 +32,7 @@ from roadeval.report.blocks import (
 from roadeval.report.chart import Chart
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
-from roadeval.report.sections.common import rate_cells, variant_cell
+from roadeval.report.tables import rate_cells, variant_cell
 from roadeval.results.sentences import step_by_step, without_filter
 
 LARGE: Final = 420

@@ -11,7 +11,7 @@ from roadeval.evaluation.metres import ABOVE, FREE, LEFT, RIGHT
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts import standard as charts
 from roadeval.report.findings import Findings
-from roadeval.report.sections.common import variant_cell
+from roadeval.report.tables import variant_cell
 
 METRES: Final = "metres: "
 """Begins the sentence on how the camera is known."""

@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterator, Mapping
+from typing import Final
 
-from roadeval.data import BASELINE, FINAL_STAGE
-from roadeval.data.words import DASH, counted, defined, interval, listing, number, percent, points
-from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT
+from roadeval.data import BASELINE
+from roadeval.data.words import counted, defined, listing, number, percent
 from roadeval.evaluation.stats import STUDENT_FROM
 from roadeval.report.blocks import (
     Block,
     BulletList,
-    Cell,
     Heading,
     ImageGrid,
     LinkList,
-    Table,
     TableOfContents,
     Text,
 )
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
-from roadeval.report.sections.common import variant_cell
 from roadeval.report.sections.drives import WORST_AT
-from roadeval.results.facts import FleetFacts, OverDrives
+from roadeval.report.tables import differences_table, rates_table, seeds_table
+from roadeval.results.facts import FleetFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
-from roadeval.results.sentences import account, of_seeds, seeds_in_words, spread_in_words
+from roadeval.results.sentences import account, of_seeds
 
 LOSSES: Final = 3
 """Losses that are named."""
@@ -42,8 +39,6 @@ STATUSES: Final = {
     UNSCORED: "without truth",
     FAILED: "failed",
 }
-ROWS: Final = 24
-"""Variants that the tables of many drives have, at most."""
 
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
@@ -63,7 +58,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
         yield Text("Probably: by chance alone, one drive in ten would show as much.", "note")
     yield from _next(findings)
     if findings.totals:
-        yield rates_table(findings)
+        yield rates_table(findings.facts)
         if seeds := findings.facts.seeds:
             yield seeds_table(seeds, [*findings.finals])
             yield Text(of_seeds(seeds), "note")
@@ -97,14 +92,11 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     if note := _how_sure_over_drives(facts):
         yield Text(note, "note")
     if facts.rates:
-        yield fleet_rates_table(facts)
+        yield rates_table(facts)
     if facts.effects:
-        yield effects_table(facts)
-        yield Text(
-            "Percentage points. Every drive counts the same, long or short; drives of one group "
-            "count as one. Pooled: of all pixels together.",
-            "note",
-        )
+        yield differences_table(facts)
+        note = "Every drive counts the same, long or short; drives of one group count as one."
+        yield Text(note, "note")
     yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
     yield _beware(list(fleet_warnings(findings)))
     yield TableOfContents()
@@ -112,128 +104,6 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
 
 def _beware(warned: list[str]) -> BulletList:
     return BulletList("Beware", warned or ["Nothing known."], "warning" if warned else "plain")
-
-
-def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
-    """Yield a cell in percent for each value; that of the best is bold."""
-    known = [value for value in values if defined(value)]
-    best = (max if higher else min)(known, default=None)
-    place = None if best is None else values.index(best)
-    yield from (Cell(percent(value), bold=i == place) for i, value in enumerate(values))
-
-
-def rates_table(findings: Findings) -> Table:
-    """Tabulate every final mask's rates; the best of each column is bold."""
-    names = [*findings.finals]
-    columns = {title: [*cells] for title, cells in _columns(findings)}
-    rows = zip(*columns.values(), strict=True)
-    counts = [number(findings.total(name)["frames"]) for name in names]
-    alike = len(set(counts)) == 1
-    widths = {each["width"] for each in findings.facts.beyond.values()}
-    edge = f" Boundary F: the road's edge within {widths.pop()} pixels;" if widths else ""
-    edge += " boundary IoU: bands along it of 2 % of the diagonal." if edge else ""
-    return Table(
-        ["final mask", *([] if alike else ["frames"]), *columns],
-        [
-            [variant_cell(name, names), *([] if alike else [count]), *row]
-            for name, count, row in zip(names, counts, rows, strict=True)
-        ],
-        small=True,
-        caption=(
-            f"Percent: means over {counts[0] if alike else 'the evaluated'} frames; pooled ERR, "
-            f"{listing([*OVERLAP])} are of all pixels together.{edge} Bold: the best."
-        ),
-    )
-
-
-def _columns(findings: Findings) -> Iterator[tuple[str, Iterator[Cell]]]:
-    """Yield the title of each column of numbers, and its cells, one a variant."""
-    finals = {name: findings.total(name) for name in findings.finals}
-    for rate, metric in FULL.items():
-        values = [total.get(rate) for total in finals.values()]
-        yield rate, best_bold(values, higher=metric.higher_is_better)
-    pooled = [total["pooled_ERR"] for total in finals.values()]
-    yield "pooled ERR", best_bold(pooled, higher=METRICS["ERR"].higher_is_better)
-    overlap = [findings.overlap[name][stage] for name, stage in findings.finals.items()]
-    for rate, metric in OVERLAP.items():
-        yield rate, best_bold([each[rate] for each in overlap], higher=metric.higher_is_better)
-    if beyond := findings.facts.beyond:
-        for name in ("boundary_F", "boundary_IoU"):
-            values = [beyond.get(variant, {}).get(name) for variant in finals]
-            yield name.replace("_", " "), best_bold(values, higher=True)
-
-
-def fleet_rates_table(facts: FleetFacts) -> Table:
-    """Tabulate the final masks' rates over drives; the best of each column is bold."""
-    rows = facts.rates[:ROWS]
-    names = [row["variant"] for row in rows]
-    higher = {name: metric.higher_is_better for name, metric in FULL.items()} | {
-        "pooled_ERR": False
-    }
-    cells = [[*best_bold([row[n] for row in rows], higher=higher[n])] for n in higher]
-    return Table(
-        ["final mask", "drives", "frames", *(name.replace("_", " ") for name in higher)],
-        [
-            [
-                variant_cell(row["variant"], names),
-                number(row["drives"]),
-                number(row["frames"]),
-                *own,
-            ]
-            for row, own in zip(rows, zip(*cells, strict=True), strict=True)
-        ],
-        caption=(
-            "Percent: the mean over drives of each drive's mean rate; pooled ERR is of all pixels "
-            "of all drives together, so that long drives count for more. Bold: the best."
-        ),
-    )
-
-
-def effects_table(facts: FleetFacts) -> Table:
-    """Tabulate the differences over drives: the filter's, and each variant's against blind."""
-    shown = [each for each in facts.effects if each.metric in SHORT]
-    rows: list[list[Cell | str]] = []
-    breaks = []
-    for base, variant in list(dict.fromkeys((e.base, e.variant) for e in shown))[:ROWS]:
-        breaks.append(len(rows))
-        own = {e.metric: e for e in shown if (e.base, e.variant) == (base, variant)}
-        there = [name for name in SHORT if name in own]
-        rows += [_effect_cells(own[name], first=name == there[0]) for name in there]
-    return Table(
-        ["difference", "rate", "mean", "interval", "worse", "better", "pooled"],
-        rows,
-        text_columns=(0, 1),
-        breaks=breaks[1:],
-        groups=[("", 2), ("over drives", 2), ("drives", 2), ("", 1)],
-        small=True,
-    )
-
-
-def _effect_cells(each: OverDrives, *, first: bool) -> list[Cell | str]:
-    return [
-        f"{each.variant} \N{MINUS SIGN} {each.base}" if first else "",
-        each.metric,
-        Cell(points(each.mean), bold=first),
-        interval(each.low, each.high),
-        *(DASH if count is None else number(count) for count in (each.worse, each.better)),
-        points(each.pooled),
-    ]
-
-
-def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
-    """Tabulate the spread of rates over seeds, a row for each variant that learns."""
-    return Table(
-        ["final mask", *FULL],
-        [
-            [
-                variant_cell(name, names),
-                *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in FULL),
-            ]
-            for name, stages in seeds["totals"].items()
-        ],
-        caption=f"Percent, with {seeds_in_words(seeds)} of the training: the middle, and from the "
-        "least to the greatest.",
-    )
 
 
 def _trained_here(placement: str | None) -> str:

@@ -20,7 +20,8 @@ def total(err, pooled=None, frames=91):
     """The sums of a stage, of which the tests look at ERR alone."""
     rates = dict.fromkeys(RATES, 0.5) | {"ERR": err}
     pooled_rates = {f"pooled_{rate}": 0.5 for rate in RATES} | {"pooled_ERR": pooled or err}
-    return {"frames": frames} | rates | pooled_rates
+    counts = {"TP": 6, "TN": 10, "FP": 3, "FN": 1}
+    return {"frames": frames} | counts | rates | pooled_rates
 
 
 TOTALS = {
@@ -64,12 +65,12 @@ def lines(results):
 
 def test_an_undefined_rate_is_a_dash():
     totals = {"filtered": {"post": total(math.nan)}, "unfiltered": {"post": total(0.3)}}
-    assert "filtered post 91 - - 50.00 50.00 50.00" in lines(summary(totals=totals))
+    assert "filtered post 91 - 50.00 50.00 50.00 - 60.00" in lines(summary(totals=totals))
 
 
 def test_a_difference_is_told_in_points_with_its_interval():
     shown = lines(summary())
-    assert "final masks ERR, pp 95 % interval FPR, pp FNR, pp" in shown
+    assert "difference ERR, pp interval, pp FPR, pp FNR, pp" in shown
     assert "filtered - unfiltered +0.65 +0.10 to +1.20 * +0.10 -0.20" in shown
 
 

@@ -2,7 +2,8 @@
 
 from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Table
-from roadeval.report.sections.drive import stages, stages_table
+from roadeval.report.sections.drive import stages
+from roadeval.report.tables import stages_table
 from tests.report.making import column, opened, plain_rows, some_findings, the
 
 PARTS = {
@@ -12,12 +13,13 @@ PARTS = {
 
 
 def test_each_stage_has_its_rates_and_what_it_repaired_and_spoiled():
-    table = stages_table(some_findings(changes={("filtered", "post"): (0.08, 0.02)}))
-    assert table.columns[2:] == ["ERR", "FPR", "FNR", "IoU", "repaired", "spoiled"]
-    assert plain_rows(table)[:3] == [
-        ["filtered", "svm", "20.00", "21.00", "22.00", "50.00", DASH, DASH],
-        ["", "post", "10.00", "11.00", "12.00", "50.00", "8.00", "2.00"],
-        ["unfiltered", "svm", "30.00", "31.00", "32.00", "60.00", DASH, DASH],
+    table = stages_table(some_findings().totals, {("filtered", "post"): (0.08, 0.02)})
+    assert table.columns[3:7] == ["ERR", "FPR", "FNR", "ACC"]
+    assert table.columns[7:] == ["pooled ERR", "IoU", "repaired", "spoiled"]
+    rates, best = ("20.00", "21.00", "22.00", "80.00"), ("10.00", "11.00", "12.00", "90.00")
+    assert plain_rows(table)[:2] == [
+        ["filtered", "svm", "1,200", *rates, "21.00", "60.00", DASH, DASH],
+        ["", "post", "1,200", *best, "11.00", "60.00", "8.00", "2.00"],
     ]
     assert [cell.bold for cell in column(table, "ERR")] == [False, True, False, True, True]
     assert table.breaks == [2, 4]

@@ -1,0 +1,241 @@
+"""The tables of rates and differences, of a drive and of many: for a terminal, paper and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, Final
+
+from roadeval.data import FINAL_STAGE
+from roadeval.data.words import (
+    DASH,
+    MINUS,
+    defined,
+    listing,
+    number,
+    percent,
+    points,
+    short_names,
+)
+from roadeval.evaluation import score
+from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT, SHORT_OVERLAP
+from roadeval.evaluation.score import final_stages
+from roadeval.report.blocks import Cell, Table
+from roadeval.report.chart import looks
+from roadeval.results.facts import Facts, FleetFacts, Totals
+from roadeval.results.sentences import marked_interval, seeds_in_words, spread_in_words
+
+OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
+"""The rates whose differences stand beside that of ERR."""
+
+
+def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
+    """Return a variant's name, or a text, with the dot of its colour among ``names``."""
+    return Cell(text or name, dot=looks(names)[name].colour)
+
+
+def rate_cells(rates: Mapping[str, float], *, bold: bool) -> list[Cell]:
+    """Return a mask's cells in a short table of rates; its ERR may be bold."""
+    return [Cell(percent(rates.get(name)), bold=bold and name == "ERR") for name in SHORT]
+
+
+def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
+    """Yield a cell in percent for each value; that of the best is bold."""
+    known = [value for value in values if defined(value)]
+    best = (max if higher else min)(known, default=None)
+    place = None if best is None else values.index(best)
+    yield from (Cell(percent(value), bold=i == place) for i, value in enumerate(values))
+
+
+def rates_table(facts: Facts | FleetFacts) -> Table:
+    """Tabulate every final mask's rates; the best of each column is bold."""
+    finals = {name: facts.totals[name][stage] for name, stage in facts.finals.items()}
+    of_fleet, names = isinstance(facts, FleetFacts), [*finals]
+    counts = [number(total["frames"]) for total in finals.values()]
+    alike = len(set(counts)) == 1 and not of_fleet
+    columns: dict[str, Iterable[Cell | str]] = {}
+    if of_fleet:
+        columns["drives"] = [number(total["drives"]) for total in finals.values()]
+    if not alike:
+        columns["frames"] = counts
+    rates = {name: metric.higher_is_better for name, metric in FULL.items()}
+    for rate, higher in (rates | {"pooled_ERR": METRICS["ERR"].higher_is_better}).items():
+        values = [total.get(rate) for total in finals.values()]
+        columns[rate.replace("_", " ")] = best_bold(values, higher=higher)
+    if isinstance(facts, FleetFacts):
+        caption = (
+            "Percent: the mean over drives of each drive's mean rate; pooled ERR is of all pixels "
+            "of all drives together, so that long drives count for more. Bold: the best."
+        )
+    else:
+        overlap = [score.overlap(total) for total in finals.values()]
+        for rate, metric in OVERLAP.items():
+            values = [each[rate] for each in overlap]
+            columns[rate] = best_bold(values, higher=metric.higher_is_better)
+        beyond, edge = facts.beyond, ""
+        if widths := {each["width"] for each in beyond.values()}:
+            for name in ("boundary_F", "boundary_IoU"):
+                values = [beyond.get(variant, {}).get(name) for variant in finals]
+                columns[name.replace("_", " ")] = best_bold(values, higher=True)
+            edge = (
+                f" Boundary F: the road's edge within {widths.pop()} pixels; boundary IoU: bands "
+                "along it of 2 % of the diagonal."
+            )
+        caption = (
+            f"Percent: means over {counts[0] if alike else 'the evaluated'} frames; pooled ERR, "
+            f"{listing([*OVERLAP])} are of all pixels together.{edge} Bold: the best."
+        )
+    rows = zip(*columns.values(), strict=True)
+    return Table(
+        ["final mask", *columns],
+        [[variant_cell(name, names), *row] for name, row in zip(names, rows, strict=True)],
+        small=not of_fleet,
+        caption=caption,
+    )
+
+
+def stages_table(
+    totals: Totals, changes: Mapping[tuple[str, str], tuple[float, float]] | None = None
+) -> Table:
+    """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
+    finals = final_stages((name, stage) for name, own in totals.items() for stage in own)
+    rows: list[list[Cell | str]] = []
+    breaks = []
+    for variant, stages in totals.items():
+        breaks.append(len(rows))
+        for place, (stage, total) in enumerate(stages.items()):
+            bold, overlap = stage == finals[variant], score.overlap(total)
+            rows.append(
+                [
+                    "" if place else variant_cell(variant, [*totals]),
+                    stage,
+                    number(total["frames"]),
+                    *(Cell(percent(total.get(n)), bold=bold and n == "ERR") for n in FULL),
+                    percent(total.get("pooled_ERR")),
+                    *(percent(overlap[name]) for name in SHORT_OVERLAP),
+                ]
+            )
+            if changes:
+                rows[-1] += map(percent, changes.get((variant, stage), (None, None)))
+    changed = ["repaired", "spoiled"] if changes else []
+    meanings = "; ".join(f"{name}: {metric.in_words}" for name, metric in SHORT.items())
+    return Table(
+        ["variant", "stage", "frames", *FULL, "pooled ERR", *SHORT_OVERLAP, *changed],
+        rows,
+        text_columns=(0, 1),
+        breaks=breaks[1:],
+        caption=f"Percent. {meanings}.",
+        small=True,
+    )
+
+
+def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Table:
+    """Tabulate the differences of final masks, of the frames of a drive or over drives.
+
+    A ``brief`` table has the differences alone: neither both errors, nor how many are better.
+    """
+    effects, names = facts.final_effects, [*facts.finals]
+    errors = {name: facts.totals[name][stage]["ERR"] for name, stage in facts.finals.items()}
+    unit = effects[0].rates["ERR"].unit
+    rows: list[list[Cell | str]] = []
+    for each in effects:
+        change, words = each.rates["ERR"], f"{each.variant} {MINUS} {each.base}"
+        ends = [percent(errors[name]) for name in (each.base, each.variant)]
+        won = [number(count or 0) for count in (change.better, change.worse)]
+        if unit == "frames":
+            won.append(DASH if change.effective is None else f"{change.effective:.0f}")
+        rows.append(
+            [
+                variant_cell(each.variant, names, words),
+                *([] if brief else ends),
+                Cell(points(change.mean), bold=True),
+                marked_interval(change),
+                *(points(each.rates[rate].mean) for rate in OTHERS),
+                *([] if brief else won),
+            ]
+        )
+    about = [] if brief else ["from, %", "to, %"]
+    counts = [] if brief else ["better", "worse", *(["effective"] if unit == "frames" else [])]
+    others = [f"{rate}, pp" for rate in OTHERS]
+    return Table(
+        ["difference", *about, "ERR, pp", "interval, pp", *others, *counts],
+        rows,
+        breaks=[place for place, (a, b) in enumerate(pairwise(effects), 1) if a.base != b.base],
+        groups=[("", 1), ("ERR", 4), ("", len(OTHERS)), (unit, len(counts))] if counts else (),
+        small=True,
+    )
+
+
+def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
+    """Tabulate the spread of rates over seeds, a row for each variant that learns."""
+    return Table(
+        ["final mask", *FULL],
+        [
+            [
+                variant_cell(name, names),
+                *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in FULL),
+            ]
+            for name, stages in seeds["totals"].items()
+        ],
+        caption=f"Percent, with {seeds_in_words(seeds)} of the training: the middle, and from the "
+        "least to the greatest.",
+    )
+
+
+def thresholds_table(curves: Totals, totals: Totals) -> Table:
+    """Tabulate areas, MaxF and calibration beside the rates of the mask as it is."""
+    rows: list[list[Cell | str]] = []
+    for variant, stages in curves.items():
+        for stage, own in stages.items():
+            total = totals[variant][stage]
+            mask = score.overlap(total)
+            rows.append(
+                [
+                    variant_cell(variant, [*totals]),
+                    stage,
+                    *(percent(own[name]) for name in ("AP", "AUC", "ECE")),
+                    Cell(percent(own["MaxF"]), bold=True),
+                    *(percent(own[name]) for name in ("threshold", "precision", "recall")),
+                    *(percent(mask[name]) for name in ("F1", "precision")),
+                    percent(total["pooled_TPR"]),
+                ]
+            )
+    return Table(
+        [
+            *("variant", "stage", "AP", "AUC", "ECE", "MaxF", "threshold"),
+            *("precision", "recall", "F1", "precision", "recall"),
+        ],
+        rows,
+        text_columns=(0, 1),
+        groups=[
+            *(("", 2), ("over all thresholds", 3)),
+            *(("at the best threshold", 4), ("the mask as it is", 3)),
+        ],
+        caption="Percent.",
+        small=True,
+    )
+
+
+def cameras_table(facts: Facts) -> Table:
+    """Tabulate ERR of each camera's final masks, and the first difference within each."""
+    names, masks = short_names([*facts.cameras]), [*facts.finals]
+    pairs = [(each.variant, each.base) for each in facts.final_effects[:1]]
+    rows: list[list[Cell | str]] = []
+    for camera, own in facts.cameras.items():
+        known = {name: own.totals[name][stage]["ERR"] for name, stage in own.finals.items()}
+        changes = {(e.variant, e.base): e.rates["ERR"] for e in own.final_effects}
+        row: list[Cell | str] = [names[camera], number(own.frames.evaluated)]
+        row += best_bold([known.get(name) for name in masks], higher=False)
+        for pair in pairs:
+            change = changes.get(pair)
+            row += [points(change.mean), marked_interval(change)] if change else [DASH, DASH]
+        rows.append(row)
+    titles = [title for a, b in pairs for title in (f"{a} {MINUS} {b}", "interval")]
+    return Table(
+        ["camera", "frames", *masks, *titles],
+        rows,
+        caption="ERR of the final masks in percent, and its difference in percentage points with "
+        "the interval within the camera. Above, each camera counts the same, and frames that were "
+        "taken at the same time count once in an interval.",
+        small=True,
+    )
