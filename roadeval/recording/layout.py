@@ -124,6 +124,9 @@ class Layout:
     """Before the camera, where it is known."""
     extent: tuple[float, float, float] = (6, 46, 20)
     """Metres ahead between which the ground is shown from above, and metres across."""
+    clouds: tuple[str, ...] = ()
+    """Topics of the log's point clouds. They are not recorded, but seen where Rerun's own loader of
+    the log puts them beside."""
     tables: Mapping[str, str] = field(default_factory=dict)
     """Header line of each table that grows with the frames, by the table's name."""
     properties: Mapping[str, str | int | float] = field(default_factory=dict)

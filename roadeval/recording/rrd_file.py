@@ -118,6 +118,8 @@ class RrdFile:
         for place in places:
             with whole(self.path, place.path):
                 with self.path.open("rb") as file:
+                    if place.offset + place.size > file.seek(0, 2):
+                        raise DamagedError(self.path, place.path)
                     file.seek(place.offset)
                     path, batch = rows_of(file.read(place.size))
                 if path != place.path:
@@ -271,12 +273,13 @@ Stores = Iterable[tuple[bytes, list[Place]]]
 
 def _indexed(file: IO[bytes]) -> Stores | None:
     """Return what the index lists; None of a file without one."""
-    file.seek(max(file.seek(0, 2) - _END.size, 0))
+    end = file.seek(0, 2)
+    file.seek(max(end - _END.size, 0))
     offset, length, _, magic, _ = _END.unpack(file.read(_END.size).rjust(_END.size))
     if magic != _END_MAGIC:
         return None
     file.seek(offset)
-    parts = [_fields(part) for _, part in _each_field(file.read(length))]
+    parts = [_fields(part) for _, part in _each_field(file.read(min(length, end)))]
     return [(part[_STORE], _listed(part[_INDEX])) for part in parts]
 
 

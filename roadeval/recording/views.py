@@ -75,7 +75,8 @@ def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
         tabs = [_all_cameras(layouts)]
         names = short_names([*layouts])
         for prefix, each in layouts.items():
-            tabs.append(rrb.Tabs(*_below(prefix, _tabs(each)), active_tab=0, name=names[prefix]))
+            parts = _below(prefix, _tabs(each), each.clouds)
+            tabs.append(rrb.Tabs(*parts, active_tab=0, name=names[prefix]))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
@@ -93,20 +94,22 @@ def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
     )
 
 
-def _below(prefix: str, parts: Iterable[BlueprintPart]) -> list[BlueprintPart]:
+def _below(
+    prefix: str, parts: Iterable[BlueprintPart], beside: Sequence[str] = ()
+) -> list[BlueprintPart]:
     """Return views and containers that show the entities below a path, as if they lay at the top.
 
-    The parts are changed.
+    The parts are changed. What lies ``beside`` all cameras stays where it is.
     """
     made = []
     for part in parts:
         if isinstance(part, rrb.View):
             part.origin = prefix + (part.origin if part.origin != "/" else "")
-            part.contents = [prefix + path for path in part.contents]
+            part.contents = [path if path in beside else prefix + path for path in part.contents]
             own = part.visualizer_overrides
             part.visualizer_overrides = {prefix + str(path): each for path, each in own.items()}
         else:
-            _below(prefix, part.contents)
+            _below(prefix, part.contents, beside)
         made.append(part)
     return made
 
@@ -171,7 +174,7 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
     if not ground.is_posed or not layout.calibration:
         return rrb.Grid(*flat, grid_columns=len(flat), name="On the ground")
     near, far, _ = layout.extent
-    paths = [at.GROUND, *(at.ground_path(name) for name in names[:1]), at.CAMERA]
+    paths = [at.GROUND, *(at.ground_path(name) for name in names[:1]), at.CAMERA, *layout.clouds]
     space = rrb.Spatial3DView(
         origin="/",
         contents=paths,
@@ -182,8 +185,11 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
             look_target=(0, 2, (near + far) / 2.5),
             eye_up=(0, -1, 0),
         ),
-        # Its picture has no place in space here: it is on the ground.
-        overrides={at.CAMERA: rr.Pinhole.from_fields().visualizer()},
+        # The camera's picture is on the ground, and of that no frame is shown.
+        overrides={
+            at.CAMERA: rr.Pinhole.from_fields().visualizer(),
+            at.GROUND: rr.EncodedImage.from_fields().visualizer(),
+        },
     )
     grid = rrb.Grid(*flat, grid_columns=len(flat))
     return rrb.Horizontal(space, grid, column_shares=[2, 3], name="On the ground")

@@ -120,6 +120,14 @@ def test_each_part_is_checked_when_it_is_read(path, read, spoilt):
             read(opened)
 
 
+def test_a_message_that_its_index_says_is_larger_than_the_file_takes_no_memory(recording):
+    opened = Recording(recording.path)
+    places = opened._file._places["/truth"]
+    opened._file._places["/truth"] = [each._replace(size=1 << 62) for each in places]
+    with pytest.raises(DamagedError, match="at /truth"):
+        opened.truth(4)
+
+
 def test_a_message_of_another_entity_is_not_taken_for_one(recording, tmp_path):
     data, truth, post = (
         recording.path.read_bytes(),

@@ -38,5 +38,13 @@ def test_an_edge_that_a_wrong_camera_could_explain_is_marked():
     assert cells[2] == "+0.30"
     assert cells[6] == f"{UNSURE}\N{MINUS SIGN}0.10"
     assert cells[5] == "1 of 9"
-    assert plain(free.rows[0][1]) == "0.00"
+    # Were the camera otherwise, no end would be seen: that is as unsure as can be.
+    assert plain(free.rows[0][1]) == f"{UNSURE}0.00"
     assert plain(free.rows[0][2]) == "\N{EN DASH}"
+
+
+def test_nothing_is_marked_where_no_other_camera_was_counted():
+    measures = [("left_edge", "10m"), ("right_edge", "10m"), ("free_distance", "ahead")]
+    rows = [row("filtered", *measure, 0.1, math.nan) for measure in measures]
+    edges, free = edges_tables(rows, NAMES)
+    assert plain(edges.rows[0][2]) == plain(free.rows[0][1]) == "+0.10"

@@ -170,6 +170,7 @@ class Run:
             calibration=self.calibration,
             ground=self.selection.ground_as_read,
             extent=(*self.config.evaluation.plan, self.config.evaluation.plan_width),
+            clouds=tuple(each.name for each in self.log.topics if each.is_cloud),
             tables={name: TABLES[name].header for name in STREAMED},
             properties=self._properties(),
         )

@@ -36,6 +36,7 @@ KEPT: Final = 32
 """Messages of a topic to keep, those of at most `KEPT_BYTES`: a label's stamp is looked at before
 its turn, and its chunk, mostly of other topics, is long forgotten when its picture is needed."""
 KEPT_BYTES: Final = 1 << 18
+CLOUDS: Final = ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
 GAP: Final = 2.5
 """A step of more than so many median periods is a gap."""
 
@@ -79,6 +80,11 @@ class TopicInfo:
     def is_image(self) -> bool:
         """Whether its messages carry images, as pixels, files or video."""
         return self.kind in PICTURES
+
+    @property
+    def is_cloud(self) -> bool:
+        """Whether its messages carry points in space."""
+        return self.schema in CLOUDS
 
 
 def describe_topic(reader: TopicReader) -> TopicInfo:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
@@ -46,11 +47,11 @@ def rows_of(table: Rows) -> Iterator[Row]:
 
 def _note(rows: Sequence[Row]) -> str:
     told = "All of it holds on flat ground: a slope or a bump bends it."
-    if any(defined(row["low"]) for row in rows):
+    if _is_posed(rows):
         told += (
             " As the camera stands: the range if it looked 1\N{DEGREE SIGN} further up or down, or "
-            f"stood 5 cm higher or lower; {UNSURE}: that alone could explain the number, or its "
-            f"difference from {UNFILTERED}."
+            f"stood 5 cm higher or lower, {DASH} where one of these would see none; {UNSURE}: that "
+            f"alone could explain the number, or its difference from {UNFILTERED}."
         )
     else:
         told += " How far a wrong camera would move it is not known of a homography alone."
@@ -66,6 +67,7 @@ def distance_table(rows: Sequence[Row], names: Sequence[str]) -> Table:
     places = list(dict.fromkeys(row["where"] for row in errors))
     found = {(row["variant"], row["measure"], row["where"]): row for row in rows}
     variants = [name for name in names if (name, "ERR", places[0]) in found]
+    posed = _is_posed(rows)
     first = UNFILTERED if UNFILTERED in variants else variants[0]
     lines: list[list[Cell | str]] = []
     breaks = []
@@ -75,7 +77,7 @@ def distance_table(rows: Sequence[Row], names: Sequence[str]) -> Table:
         bases = [found[first, "ERR", place] for place in places]
         effects = [abs(row["value"] - base["value"]) for row, base in zip(own, bases, strict=True)]
         marks = [
-            UNSURE if variant != first and _sway(row) > effect else ""
+            UNSURE if variant != first and posed and _sway(row) > effect else ""
             for row, effect in zip(own, effects, strict=True)
         ]
         cells = [f"{m}{percent(row['value'], 1)}" for m, row in zip(marks, own, strict=True)]
@@ -98,10 +100,15 @@ def distance_table(rows: Sequence[Row], names: Sequence[str]) -> Table:
     )
 
 
+def _is_posed(rows: Sequence[Row]) -> bool:
+    """Return whether numbers were counted again as the camera might stand."""
+    return any(defined(row["low"]) for row in rows)
+
+
 def _sway(row: Row) -> float:
-    """Return how far a wrong camera may move a number; 0 where that is not known."""
+    """Return how far a wrong camera may move a number; infinitely where it may take it away."""
     if not defined(row["low"]):
-        return 0.0
+        return math.inf
     return float(max(row["high"] - row["value"], row["value"] - row["low"]))
 
 
@@ -110,15 +117,15 @@ def edges_tables(rows: Sequence[Row], names: Sequence[str]) -> Iterator[Table]:
     found = {(row["variant"], row["measure"], row["where"]): row for row in rows}
     places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == LEFT))
     variants = [name for name in names if name != BASELINE and (name, FREE, "ahead") in found]
+    posed, breaks = _is_posed(rows), []
     lines: list[list[Cell | str]] = []
-    breaks = []
     for variant in variants:
         breaks.append(len(lines))
         for place in places:
             sides = [found[variant, side, place] for side in (LEFT, RIGHT)]
             if any(row["frames"] for row in sides):
                 head = variant_cell(variant, names) if len(lines) == breaks[-1] else ""
-                cells = (cell for row in sides for cell in _end(row))
+                cells = (cell for row in sides for cell in _end(row, posed=posed))
                 lines.append([head, charts.in_metres(place), *cells])
     columns = ("median", "as it stands", "95 %", "missing")
     if lines:
@@ -136,22 +143,27 @@ def edges_tables(rows: Sequence[Row], names: Sequence[str]) -> Iterator[Table]:
     if any(row["frames"] for row in free):
         yield Table(
             ["free distance ahead, m", *columns],
-            [[variant_cell(row["variant"], names), *_end(row)] for row in free],
+            [[variant_cell(row["variant"], names), *_end(row, posed=posed)] for row in free],
             caption="How far ahead the road ends, mask minus truth; both at the latest where the "
             "truth is no longer known.",
             small=True,
         )
 
 
-def _end(row: Row) -> tuple[str, str, str, str]:
+def _end(row: Row, *, posed: bool) -> tuple[str, str, str, str]:
     """Return the cells of a measure: its median, the range, the 95th percentile, the missing."""
     if not row["frames"]:
         return (DASH,) * 4
-    mark = UNSURE if _sway(row) > abs(row["value"]) else ""
+    unsure = posed and defined(row["value"]) and _sway(row) > abs(row["value"])
     known = defined(row["low"])
     span = f"{_metres(row['low'])} to {_metres(row['high'])}" if known else DASH
     size = _metres(row["p95"]).lstrip("+")
-    return f"{mark}{_metres(row['value'])}", span, size, f"{row['missing']} of {row['frames']}"
+    return (
+        f"{UNSURE * unsure}{_metres(row['value'])}",
+        span,
+        size,
+        f"{row['missing']} of {row['frames']}",
+    )
 
 
 def _metres(value: float) -> str:
