@@ -87,11 +87,9 @@ def looks_of_results(masks: Mapping[str, tuple[str, str]]) -> dict[str, Look]:
 
 
 class ChartKind(StrEnum):
-    """How numbers are drawn: lines from left to right, bars, points, marks in rows, or a map."""
+    """How numbers are drawn: lines from left to right, marks in rows, or a map."""
 
     LINES = "lines"
-    BARS = "bars"
-    POINTS = "points"
     MARKS = "marks"
     MAP = "map"
 
@@ -134,7 +132,7 @@ class Key:
 
     name: str
     kind: str
-    """``line``, ``mark``, ``both``, ``bar``, ``level`` or ``share``."""
+    """``line``, ``mark``, ``both``, ``level`` or ``share``."""
     look: Look = Look(FAINT)
 
 
@@ -172,11 +170,10 @@ class Chart:
 
     def legend(self) -> Iterator[Key]:
         """Yield the entries of its legend."""
-        kinds = {ChartKind.BARS: "bar", ChartKind.POINTS: "mark", ChartKind.MARKS: "mark"}
         for each in (own for own in self.series if own.x):
             line = "line" if self.across else "both"
-            kind = kinds.get(self.kind) or ("mark" if len(each.x) == 1 else line)
-            yield Key(each.name, kind, each.look)
+            alone = self.kind is ChartKind.MARKS or len(each.x) == 1
+            yield Key(each.name, "mark" if alone else line, each.look)
         if self.level:
             yield Key(self.level.name, "level")
         if self.share:

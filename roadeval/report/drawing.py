@@ -86,34 +86,17 @@ class Shape:
     look: Look
     runs: Sequence[Sequence[Point]] = ()
     """Points joined by a line, which breaks where a value is undefined."""
-    bars: Sequence[tuple[float, float, float, float]] = ()
-    """Left, width, top and height."""
-    ends: Sequence[tuple[float, float, float]] = ()
-    """Intervals: a position and two heights."""
     marks: Sequence[Point] = ()
 
     @property
     def path(self) -> str:
-        """The line or the bars as an SVG path."""
-        lines = ("L".join(f"{x:g} {y:g}" for x, y in run) for run in self.runs)
-        bars = (f"M{x:g} {y:g}h{w:g}v{h:g}h{-w:g}z" for x, w, y, h in self.bars)
-        return "".join([*(f"M{line}" for line in lines), *bars])
+        """The line as an SVG path."""
+        return "".join("M" + "L".join(f"{x:g} {y:g}" for x, y in run) for run in self.runs)
 
     @property
     def dots(self) -> str:
         """The marks as an SVG path of lines without length, whose ends are round."""
         return "".join(f"M{x:g} {y:g}h0" for x, y in self.marks)
-
-    @property
-    def intervals(self) -> str:
-        """The intervals as an SVG path."""
-        return "".join(f"M{x:g} {low:g}V{high:g}" for x, low, high in self.ends)
-
-    @property
-    def cuts(self) -> list[tuple[float, int]]:
-        """Where intervals reach beyond the chart: a position, and 0 at the top or 100 below."""
-        beyond = ((x, ((high < 0, 0), (low > 100, 100))) for x, low, high in self.ends)
-        return [(x, edge) for x, edges in beyond for is_cut, edge in edges if is_cut]
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +149,7 @@ class Drawing:
     band: tuple[float, float] | None
     """The place of the chart's level, and the top and height of its interval, if there are any."""
     shapes: Sequence[Shape] = ()
-    """Of lines, bars and points."""
+    """Of lines."""
     rows: Sequence[MarkRow] = ()
     """Of marks."""
 
@@ -212,7 +195,7 @@ def drawn(chart: Chart | HeatMap, frames: Span | None = None) -> Drawing | MapDr
         zero=y.percent(0) if y.low < 0 < y.high else None,
         level=y.down(level.value) if level else None,
         band=band,
-        shapes=() if is_rows else [_shape(chart.kind, each, x, y) for each in chart.series],
+        shapes=() if is_rows else [_shape(each, x, y) for each in chart.series],
         rows=[*_rows(chart, y)] if is_rows else (),
     )
 
@@ -226,10 +209,6 @@ def _positions(chart: Chart, frames: Span | None) -> tuple[Span, list[Tick]]:
         numbers = [number for each in chart.series for number in each.x]
         x = Span(*(chart.x_range or (min(numbers), max(numbers))))
         return x, _ticked(x)
-    if chart.kind is ChartKind.POINTS:
-        # There is no room for so many names: the caption has some, and the pointer shows them.
-        margin = max(len(chart.names) / 80, 0.5)
-        return Span(-margin, len(chart.names) - 1 + margin), []
     x = Span(-0.3, len(chart.names) - 0.7)
     return x, [(x.percent(place), name) for place, name in enumerate(chart.names)]
 
@@ -249,24 +228,9 @@ def _values_span(chart: Chart) -> Span:
     return Span(low - room if low < 0 or not chart.from_zero else low, high + room)
 
 
-def _shape(kind: ChartKind, series: Series, x: Span, y: Span) -> Shape:
+def _shape(series: Series, x: Span, y: Span) -> Shape:
     marks = [(x.percent(at), y.down(value)) for at, value in series.points()]
-    if kind is ChartKind.BARS:
-        zero = y.down(0)
-        apart = min((b - a for a, b in zip(series.x, series.x[1:], strict=False)), default=1)
-        width = round(86 * apart / (x.high - x.low), 3)
-        bars = [
-            (round(at - width / 2, 3), width, min(top, zero), round(abs(zero - top), 3))
-            for at, top in marks
-        ]
-        return Shape(series.name, series.look, bars=bars)
     seen = [(at, top) for at, top in marks if -0.5 <= at <= 100.5 and -0.5 <= top <= 100.5]
-    if kind is ChartKind.POINTS:
-        found = zip(series.x, series.low, series.high, strict=False)
-        ends = [
-            (x.percent(at), y.down(low), y.down(high)) for at, low, high in found if low <= high
-        ]
-        return Shape(series.name, series.look, ends=ends, marks=seen)
     runs: list[list[Point]] = [[]]
     for at, value in zip(series.x, series.y, strict=True):
         if math.isfinite(value):

@@ -14,7 +14,7 @@ from roadeval.evaluation.stats import Difference
 from roadeval.report import charts as folder
 from roadeval.report.chart import ChartKind, Look, legend, looks, looks_of_results
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import MEAN, NAMED, ForestRow, figures_over_drive
+from roadeval.report.charts.standard import DRAWN, MEAN, ForestRow, figures_over_drive
 from tests.evaluation.making import a_table, rows_of
 
 FILTERED, UNFILTERED = (colours.hex_of(c) for c in (colours.FILTERED, colours.UNFILTERED))
@@ -128,15 +128,13 @@ def test_a_figure_over_the_drive_is_one_file_in_the_folder(tmp_path, monkeypatch
 # --- Differences ----------------------------------------------------------------------------------
 
 
-def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
+def test_the_differences_of_frames_have_their_mean_across():
     mean = replace(CHANGE, mean=-0.05, low=None, high=None)
     frames, changes = np.array([7, 9]), np.array([0.1, -0.2])
     chart = charts.difference(frames, changes, "filtered", "unfiltered", mean)
-    worse, better = chart.series
-    assert [*worse.points()] == [(7, pytest.approx(10))]
-    assert [*better.points()] == [(9, pytest.approx(-20))]
-    assert (worse.look.colour, better.look.colour) == (UNFILTERED, FILTERED)
-    assert (worse.name, better.name) == ("unfiltered better", "filtered better")
+    (own,) = chart.series
+    assert [*own.points()] == [(7, pytest.approx(10)), (9, pytest.approx(-20))]
+    assert own.look.colour == FILTERED
     assert (chart.level.name, chart.level.value) == ("mean", -5)
 
 
@@ -183,17 +181,13 @@ def test_it_is_told_that_the_mean_has_no_interval():
     assert "The mean has no interval" in figure.caption
 
 
-def test_many_drives_are_points_from_the_worst_on_and_the_mean_lies_across():
-    many = drives(NAMED + 1)
-    figure = charts.forest(many, OVER, "change")
+def test_of_many_drives_the_worst_and_the_best_have_a_row():
+    figure = charts.forest(drives(DRAWN + 4), OVER, "change")
     (chart,) = figure.charts
-    assert chart.kind is ChartKind.POINTS
-    assert chart.names[0] == f"drive_{NAMED}"
-    assert (chart.level.value, chart.level.low, chart.level.high) == (1.0, -1.0, 3.0)
-    worse, better = chart.series
-    assert (worse.x[0], worse.y[0], better.x) == (0, NAMED / 10, [NAMED])
-    assert f"The worst: drive_{NAMED} (+6.00), drive_{NAMED - 1} (+5.90)" in figure.caption
-    assert "The best: drive_0 (0.00)" in figure.caption
+    half = DRAWN // 2
+    assert len(chart.names) == DRAWN + 1
+    assert chart.names[half - 1 : half + 1] == [f"drive_{half + 4}", f"drive_{half - 1}"]
+    assert "Of all drives the 20 worst and the 20 best." in figure.caption
 
 
 def test_the_group_of_a_drive_stands_beside_its_name():

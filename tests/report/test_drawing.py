@@ -48,16 +48,6 @@ def test_without_a_frame_there_still_is_a_range():
     assert drawn(lines()).x == span_of_frames([]) == Span(0, 1)
 
 
-def test_bars_stand_on_zero():
-    chart = Chart("change", ChartKind.BARS, [series([0, 1], [10.0, -10.0])], unit="pp")
-    made = drawn(chart, Span(-0.5, 1.5))
-    assert made.zero == 50
-    upper, lower = made.shapes[0].bars
-    assert upper == (3.5, 43, pytest.approx(5.357), pytest.approx(44.643))
-    assert lower == (53.5, 43, 50, pytest.approx(44.643))
-    assert made.shapes[0].path.startswith("M3.5 5.357h43v44.643h-43z")
-
-
 @pytest.mark.parametrize(
     ("low", "high", "expected"),
     [(0, 9, [0, 2.5, 5, 7.5]), (-1, 1, [-1, -0.5, 0, 0.5, 1]), (0, 0.03, [0, 0.01, 0.02, 0.03])],
@@ -75,26 +65,15 @@ def test_marks_have_their_value_and_interval_and_leave_out_what_is_undefined():
 
 
 def test_a_level_lies_across_with_its_interval_and_belongs_to_the_values():
-    chart = Chart("change", ChartKind.BARS, [series([0], [2.0])], level=Level("mean", 2, 1, 4))
+    chart = Chart("change", ChartKind.LINES, [series([0], [2.0])], level=Level("mean", 2, 1, 4))
     made = drawn(chart)
     high = 4 * 1.06
     assert made.level == pytest.approx(100 * (1 - 2 / high), abs=0.001)
     assert made.band == pytest.approx((100 * (1 - 4 / high), 300 / high), abs=0.002)
     assert values(chart, made)["level"] == {"name": "mean", "value": 2, "low": 1, "high": 4}
-    plain = Chart("change", ChartKind.BARS, [series([0], [2.0])], level=Level("mean", 1))
+    plain = Chart("change", ChartKind.LINES, [series([0], [2.0])], level=Level("mean", 1))
     assert drawn(plain).band is None
     assert values(plain, drawn(plain))["level"]["low"] is None
-
-
-def test_points_have_intervals_and_names_without_room_for_them():
-    own = series([0, 1], [2.0, 1.0], low=[1.0, math.nan], high=[3.0, math.nan])
-    chart = Chart("change", ChartKind.POINTS, [own], names=["a", "b"], y_range=(0, 4))
-    made = drawn(chart)
-    (shape,) = made.shapes
-    assert shape.intervals == "M25 75V25"
-    assert shape.dots == "M25 50h0M75 75h0"
-    assert made.x_ticks == []
-    assert values(chart, made)["series"][0]["high"] == [3.0, None]
 
 
 def test_positions_of_their_own_have_a_range_of_their_own():
@@ -132,14 +111,6 @@ def test_an_interval_beyond_the_chart_ends_in_an_arrow_at_its_edge(low, high, cu
     (mark,) = made.rows[0].marks
     assert (mark.cut, (mark.low, mark.high)) == (cut, ends)
     assert f"({low:.2f} to {high:.2f})" in mark.text
-
-
-def test_an_interval_beyond_a_chart_of_points_is_cut_at_the_top_and_below():
-    own = series([0, 1, 2, 3], [2.0] * 4, low=[1.0, -9.0, 1.0, -9.0], high=[3.0, 3.0, 9.0, 9.0])
-    made = drawn(Chart("change", ChartKind.POINTS, [own], names=[*"abcd"], y_range=(0.0, 4.0)))
-    (shape,) = made.shapes
-    at = [x for x, _ in shape.marks]
-    assert shape.cuts == [(at[1], 100), (at[2], 0), (at[3], 0), (at[3], 100)]
 
 
 # --- Heat maps ------------------------------------------------------------------------------------

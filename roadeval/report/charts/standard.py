@@ -14,7 +14,7 @@ import numpy.typing as npt
 from roadeval.data import BASELINE, Rows, colours
 from roadeval.data.arrays import Floats, Sums
 from roadeval.data.result import Cells
-from roadeval.data.words import DASH, in_percent, points
+from roadeval.data.words import DASH, in_percent
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import LEVELS, Thresholds, merged
@@ -283,10 +283,8 @@ def series(name: str, look: Look, x: Any, y: Any) -> Series:
 
 
 MEAN: Final = "mean over drives"
-NAMED: Final = 60
-"""Of more drives than this only the extremes are named."""
-EXTREMES: Final = 3
-"""Drives named at either end, where not all are."""
+DRAWN: Final = 40
+"""Drives that have a row; of more the worst and the best."""
 WIDEST: Final = 0.9
 """The share of the drives' intervals that are seen whole; an axis for all would hide the rest."""
 LEAST: Final = 0.001
@@ -301,14 +299,11 @@ def difference(
     frames: Cells, changes: Cells, treated: str, control: str, mean: Difference
 ) -> Chart:
     """Return the paired difference of ERR, frame by frame, and its mean with the interval."""
-    drawn, change = looks([treated, control]), 100 * changes
+    look = looks([treated, control])[treated]
     return Chart(
         f"ERR of {treated} minus {control}",
-        ChartKind.BARS,
-        [
-            thinned(series(f"{name} better", drawn[name], frames, np.where(own, change, np.nan)))
-            for name, own in ((control, change > 0), (treated, change <= 0))
-        ],
+        ChartKind.LINES,
+        [thinned(series("each frame", look, frames, 100 * changes))],
         unit="pp",
         level=Level(
             "mean" if mean.low is None else "mean and its interval",
@@ -375,9 +370,13 @@ class ForestRow:
 def forest(rows: Sequence[ForestRow], over: Difference, label: str) -> Figure:
     """Return every drive's difference with its interval, the worst first, and that over drives.
 
-    Rows with names, as long as they are few; of more drives points side by side.
+    Of many drives only the worst and the best.
     """
     ranked = sorted(rows, key=lambda row: (-row.mean, row.name))
+    told = ["A row a drive, with its own interval, the worst above."]
+    if len(rows) > DRAWN:
+        rows = ranked = ranked[: DRAWN // 2] + ranked[-DRAWN // 2 :]
+        told.append(f"Of all drives the {DRAWN // 2} worst and the {DRAWN // 2} best.")
     names = [row.name if row.group is None else f"{row.name} ({row.group})" for row in ranked]
     drives = [
         _intervals(word, look, own, [(r.mean, r.low, r.high) for r in (ranked[p] for p in own)])
@@ -387,20 +386,10 @@ def forest(rows: Sequence[ForestRow], over: Difference, label: str) -> Figure:
         )
     ]
     mean, ends = (over.mean, over.low, over.high), _limits(rows, over)
-    if len(rows) > NAMED:
-        level = Level(MEAN, *map(in_percent, mean))
-        chart = Chart(label, ChartKind.POINTS, drives, names, "pp", level=level, y_range=ends)
-        told = ["A point a drive, with its own interval, the worst on the left."]
-        for word, some in (("worst", ranked[:EXTREMES]), ("best", ranked[: -EXTREMES - 1 : -1])):
-            named = (f"{row.name} ({points(row.mean)})" for row in some)
-            told.append(f"The {word}: {', '.join(named)}.")
-    else:
-        drives.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [mean]))
-        marks = ChartKind.MARKS
-        chart = Chart(label, marks, drives, [*names, MEAN], "pp", sums=1, y_range=ends)
-        told = ["A row a drive, with its own interval, the worst above."]
-        if any(row.group for row in rows):
-            told.append("In brackets the group that it belongs to.")
+    drives.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [mean]))
+    chart = Chart(label, ChartKind.MARKS, drives, [*names, MEAN], "pp", sums=1, y_range=ends)
+    if any(row.group for row in rows):
+        told.append("In brackets the group that it belongs to.")
     if missing := sum(row.low is None for row in rows):
         told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
     known = ((row.low, row.high) for row in rows if row.low is not None and row.high is not None)

@@ -95,7 +95,8 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         if findings.pixels:
             yield Text(pixels_changed(*findings.pixels, int(pairs["wrong"].sum())))
         drawn = difference(pairs["frame"], pairs["ERR"], FILTERED, UNFILTERED, change)
-        yield Figure([drawn], f"ERR of {FILTERED} minus {UNFILTERED}, frame by frame.")
+        caption = f"ERR of {FILTERED} minus {UNFILTERED}, frame by frame; below 0 the filter helps."
+        yield Figure([drawn], caption)
     yield from _over_time(findings)
 
 

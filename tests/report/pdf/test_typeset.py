@@ -51,8 +51,7 @@ def a_chart(title, kind=ChartKind.LINES, **more):
 
 CHARTS = {
     "lines": a_chart("ERR", names=["svm", "post"], level=Level("the mean", 1.5)),
-    "bars": a_chart("ERR", ChartKind.BARS, unit="pp", level=Level("the mean", 1.5, 1, 2)),
-    "points": a_chart("ERR", ChartKind.POINTS, names=["a", "b"]),
+    "level": a_chart("ERR", ChartKind.LINES, unit="pp", level=Level("the mean", 1.5, 1, 2)),
     "curves": a_chart("precision", across="recall"),
     "marks": a_chart("ERR", ChartKind.MARKS, names=["a", "b"], share=[3, 4], y_range=(0, 4)),
     "map": HeatMap("FP of a", np.array([[1.0, np.nan]]), 2.0, (213, 94, 0)),
@@ -66,7 +65,7 @@ def test_every_kind_of_chart_is_drawn_with_its_words(name):
     words = text(content)
     title = chart.title if name == "map" else f"{chart.title}, {chart.unit}"
     wanted = [title, "What it shows.", *(k.name for k in chart.legend())]
-    wanted += [] if name in ("points", "map") else getattr(chart, "names", ())
+    wanted += [] if name == "map" else getattr(chart, "names", ())
     assert [each for each in wanted if each not in words] == []
     # A legend is one, the titles are three.
     assert all(words.count(key.name) == 1 for key in chart.legend())
