@@ -157,7 +157,10 @@ def _drive(source: Path) -> DriveResult:
     """Open a recording of one camera."""
     drive = Result(source).drive
     if drive is None or drive.recording is None:
-        raise RoadevalError(f"{source}: frames are picked from the recording of one camera")
+        raise RoadevalError(
+            f"{source}: frames are picked from a recording of one camera; give the log, and of "
+            "several cameras one with --image-topic"
+        )
     return drive
 
 
