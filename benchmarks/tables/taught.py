@@ -11,7 +11,7 @@ from benchmarks.tables.drives import DRIVES, Drive, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST, read_drives
 from benchmarks.tables.measure import TEACHER, of_others
 from roadeval.training import save_model
-from roadeval.training.learning import train_on
+from roadeval.training.learning import fit
 
 IDD_LITE: Final = "idd"
 PUPILS: Final[tuple[tuple[str, str, str | None], ...]] = (
@@ -64,7 +64,7 @@ def model_of(teacher: str, seed: int, sources: Sources, idd_lite: Path | None = 
     if idd_lite is not None and teacher == IDD_LITE:
         config = roadeval.configure(tables)
         frames = [frame for drive in read_drives(idd_lite).values() for frame in drive]
-        save_model(train_on(frames, config.pipelines(), config.training), path)
+        save_model(fit(frames, config.pipelines(), config.training), path)
         return path
     drive = DRIVES[teacher]
     config = roadeval.configure(tables | {"labels": drive.labels})

@@ -33,9 +33,10 @@ _LOCAL: Final = {
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
     # Without Dask's own MALLOC_TRIM_THRESHOLD_: with it every image is mapped and cleared again,
-    # and a drive takes twice as long.
+    # and a drive takes twice as long. Nothing is imported from the current folder: a worker
+    # receives this process's own path, but only after it has imported some modules.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(
-        ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
+        ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PYTHONSAFEPATH"), 1
     ),
 }
 
@@ -67,7 +68,6 @@ def started(
 
     with ExitStack() as stack:
         if scheduler is None:
-            stack.enter_context(_safe_path())
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or dask.system.CPU_COUNT
             client = stack.enter_context(_local(distributed, count, memory_gib))
@@ -84,23 +84,6 @@ def started(
 def died(error: BaseException) -> bool:
     """Return whether an error means that the workers of a task have died."""
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
-
-
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let Python processes that begin in the block import nothing from the current folder.
-
-    A worker receives this process's own path, but only after it has imported some modules.
-    """
-    before = os.environ.get("PYTHONSAFEPATH")
-    os.environ["PYTHONSAFEPATH"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["PYTHONSAFEPATH"]
-        else:
-            os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextmanager

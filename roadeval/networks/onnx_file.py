@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.networks.settings import NetSettings, NetworkError
+from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
 
@@ -219,9 +220,9 @@ def weight_files(model: memoryview) -> Iterator[str]:
     for graph in _all(model, _GRAPH):
         for tensor in _all(graph, _INITIALIZER):
             for entry in _all(tensor, _EXTERNAL_DATA):
-                key, value = (b"".join(_all(entry, number)) for number in (1, 2))
-                if key == b"location":
-                    yield _text(value)
+                key, value = ("".join(map(_text, _all(entry, number))) for number in (1, 2))
+                if key == "location":
+                    yield value
 
 
 def maker(model: memoryview, output: str) -> str:
@@ -244,34 +245,10 @@ def maker(model: memoryview, output: str) -> str:
 
 def _all(message: memoryview, number: int) -> Iterator[memoryview]:
     """Yield the bytes of each field of a message that has this number."""
-    place = 0
-    while place < len(message):
-        key, begin = _integer(message, place)
-        wire = key & 7
-        if wire == 0:
-            _, place = _integer(message, begin)
-        elif wire == 2:
-            size, begin = _integer(message, begin)
-            place = begin + size
-        elif wire in (1, 5):
-            place = begin + (8 if wire == 1 else 4)
-        else:
-            raise ValueError("a kind of field that ONNX does not use")
-        if place > len(message):
-            raise ValueError("a field that is cut off")
-        if key >> 3 == number:
-            yield message[begin:place]
+    for found, value in protobuf_fields(message):
+        if found == number and isinstance(value, memoryview):
+            yield value
 
 
-def _integer(message: memoryview, place: int) -> tuple[int, int]:
-    """Return an integer of variable length and the place behind it."""
-    value = 0
-    for index, byte in enumerate(message[place : place + 10]):
-        value |= (byte & 0x7F) << (7 * index)
-        if byte < 0x80:
-            return value, place + index + 1
-    raise ValueError("an integer that is cut off")
-
-
-def _text(value: memoryview | bytes) -> str:
+def _text(value: memoryview) -> str:
     return bytes(value).decode(errors="replace")

@@ -23,6 +23,7 @@ import pyarrow as pa
 
 from roadeval.errors import RoadevalError
 from roadeval.recording.layout import APPLICATION, FRAME, DamagedError, RecordingError
+from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 
 _TEXT: Final = "TextDocument:text"
@@ -44,8 +45,6 @@ _INDEX: Final = 4
 content, how it is packed, and the size of what is unpacked."""
 _RECORDING: Final = 1
 """The kind of a store that is no blueprint."""
-_BYTES: Final = 2
-"""The kind of a field with a length; all others are one number."""
 _LZ4: Final = 2
 _MOST_PACKED: Final = 255
 """Bytes that LZ4 makes of one, at most: a message may claim any size."""
@@ -176,12 +175,12 @@ def flat(lists: pa.ListArray) -> pa.Array:
 
 def rows_of(message: bytes) -> tuple[str, pa.RecordBatch]:
     """Return the entity's path and the rows of a message; an error of any kind if it is damaged."""
-    own = _fields(message)
+    own = dict(protobuf_fields(memoryview(message)))
     batch = _unpacked(own[_CONTENT], own.get(_COMPRESSION), own[_SIZE])
     return batch.schema.metadata[b"rerun:entity_path"].decode(), batch
 
 
-def _unpacked(content: bytes, compression: int | None, size: int) -> pa.RecordBatch:
+def _unpacked(content: memoryview, compression: int | None, size: int) -> pa.RecordBatch:
     import lz4.block
 
     if compression == _LZ4:
@@ -191,32 +190,6 @@ def _unpacked(content: bytes, compression: int | None, size: int) -> pa.RecordBa
     batch = pa.ipc.open_stream(content).read_next_batch()
     batch.validate(full=True)  # what does not add up would be read beyond its end
     return batch
-
-
-def _fields(message: bytes) -> dict[int, Any]:
-    """Return the fields of a message in Protocol Buffers by number, each the last of its number."""
-    return dict(_each_field(message))
-
-
-def _each_field(message: bytes) -> Iterator[tuple[int, Any]]:
-    at = 0
-    while at < len(message):
-        tag, at = _varint(message, at)
-        number, at = _varint(message, at)
-        if tag & 7 == _BYTES:
-            at += number
-            yield tag >> 3, message[at - number : at]
-        else:
-            yield tag >> 3, number
-
-
-def _varint(message: bytes, at: int) -> tuple[int, int]:
-    """Return the number that begins at a byte, seven bits a byte, and where it ends."""
-    number = shift = 0
-    while message[at] & 0x80:
-        number |= (message[at] & 0x7F) << shift
-        at, shift = at + 1, shift + 7
-    return number | message[at] << shift, at + 1
 
 
 def _filled(batch: pa.RecordBatch, component: str) -> pa.RecordBatch:
@@ -261,13 +234,13 @@ def _read_places(path: Path) -> tuple[list[Place], bool]:
     return places, indexed
 
 
-def _about(store: bytes) -> tuple[int, str]:
+def _about(store: memoryview) -> tuple[int, str]:
     """Return the kind of a store, and the program that made it."""
-    fields = _fields(store)
-    return fields[1], _fields(fields[3])[1].decode()
+    fields = dict(protobuf_fields(store))
+    return fields[1], bytes(dict(protobuf_fields(fields[3]))[1]).decode()
 
 
-Stores = Iterable[tuple[bytes, list[Place]]]
+Stores = Iterable[tuple[memoryview, list[Place]]]
 """Descriptions of recordings and blueprints, and the places of messages of each."""
 
 
@@ -279,12 +252,14 @@ def _indexed(file: IO[bytes]) -> Stores | None:
     if magic != _END_MAGIC:
         return None
     file.seek(offset)
-    parts = [_fields(part) for _, part in _each_field(file.read(min(length, end)))]
+    index = memoryview(file.read(min(length, end)))
+    parts = [dict(protobuf_fields(part)) for _, part in protobuf_fields(index)]
     return [(part[_STORE], _listed(part[_INDEX])) for part in parts]
 
 
-def _listed(index: bytes) -> list[Place]:
-    _, content, compression, size = (_fields(index)[number] for number in (1, 2, 3, 4))
+def _listed(index: memoryview) -> list[Place]:
+    own = dict(protobuf_fields(index))
+    content, compression, size = (own[number] for number in (2, 3, 4))
     batch = _unpacked(content, compression, size)
     names = [f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size", "is_static")]
     names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
@@ -295,7 +270,7 @@ def _listed(index: bytes) -> list[Place]:
     ]
 
 
-def _written(file: IO[bytes]) -> Iterator[tuple[bytes, list[Place]]]:
+def _written(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Place]]]:
     """Read the whole messages of a file without an index."""
     end, offset = file.seek(0, 2), _BEGIN + _HEADER.size
     while offset <= end:
@@ -310,7 +285,8 @@ def _written(file: IO[bytes]) -> Iterator[tuple[bytes, list[Place]]]:
             if not static:
                 frames = batch.column(FRAME).to_pylist()
                 span = Span(min(frames), max(frames))
-            yield _fields(message)[_STORE], [Place(path, offset, size, static, span)]
+            store = dict(protobuf_fields(memoryview(message)))[_STORE]
+            yield store, [Place(path, offset, size, static, span)]
         offset += size + _HEADER.size
 
 

@@ -1,4 +1,4 @@
-"""JSON and TOML from elsewhere, read within limits.
+"""JSON, TOML and Protocol Buffers from elsewhere, read within limits.
 
 A few kilobytes can nest deeper than any program unpacks, name a table by twenty thousand words, or
 hold a word that takes minutes to typeset.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -122,3 +122,43 @@ def _check(document: Any, most: int, *, shown: bool = True) -> None:
         level = inner
     if shown:
         check_texts(texts)
+
+
+def protobuf_fields(message: memoryview) -> Iterator[tuple[int, Any]]:
+    """Yield number and value of each field of a message in Protocol Buffers.
+
+    A value is an integer, or the part of the message that holds it. A ValueError if the message is
+    damaged.
+    """
+    place = 0
+    while place < len(message):
+        key, place = _varint(message, place)
+        number, kind = key >> 3, key & 7
+        if kind == 0:
+            value, place = _varint(message, place)
+            yield number, value
+            continue
+        if kind == 2:
+            size, place = _varint(message, place)
+        elif kind in _SIZES:
+            size = _SIZES[kind]
+        else:
+            raise ValueError("a kind of field that is not used")
+        if size > len(message) - place:
+            raise ValueError("a field that is cut off")
+        yield number, message[place : place + size]
+        place += size
+
+
+_SIZES: Final = {1: 8, 5: 4}
+"""Bytes of fields of a fixed size, by their kind."""
+
+
+def _varint(message: memoryview, place: int) -> tuple[int, int]:
+    """Return an integer, seven bits a byte, and the place behind it."""
+    value = 0
+    for index, byte in enumerate(message[place : place + 10]):
+        value |= (byte & 0x7F) << (7 * index)
+        if byte < 0x80:
+            return value, place + index + 1
+    raise ValueError("an integer that is cut off")

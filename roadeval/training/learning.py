@@ -46,21 +46,21 @@ def fit(
     frames: Sequence[Frame],
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
-    prior: npt.NDArray[np.float32] | None = None,
+    warnings: Sequence[str] = (),
     base: Model | None = None,
 ) -> Model:
-    """Train every variant that learns anything.
+    """Train every variant that learns anything on decoded frames.
 
-    A `TrainingError` if there is no frame, or if the frames show road alone or no road at all and
-    some variant has something to learn. The frames have truth, unless ``settings.source`` allows
-    the patch. ``prior`` is kept in the model for the baseline, see `Model`. ``base`` is what the
-    variants have learnt from other drives: stages that can learn further do so, the others stay as
-    they are.
+    Their truths, where they have any, make the baseline. A `TrainingError` if there is no frame, or
+    if the frames show road alone or no road at all and some variant has something to learn. The
+    frames have truth, unless ``settings.source`` allows the patch. ``warnings`` are put before
+    those of the training itself. ``base`` is what the variants have learnt from other drives:
+    stages that can learn further do so, the others stay as they are.
     """
     learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)
     parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
-    warnings: list[str] = []
+    found = [*warnings]
     pixels = 0
     if learning:
         sampled = _sampled(frames, truths, settings)
@@ -73,15 +73,16 @@ def fit(
         each = partial(_fit_variant, frames, sampled, {} if base is None else base.parameters)
         for name, learnt, warned in ordered(each, learning.items(), _AT_ONCE):
             parameters[name] = learnt
-            warnings += warned
+            found += warned
+    labelled = [frame.truth for frame in frames if frame.truth is not None]
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
         pixels,
-        prior,
-        tuple(warnings),
+        BlindPrior.of_truths(labelled).road if labelled else None,
+        tuple(found),
         np.stack([fingerprint(frame.image) for frame in frames]),
     )
 
@@ -339,7 +340,7 @@ def _with_each_seed(
     base: Model | None,
 ) -> tuple[Model, ...]:
     """Train once with each seed; the first model has the warnings of all."""
-    first, *others = (train_on(frames, pipelines, each, base=base) for each in settings.by_seed())
+    first, *others = (fit(frames, pipelines, each, base=base) for each in settings.by_seed())
     more = [
         f"seed {seed}: {warning}"
         for seed, model in enumerate(others, settings.seed + 1)
@@ -371,24 +372,7 @@ def from_drives(
     guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
     repeated = [each for path, own in frames.items() for each in _repeated(own, f"{path.name}: ")]
     every = [frame for own in frames.values() for frame in own]
-    return train_on(every, pipelines, settings, [*warnings, *repeated, *guess])
-
-
-def train_on(
-    frames: Sequence[Frame],
-    pipelines: Mapping[str, Pipeline],
-    settings: TrainingSettings,
-    warnings: Sequence[str] = (),
-    base: Model | None = None,
-) -> Model:
-    """Train on decoded frames; their truths, where they have any, make the baseline.
-
-    ``warnings`` are put before those of the training itself, which builds on ``base``.
-    """
-    truths = [frame.truth for frame in frames if frame.truth is not None]
-    prior = BlindPrior.of_truths(truths).road if truths else None
-    model = fit(frames, pipelines, settings, prior, base)
-    return replace(model, warnings=(*warnings, *model.warnings))
+    return fit(every, pipelines, settings, [*warnings, *repeated, *guess])
 
 
 def _repeated(frames: Sequence[Frame], drive: str = "") -> list[str]:

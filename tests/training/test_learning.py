@@ -9,7 +9,7 @@ from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingError, TrainingSettings, learning, save_model
-from roadeval.training.learning import from_drives, from_file, from_log, spread, train_on
+from roadeval.training.learning import fit, from_drives, from_file, from_log, spread
 from roadeval.training.schedule import Schedule, Use
 from tests.training.making import frame, pipelines
 
@@ -114,9 +114,9 @@ def test_every_further_seed_trains_as_it_would_by_itself():
 
 
 def test_what_a_further_seed_warns_of_is_told_with_it(monkeypatch):
-    def collapsing(frames, pipelines, settings, prior, *base):
+    def collapsing(frames, pipelines, settings, **given):
         told = ("filtered: svm has collapsed",) if settings.seed != 4 else ()
-        return replace(made(frames, pipelines, settings, prior), warnings=told)
+        return replace(made(frames, pipelines, settings, **given), warnings=told)
 
     made = learning.fit
     monkeypatch.setattr(learning, "fit", collapsing)
@@ -314,7 +314,7 @@ def robust(tmp_path):
     small = {"trees": 3, "width": 32, "least": 5, "features": ("place", "colour")}
     made = {"unfiltered": configure({"preset": "robust", "trees": small}).pipeline}
     path = tmp_path / "city.model"
-    save_model(train_on([frame(n) for n in (50, 51)], made, TrainingSettings()), path)
+    save_model(fit([frame(n) for n in (50, 51)], made, TrainingSettings()), path)
     return made, path
 
 
@@ -349,7 +349,7 @@ def test_without_truth_the_patch_adapts_only_where_that_is_insisted_on(robust):
 
 def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
     path = tmp_path / "city.model"
-    save_model(train_on([frame(0)], PIPELINES, TrainingSettings()), path)
+    save_model(fit([frame(0)], PIPELINES, TrainingSettings()), path)
     with pytest.raises(
         TrainingError, match=r"no stage of it can learn further \(similarity, svm\)"
     ):

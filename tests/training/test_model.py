@@ -23,7 +23,8 @@ FEW = {"trees": {"trees": 10, "features": ["place"]}}
 @pytest.fixture(scope="module")
 def model() -> Model:
     prior = np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
-    return fit([frame(n) for n in range(3)], pipelines(), TrainingSettings(), prior)
+    fitted = fit([frame(n) for n in range(3)], pipelines(), TrainingSettings())
+    return dataclasses.replace(fitted, prior=prior)
 
 
 @pytest.fixture
