@@ -46,7 +46,6 @@ class Watch:
         self._lines = lines
         self._stage = ""
         self._written = 0.0
-        self._dashboard: str | None = None
 
     def __call__(self, progress: Progress | FleetProgress) -> None:
         """Show how far a job is."""
@@ -59,7 +58,7 @@ class Watch:
         # Before the first item nothing is known; the bar shows that something moves.
         total = progress.total if progress.done else None
         self._display.update(self._task, completed=progress.done, total=total)
-        text = self._frames(progress) if isinstance(progress, Progress) else self._drives(progress)
+        text = self._frames(progress) if isinstance(progress, Progress) else drives_line(progress)
         self._display.update(self._task, description=text)
         due = time.monotonic() - self._written >= LINE_PERIOD_S
         if self._lines and (begins or due or progress.done == progress.total):
@@ -78,13 +77,6 @@ class Watch:
             if task.time_remaining is not None:
                 parts.append(f"{task.time_remaining:.0f} s left")
         return f"{progress.stage}: {', '.join(parts)}"
-
-    def _drives(self, progress: FleetProgress) -> str:
-        """Describe a fleet, and write where its dashboard is."""
-        if progress.dashboard is not None and progress.dashboard != self._dashboard:
-            self._dashboard = progress.dashboard
-            self._write(f"workers   {progress.dashboard}")
-        return drives_line(progress)
 
 
 def drives_line(progress: FleetProgress) -> str:

@@ -308,6 +308,11 @@ class RunConfig(LogConfig):
         used = (each.settings.get("given") for each in self.pipelines().values())
         return {own.name for own in used if own is not None}
 
+    def for_training(self) -> RunConfig:
+        """Return the configuration with the masks alone that variants learn from."""
+        masks = {name: own for name, own in self.masks.items() if name in self.given()}
+        return replace(self, masks=masks, only=())
+
     def with_drives(self, drives: Iterable[DriveSettings]) -> RunConfig:
         """Return the configuration with further settings of single drives.
 

@@ -12,8 +12,6 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from importlib.util import find_spec
 from typing import Any, Final
 
 from roadeval.fleet.entry import FleetError
@@ -33,41 +31,31 @@ _LOCAL: Final = {
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
     # Without Dask's own MALLOC_TRIM_THRESHOLD_: with it every image is mapped and cleared again,
-    # and a drive takes twice as long. Nothing is imported from the current folder: a worker
-    # receives this process's own path, but only after it has imported some modules.
+    # and a drive takes twice as long.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(
-        ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PYTHONSAFEPATH"), 1
+        ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
     ),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Engine:
-    """Worker processes."""
-
-    executor: Executor
-    workers: int | None
-    dashboard: str | None = None
-    """Address of a page that shows their work, if there is one."""
 
 
 @contextmanager
 def started(
     workers: int | None = None, memory_gib: float | None = None, scheduler: str | None = None
-) -> Iterator[Engine]:
-    """Start worker processes here, or connect to a scheduler, until the block ends.
+) -> Iterator[tuple[Executor, int]]:
+    """Start worker processes here, or connect to a scheduler; yield who does tasks, and how many.
 
-    Tasks that still run then are cancelled; workers that were started here end. A `FleetError` if
-    the scheduler does not answer. There are ``workers`` processes here, one a processor by default.
-    ``memory_gib`` is the limit of each, by default its share of the machine's: a process that takes
-    more is ended, which costs its drive one attempt. ``scheduler`` is the address of a Dask
-    scheduler, ``tcp://host:8786``, or the file that it has written.
+    At the end of the block tasks that still run are cancelled, and workers that were started here
+    end. A `FleetError` if the scheduler does not answer. There are ``workers`` processes here, one
+    a processor by default. ``memory_gib`` is the limit of each, by default its share of the
+    machine's: a process that takes more is ended, which costs its drive one attempt. ``scheduler``
+    is the address of a Dask scheduler, ``tcp://host:8786``, or the file that it has written.
     """
     import dask.system
     import distributed
 
     with ExitStack() as stack:
         if scheduler is None:
+            stack.enter_context(_safe_path())
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or dask.system.CPU_COUNT
             client = stack.enter_context(_local(distributed, count, memory_gib))
@@ -76,14 +64,30 @@ def started(
             count = len(client.scheduler_info(n_workers=-1)["workers"])
         executor = client.get_executor(pure=False)
         stack.callback(executor.shutdown, wait=False)
-        # Without Bokeh the address shows nothing.
-        page = client.dashboard_link if find_spec("bokeh") else None
-        yield Engine(executor, count, page or None)
+        yield executor, count
 
 
 def died(error: BaseException) -> bool:
     """Return whether an error means that the workers of a task have died."""
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let Python processes that begin in the block import nothing from the current folder.
+
+    A worker receives this process's own path, but only after it has imported some modules. Dask's
+    own setting would stay in this process's environment.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextmanager
@@ -97,7 +101,7 @@ def _local(distributed: Any, count: int, memory_gib: float | None) -> Iterator[A
                 processes=True,
                 memory_limit=limit,
                 host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
+                dashboard_address=None,
                 worker_dashboard_address=None,
                 silence_logs=logging.CRITICAL,
             )

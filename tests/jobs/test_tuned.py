@@ -264,7 +264,7 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
         assert err(rows, "mine_tuned") < err(rows, "mine") / 3
 
 
-@pytest.mark.parametrize("by", ["network", "masks"])
+@pytest.mark.parametrize("by", ["network", "masks", "files"])
 def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path, by):
     drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(2)]
     fleet = {"folds": 2, "workers": 1}
@@ -272,6 +272,8 @@ def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path,
         config = with_network(folder, fleet=fleet)
     else:
         masks = {"topics": {"masks": {"mine": "/net/mask"}}}
+        if by == "files":
+            masks = {"masks": {"mine": confidences(tmp_path / "shares")}}
         config = small(configure({**SMALL, **masks, "fleet": fleet}).with_tuned(["mine"]))
     with ThreadPoolExecutor(1) as executor:
         roadeval.replay_fleet(drives, tmp_path / "out", config, executor=executor)

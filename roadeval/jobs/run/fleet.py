@@ -65,8 +65,6 @@ class FleetProgress:
     """Since the command began."""
     stage: str
     """``looking``, ``training``, ``replaying`` or ``writing``."""
-    dashboard: str | None = None
-    """Address of a page that shows the workers, if there is one."""
 
 
 OnFleetProgress = Callable[[FleetProgress], None]
@@ -196,7 +194,6 @@ class FleetRun:
     """What is known of each drive that is done, by its ID."""
     pruned: set[str] = field(default_factory=set)
     workers: int = 1
-    dashboard: str | None = None
     began: float = field(default_factory=time.monotonic)
 
     def replay_all(self, executor: Executor | None) -> None:
@@ -243,7 +240,6 @@ class FleetRun:
                 frames=sum(each.frames for each in done if not each.repeated),
                 seconds=time.monotonic() - self.began,
                 stage=stage,
-                dashboard=self.dashboard,
             )
         )
 
@@ -320,9 +316,9 @@ class FleetRun:
             yield executor
             return
         asked = self.config.fleet
-        with started(asked.workers, asked.memory_gib, asked.scheduler) as engine:
-            self.workers, self.dashboard = engine.workers or 1, engine.dashboard
-            yield engine.executor
+        with started(asked.workers, asked.memory_gib, asked.scheduler) as (workers, count):
+            self.workers = max(count, 1)
+            yield workers
 
     def _by_fold(self, engine: Executor, configs: Mapping[str, RunConfig]) -> list[DriveTask]:
         """Train the folds' models, and return the tasks of the drives with them."""

@@ -390,7 +390,7 @@ def train_fold(task: FoldTask) -> FoldModel:
     _check(task.software, task.config)
     about = task.path.with_suffix(".json")
     with ending_the_run(task.folder), alone(task.path, about):
-        looks = [seen(entry, replace(own, masks={})) for entry, own in task.candidates]
+        looks = [seen(entry, own.for_training()) for entry, own in task.candidates]
         parts = [asked(task.config, ""), looks]
         parts += [[entry.id, asked(own, "")] for entry, own in task.candidates]
         wanted = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
@@ -460,7 +460,7 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
 
 def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[Frame]:
     """Decode the training frames of a drive, and hold them as long as there is room."""
-    with logs.open_log(readable(entry.source), replace(own, masks={})) as log:
+    with logs.open_log(readable(entry.source), own.for_training()) as log:
         selection = log.select()
         if selection.truth is None:
             return

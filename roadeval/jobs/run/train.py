@@ -78,9 +78,7 @@ def _draw(
 ) -> _Drawn:
     """Decode the training frames of a drive and hold them."""
     own, frames, streams = config.for_drive(drive), list[Frame](), list[logs.FrameStream]()
-    needed = config.given()
-    masks = {name: each for name, each in own.masks.items() if name in needed}
-    with logs.open_log(drive, replace(own, masks=masks)) as log:
+    with logs.open_log(drive, own.for_training()) as log:
         selection = log.select(several=several and own.labels == config.labels)
 
         def begin() -> logs.FrameStream:
