@@ -35,7 +35,6 @@ from roadeval.report.blocks import markdown as written
 from roadeval.report.chart import Chart
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import ForestRow
-from roadeval.report.sections.drives import Part, strata_table
 from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
 
@@ -276,7 +275,6 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         yield Text(told.discovery_note(), "note")
         yield from _plot(comparison)
         yield from changed_drives(comparison)
-        yield from _by_tag(comparison)
     if comparison.regions:
         legend = correction(row.difference for row in comparison.regions)
         yield Heading("Where it is better, and where worse", 2)
@@ -331,18 +329,6 @@ def _masks(comparison: Comparison) -> list[tuple[str, str]]:
 
 def _own(comparison: Comparison, result: str, variant: str) -> list[DriveChange]:
     return [row for row in comparison.drives if (row.result, row.variant) == (result, variant)]
-
-
-def _by_tag(comparison: Comparison) -> Iterator[Block]:
-    for mask in _masks(comparison):
-        parts = [
-            Part(each.stratum.by, str(each.stratum.value), each.stratum.difference)
-            for each in comparison.strata
-            if (each.result, each.variant) == mask
-        ]
-        if any(part.difference.mean for part in parts):
-            yield Heading(f"Change of {TESTED} of {mask[1]} by tag", 2)
-            yield from strata_table(parts)
 
 
 def _plot(comparison: Comparison) -> Iterator[Block]:

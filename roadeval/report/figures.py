@@ -20,9 +20,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
 from matplotlib.image import FigureImage
-from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from matplotlib.transforms import Bbox, TransformedBbox
 
@@ -57,8 +55,6 @@ from roadeval.runtime.threads import ordered
 DPI: Final = 200
 WIDTH: Final = 8
 """Inches across a figure."""
-INCH: Final = 72
-"""Points in an inch."""
 LETTERS: Final = 9
 SMALL: Final = 8
 """Points of labels and legends, and of the ticks' labels."""
@@ -153,21 +149,6 @@ def svg(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def _fitting(name: str, room: float) -> str:
-    """Return a name in as many letters as fit into so many points; three at least."""
-    letters = len(visible(name))
-    while letters > 3 and _width(elided(name, letters)) > room:
-        letters -= 1
-    return elided(name, letters)
-
-
-def _width(text: str) -> float:
-    """Return the width of a line of text in points."""
-    font = FontProperties(family=RC["font.family"], size=LETTERS)
-    width: float = text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]
-    return width
-
-
 MARKED: Final = 25
 """Up to this many points each has its marker; beyond, about as many do."""
 CROWDED: Final = 150
@@ -184,10 +165,8 @@ _DASHES: Final = {
     "dash-dotted": (0, (7, 2, 1.5, 2)),
 }
 _MARKS: Final = {"circle": "o", "square": "s", "triangle": "^", "diamond": "D", "cross": "x"}
-_ROOM: Final = INCH * (WIDTH - 1)
-_HANDLE: Final = 4.2 * LETTERS
-_BETWEEN: Final = 2 * LETTERS
-"""Points that a legend has, that a line before a label takes, and that lie between columns."""
+_WIDEST: Final = 80
+"""Letters that have room in a line of a figure, with a legend's lines beside them."""
 
 
 def error_rate(drive: str, windows: Rows) -> Figure:
@@ -236,8 +215,8 @@ def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
     axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     axes[-1].set_xlabel("frame")
     handles, names = (found[::-1] for found in axes[0].get_legend_handles_labels())
-    names = [_fitting(_LABELS.get(name, name), _ROOM - _HANDLE) for name in names]
-    columns = int((_ROOM + _BETWEEN) / (max(map(_width, names)) + _HANDLE + _BETWEEN))
+    names = [elided(_LABELS.get(name, name), _WIDEST) for name in names]
+    columns = 100 // (max(map(len, names)) + 10)
     axes[0].legend(
         handles,
         names,
@@ -248,7 +227,7 @@ def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
         bbox_to_anchor=(0, 1),
         borderaxespad=0.2,
         borderpad=0,
-        ncols=min(columns, 3),
+        ncols=min(max(columns, 1), 3),
         handlelength=3.4,
     ).get_title().set_color(FAINT)
     figure.align_ylabels(axes)
@@ -292,16 +271,15 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
     write(0.1, 0.32, _legend(examples, names), size=8.5, color=FAINT, va="top")
     for number, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
         top, bottom = TOP + number * down, TOP + (number + 1) * down - GAP
-        name = f"frame {example.frame}"
-        shown = name if _width(name) < INCH * (down - GAP) else str(example.frame)
+        name = f"frame {example.frame}" if down > 0.7 else str(example.frame)
         beside = {"rotation": 90, "ha": "right", "va": "center", "size": SMALL, "color": FAINT}
-        write(LEFT - GAP, (top + bottom) / 2, shown, **beside)
+        write(LEFT - GAP, (top + bottom) / 2, name, **beside)
         for column, (title, picture) in enumerate(pictures.items()):
             left, right = LEFT + column * across, LEFT + (column + 1) * across - GAP
             sides = left / WIDTH, 1 - bottom / total, right / WIDTH, 1 - top / total
             Picture(figure, picture, Bbox.from_extents(*sides))
             if number == 0:
-                name = _fitting(title, INCH * (across - GAP))
+                name = elided(title, max(int(11 * across), 3))
                 above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
                 write((left + right) / 2, TOP - GAP, name, **above)
     return figure

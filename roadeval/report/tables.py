@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, Final
 
-from roadeval.data import FINAL_STAGE
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import (
     DASH,
     MINUS,
@@ -23,7 +23,7 @@ from roadeval.evaluation.score import final_stages
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
-from roadeval.results.sentences import marked_interval, seeds_in_words, spread_in_words
+from roadeval.results.sentences import marked_interval, spread_in_words
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 """The rates whose differences stand beside that of ERR."""
@@ -167,18 +167,24 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
 
 
 def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
-    """Tabulate the spread of rates over seeds, a row for each variant that learns."""
+    """Tabulate the spread of rates over seeds: of each variant that learns, and of the filter."""
+    rows: list[list[Cell | str]] = [
+        [
+            variant_cell(name, names),
+            *(spread_in_words(stages[FINAL_STAGE].get(rate, ()), percent) for rate in FULL),
+        ]
+        for name, stages in seeds["totals"].items()
+    ]
+    if effect := seeds["difference"].get(FINAL_STAGE):
+        words = f"{FILTERED} {MINUS} {UNFILTERED}, pp"
+        rows.append([words, *(spread_in_words(effect.get(rate, ()), points) for rate in FULL)])
+    first, *_, last = seeds["seeds"]
     return Table(
         ["final mask", *FULL],
-        [
-            [
-                variant_cell(name, names),
-                *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in FULL),
-            ]
-            for name, stages in seeds["totals"].items()
-        ],
-        caption=f"Percent, with {seeds_in_words(seeds)} of the training: the middle, and from the "
-        "least to the greatest.",
+        rows,
+        caption=f"Percent, with seeds {first} to {last} of the training: the middle, and from the "
+        f"least to the greatest. All else is of seed {first}.",
+        small=True,
     )
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum, auto
 from operator import itemgetter
 from statistics import median
 from typing import Any, Final
 
-from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, TUNED, UNFILTERED, Tally
+from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Tally
 from roadeval.data.words import (
+    DASH,
     counted,
     defined,
     in_percent,
@@ -19,7 +20,6 @@ from roadeval.data.words import (
     listing,
     number,
     percent,
-    plain_points,
 )
 from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
@@ -453,49 +453,17 @@ def step_by_step(parts: Mapping[str, float]) -> str:
     return ", ".join([f"{first}{without} leaves {error:.1f} % wrong", *steps])
 
 
-def spread(values: Sequence[float | None]) -> tuple[float, float, float] | None:
-    """Return the median, least and greatest of the values that are defined; None without any."""
-    known = [value for value in values if defined(value)]
-    return (median(known), min(known), max(known)) if known else None
+def spread_in_words(values: Sequence[float | None], written: Callable[[float], str]) -> str:
+    """Return the median, least and greatest of the values that are defined.
 
-
-def spread_in_words(values: Sequence[float | None]) -> str:
-    """Return how far a rate is spread, in percent.
-
-    >>> spread_in_words([0.01, 0.02, 0.04])
+    >>> spread_in_words([0.01, 0.02, 0.04], percent)
     '2.00 (1.00 to 4.00)'
     """
-    middle, *ends = map(percent, spread(values) or [None] * 3)
-    return f"{middle} ({' to '.join(ends)})" if spread(values) else middle
-
-
-def seeds_in_words(seeds: Mapping[str, Any]) -> str:
-    """Name the seeds of ``seeds`` in ``summary.json``.
-
-    >>> seeds_in_words({"seeds": [3, 4, 5]})
-    'seeds 3 to 5'
-    """
-    first, *_, last = seeds["seeds"]
-    return f"seeds {first} to {last}"
-
-
-def of_seeds(seeds: Mapping[str, Any]) -> str:
-    """Return what other seeds, as in ``summary.json``, make of the masks and the filter."""
-    parts = [
-        f"{variant} {percent(least)} to {percent(most)} % (middle {percent(middle)})"
-        for variant, stages in seeds["totals"].items()
-        for middle, least, most in filter(None, [spread(stages[FINAL_STAGE][TESTED])])
-    ]
-    if effect := spread(seeds["difference"].get(FINAL_STAGE, {}).get(TESTED, ())):
-        middle, least, most = map(plain_points, effect)
-        parts.append(f"{FILTERED} minus {UNFILTERED} {least} to {most} pp (middle {middle})")
-    begin = f"With {seeds_in_words(seeds)} of the training"
-    if not parts:
-        return f"{begin} {TESTED} of {FINAL_STAGE} is undefined on every frame."
-    return (
-        f"{begin} {TESTED} of {FINAL_STAGE} is: {listing(parts)}. Tables and recording are those "
-        f"of seed {seeds['seeds'][0]}."
-    )
+    known = [value for value in values if defined(value)]
+    if not known:
+        return DASH
+    middle, least, most = map(written, (median(known), min(known), max(known)))
+    return f"{middle} ({least} to {most})"
 
 
 def without_filter(notes: Iterable[str]) -> list[str]:

@@ -214,14 +214,13 @@ def test_final_masks_of_all_results_are_one_family_and_the_baseline_is_not_of_it
 # --- Several drives -------------------------------------------------------------------------------
 
 
-def a_fleet(label, errors, *, groups=None, tags=None, digests=None):
+def a_fleet(label, errors, *, groups=None, digests=None):
     """A result of drives ``0``, ``1`` ..., each with so many wrong pixels frame by frame."""
     parts = []
     for place, own in enumerate(errors):
         about = {
             "digest": digests[place] if digests else f"d{place}",
             "group": groups[place] if groups else None,
-            "tags": tags[place] if tags else {},
         }
         parts.append(a_part({POST: list(own)}, drive=str(place), **about))
     return Side(label, parts)
@@ -282,16 +281,6 @@ def test_drives_are_ranked_and_few_of_those_called_changed_are_not():
     assert first.q == pytest.approx(20 * first.difference.p)
     assert any(each.difference.p < 0.05 for each in others)
     assert not any(each.changed for each in others)
-
-
-def test_changes_are_parted_by_the_tags_of_the_new_result():
-    tags = [{"weather": "rain" if place % 2 else "sun"} for place in range(12)]
-    sides = [a_fleet("a", noisy(12)), a_fleet("b", noisy(12, 12, 6), tags=tags)]
-    found = compare(sides, SETTINGS).strata
-    assert [(each.stratum.value, each.stratum.difference.units) for each in found] == [
-        ("rain", 6),
-        ("sun", 6),
-    ]
 
 
 def test_drives_that_are_left_out_or_have_moved_are_told():

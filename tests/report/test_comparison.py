@@ -193,8 +193,7 @@ def of_drives():
                 )
             }
             about = {"drive": f"drive_{place}", "digest": f"d{place}"}
-            tags = {"weather": ("sun", "rain", "fog")[place % 3]}
-            parts.append(a_part(own, tags=tags, **about))
+            parts.append(a_part(own, **about))
         return Side(label, parts)
 
     found = compare([a_result("base", 0), a_result("new", 9)], EvaluationSettings())
@@ -228,12 +227,11 @@ def test_drives_that_changed_are_listed_the_surest_first():
     assert max(q) <= 0.05
 
 
-def test_the_document_has_the_plots_and_what_changed_by_tag():
+def test_the_document_of_several_drives_has_the_plots():
     assert [b.title for b in made_of(BulletList)] == ["Limits exceeded", "Limits kept", "Where"]
     assert len(made_of(Figure)) == 2
     headings = [b.text for b in made_of(Heading)]
     assert "Which drives changed" in headings
-    assert "Change of ERR of filtered by tag" in headings
     words = text(pdf(document(COMPARED, JUDGED, [])))
     assert "filtered: over 30 drives new instead of base raises ERR of post" in words
     assert "Holm's correction for the 2 differences of ERR" in words

@@ -1,10 +1,13 @@
-"""What several seeds come to, in numbers and in a sentence."""
+"""What several seeds come to."""
 
 import math
 
 import pytest
 
-from roadeval.results.sentences import of_seeds, spread, spread_in_words
+from roadeval.data.words import points
+from roadeval.report.tables import seeds_table
+from roadeval.results.sentences import spread_in_words
+from tests.report.making import plain_rows
 
 SEEDS = {
     "seeds": [7, 8, 9],
@@ -17,37 +20,30 @@ SEEDS = {
 
 
 @pytest.mark.parametrize(
-    ("values", "found"),
+    ("values", "told"),
     [
-        ([3, 1, 2], (2, 1, 3)),
-        ([1, 2, 3, 10], (2.5, 1, 10)),
-        ([None, 2, math.nan], (2, 2, 2)),
-        ([None, math.nan], None),
-        ([], None),
+        ([0.03, 0.01, 0.02], "+2.00 (+1.00 to +3.00)"),
+        ([0.01, 0.02, 0.03, 0.1], "+2.50 (+1.00 to +10.00)"),
+        ([None, 0.02, math.nan], "+2.00 (+2.00 to +2.00)"),
+        ([None, math.nan], "–"),  # noqa: RUF001
+        ([], "–"),  # noqa: RUF001
     ],
 )
-def test_a_spread_is_the_middle_the_least_and_the_greatest_of_what_is_defined(values, found):
-    assert spread(values) == found
+def test_a_spread_is_the_middle_the_least_and_the_greatest_of_what_is_defined(values, told):
+    assert spread_in_words(values, points) == told
 
 
-def test_the_sentence_names_the_seeds_every_variant_the_effect_and_whose_tables_they_are():
-    assert of_seeds(SEEDS) == (
-        "With seeds 7 to 9 of the training ERR of post is: filtered 6.69 to 7.47 % (middle 7.09), "
-        "unfiltered 5.00 to 6.12 % (middle 5.50) and filtered minus unfiltered -1.35 to +1.69 pp "
-        "(middle +1.59). Tables and recording are those of seed 7."
-    )
+def test_every_variant_has_a_row_and_the_filter_s_effect_has_one():
+    table = seeds_table(SEEDS, ["filtered", "unfiltered"])
+    assert [row[:2] for row in plain_rows(table)] == [
+        ["filtered", "7.09 (6.69 to 7.47)"],
+        ["unfiltered", "5.50 (5.00 to 6.12)"],
+        ["filtered \N{MINUS SIGN} unfiltered, pp", "+1.59 (\N{MINUS SIGN}1.35 to +1.69)"],
+    ]
+    assert "with seeds 7 to 9 of the training" in table.caption
+    assert "All else is of seed 7." in table.caption
 
 
 def test_one_variant_has_no_effect_to_tell():
     alone = SEEDS | {"totals": {"unfiltered": SEEDS["totals"]["unfiltered"]}, "difference": {}}
-    assert of_seeds(alone) == (
-        "With seeds 7 to 9 of the training ERR of post is: unfiltered 5.00 to 6.12 % (middle "
-        "5.50). Tables and recording are those of seed 7."
-    )
-
-
-def test_rates_that_are_defined_on_no_frame_are_said_to_be():
-    none = {"filtered": {"post": {"ERR": [None, None, None]}}}
-    told = of_seeds(SEEDS | {"totals": none, "difference": {}})
-    assert told == "With seeds 7 to 9 of the training ERR of post is undefined on every frame."
-    assert spread_in_words([None]) == "–"  # noqa: RUF001
+    assert len(seeds_table(alone, ["unfiltered"]).rows) == 1

@@ -22,7 +22,7 @@ from roadeval.report.tables import (
     thresholds_table,
 )
 from roadeval.results.facts import Facts, FrameAccount
-from roadeval.results.sentences import account, correction, of_seeds, without_truth
+from roadeval.results.sentences import account, correction, without_truth
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,7 +56,7 @@ def _scores(facts: Facts, metres: Sequence[Measured]) -> Iterator[Block]:
         if legend := correction(each.rates["ERR"] for each in pairs):
             yield Text(legend)
     if facts.seeds:
-        yield from (seeds_table(facts.seeds, [*facts.totals]), Text(of_seeds(facts.seeds)))
+        yield seeds_table(facts.seeds, [*facts.totals])
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
     if metres:

@@ -8,7 +8,6 @@ from roadeval.evaluation.comparison.compare import (
     ComparisonError,
     DriveChange,
     RegionChange,
-    StratumChange,
     compare,
     variants_as_sides,
 )

@@ -44,12 +44,10 @@ from roadeval.evaluation.stats import (
     CameraRates,
     Difference,
     DriveMean,
-    Stratum,
     benjamini_hochberg,
     group_means,
     holm,
     over_drives,
-    strata,
     within_drive,
 )
 
@@ -134,16 +132,6 @@ class DriveChange:
 
 
 @dataclass(frozen=True, slots=True)
-class StratumChange:
-    """What changed in the ERR of a final mask on a part of the drives."""
-
-    result: str
-    variant: str
-    stage: str
-    stratum: Stratum
-
-
-@dataclass(frozen=True, slots=True)
 class RegionChange:
     """What changed in the ERR of a final mask within a region, or on the frames of a shade.
 
@@ -177,8 +165,6 @@ class Comparison:
     """The same on all of its own frames; side by side those of every result."""
     drives: tuple[DriveChange, ...]
     """Where several drives are compared: each, mask by mask, the surest first."""
-    strata: tuple[StratumChange, ...]
-    """Parts of several drives, by the new result's tags."""
     regions: tuple[RegionChange, ...]
     """The final masks of each new result, region by region."""
     moved: tuple[MovedFrame, ...]
@@ -256,7 +242,6 @@ def compare(
         changes=tuple(_corrected(changes)),
         levels=tuple(row for each in found for row in _changes(each.label, each.levels)),
         drives=tuple(row for each in found for row in each.drives()),
-        strata=tuple(row for each in found for row in each.strata()),
         regions=tuple(replace(r, difference=d) for r, d in zip(regions, corrected, strict=True)),
         moved=tuple(frame for each in found for frame in each.moved),
         disagreements=tuple(frame for each in found for frame in each.disagreements),
@@ -281,7 +266,7 @@ def _side_by_side(sides: Sequence[Side], other: Side, settings: EvaluationSettin
         if any(part.digest is None for part in side.scored):
             note = Note(Kind.LOG_UNKNOWN, side.label)
     made, levels = tuple(results), tuple(rows)
-    return Comparison(False, made, (), levels, levels, (), (), (), (), (), (note,), settings)
+    return Comparison(False, made, (), levels, levels, (), (), (), (), (note,), settings)
 
 
 def _result(side: Side, frames: int) -> ComparedResult:
@@ -574,15 +559,15 @@ class _Against:
 
     def drives(self) -> Iterator[DriveChange]:
         """Yield each of several drives' changes of final masks, the surest first."""
-        for (variant, stage), own in self._tested():
-            values = benjamini_hochberg([each.within.p if each.within else None for each in own])
+        for (variant, stage), tested in self._masks.items() if self._several else ():
+            own = [(e, e.base, e.within) for e in tested if e.base and e.within]
+            values = benjamini_hochberg([within.p for _, _, within in own])
             rows = [
                 DriveChange(
                     *(self.label, variant, stage, each.part.name, each.frames),
-                    *(base.means[TESTED], each.new.means[TESTED], each.within, q),
+                    *(base.means[TESTED], each.new.means[TESTED], within, q),
                 )
-                for each, q in zip(own, values, strict=True)
-                if (base := each.base) and each.within
+                for (each, base, within), q in zip(own, values, strict=True)
             ]
             yield from sorted(
                 rows,
@@ -591,21 +576,6 @@ class _Against:
                     row.drive,
                 ),
             )
-
-    def strata(self) -> Iterator[StratumChange]:
-        """Yield the changes of final masks by the new result's tags."""
-        keys = sorted({key for part in self._new.parts for key in part.tags})
-        for (variant, stage), own in self._tested():
-            values = {key: [each.part.tags.get(key) for each in own] for key in keys}
-            drives = [each.mean(each.means, TESTED) for each in own]
-            for stratum in strata(drives, values, {}, self._settings.confidence):
-                yield StratumChange(self.label, variant, stage, stratum)
-
-    def _tested(self) -> Iterator[tuple[Name, list[_OnDrive]]]:
-        """Yield the final masks of several drives."""
-        for mask, own in self._masks.items() if self._several else ():
-            if kept := [each for each in own if each.within]:
-                yield mask, kept
 
     def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""

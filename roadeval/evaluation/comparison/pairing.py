@@ -39,8 +39,6 @@ class Part:
     """Returns its rows of ``frames``, ``regions``, ``disagreements`` or ``scores``."""
     group: str | None = None
     """A name shared with other drives of the result, as of a day or a route."""
-    tags: Mapping[str, str] = field(default_factory=dict)
-    """Values by the tags' keys."""
     camera: str = ""
     """Which camera of the drive."""
 

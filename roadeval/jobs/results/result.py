@@ -459,7 +459,6 @@ def _members(fleet: FleetFolder) -> Iterator[Part]:
             asked=settings,
             rows=partial(_rows_of_member, fleet, member.drive),
             group=member.group,
-            tags=member.tags,
             camera=row["camera"] or "",
         )
 

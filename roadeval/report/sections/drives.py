@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import DASH, first_of, interval, number, percent, points
+from roadeval.data.words import DASH, first_of, number, percent, points
 from roadeval.evaluation.score import BASES, TESTED
-from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -27,7 +25,7 @@ from roadeval.report.charts.standard import ForestRow, forest
 from roadeval.results.facts import OverDrives, StratumFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
-from roadeval.results.sentences import MARK, is_significant
+from roadeval.results.sentences import MARK, is_significant, marked_interval
 from roadeval.runtime.text import elided
 
 NAMED: Final = 12
@@ -234,11 +232,11 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
         if all(each.low is None for each in own):
             own = [each for each in own if each.by not in _LIGHT]
         if own:
-            tables.append((title, [Part(e.by.removeprefix(TAG), _value(e), e) for e in own]))
+            tables.append((title, own))
     if not tables:
         return
     yield Heading("By tag and by light")
-    yield from (Details(title, [*strata_table(rows)]) for title, rows in tables)
+    yield from (Details(title, [*_strata_table(rows)]) for title, rows in tables)
     if any(row.by in _LIGHT for _, rows in tables for row in rows):
         yield Text(_OF_LIGHT, "note")
 
@@ -258,23 +256,9 @@ def _value(each: StratumFacts) -> str:
     return f"{each.value} ({least} to {most})"
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of a fleet in a table: by what it is divided, the value there, and the difference."""
-
-    by: str
-    value: str
-    difference: Difference
-
-    @property
-    def is_marked(self) -> bool:
-        """Whether the difference is significant after correction."""
-        return is_significant(self.difference.p_holm, self.difference.confidence)
-
-
-def strata_table(rows: Sequence[Part]) -> Iterator[Block]:
+def _strata_table(rows: Sequence[StratumFacts]) -> Iterator[Block]:
     """Yield a table of parts, those with the most drives of each division, and what marks mean."""
-    ranked = sorted(range(len(rows)), key=lambda place: (-rows[place].difference.units, place))
+    ranked = sorted(range(len(rows)), key=lambda place: (-rows[place].units, place))
     shown = [rows[place] for place in sorted(ranked[:STRATA])]
     first = [place == 0 or shown[place - 1].by != row.by for place, row in enumerate(shown)]
     yield Table(
@@ -287,28 +271,27 @@ def strata_table(rows: Sequence[Part]) -> Iterator[Block]:
     yield Text(_legend(rows, len(rows) - len(shown)), "note")
 
 
-def _part_cells(row: Part, *, first: bool) -> list[Cell | str]:
-    over, mark = row.difference, f" {MARK}" if row.is_marked else ""
+def _part_cells(row: StratumFacts, *, first: bool) -> list[Cell | str]:
     return [
-        row.by if first else "",
-        row.value,
-        number(over.units),
-        Cell(points(over.mean), bold=row.is_marked),
-        interval(over.low, over.high) + mark,
-        number(over.worse or 0),
-        number(over.better or 0),
+        row.by.removeprefix(TAG) if first else "",
+        _value(row),
+        number(row.units),
+        Cell(points(row.mean), bold=is_significant(row.p_holm, row.confidence)),
+        marked_interval(row),
+        number(row.worse or 0),
+        number(row.better or 0),
     ]
 
 
-def _legend(rows: Sequence[Part], left_out: int) -> str:
-    counts = {row.difference.comparisons for row in rows if row.difference.comparisons}
+def _legend(rows: Sequence[StratumFacts], left_out: int) -> str:
+    counts = {row.comparisons for row in rows if row.comparisons}
     legend = "Percentage points, means over drives."
     if counts:
         legend += (
             f" {MARK} significant after Holm's correction for the {max(counts)} parts that were "
             "tested together."
         )
-    elif all(row.difference.low is None for row in rows):
+    elif all(row.low is None for row in rows):
         legend += " No part has enough drives, or groups of them, for an interval."
     if left_out:
         legend += f" {left_out} smaller parts are left out."

@@ -24,7 +24,7 @@ from roadeval.report.tables import differences_table, rates_table, seeds_table
 from roadeval.results.facts import FleetFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
-from roadeval.results.sentences import account, of_seeds
+from roadeval.results.sentences import account
 
 LOSSES: Final = 3
 """Losses that are named."""
@@ -61,7 +61,6 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
         yield rates_table(findings.facts)
         if seeds := findings.facts.seeds:
             yield seeds_table(seeds, [*findings.finals])
-            yield Text(of_seeds(seeds), "note")
     yield Text(account(findings.facts.frames, findings.facts.windows), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
