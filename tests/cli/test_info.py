@@ -1,7 +1,6 @@
 """The command ``info``: what is in a log, and what replay would pick of it and why."""
 
 import io
-import json
 
 import cv2
 import numpy as np
@@ -52,14 +51,6 @@ def test_it_tells_where_messages_are_missing(write, capsys):
     assert "/camera: gap of 6.00 s, 3.00 s after the start" in capsys.readouterr().out
 
 
-def test_json_holds_the_same(write, capsys):
-    main(["info", write({"/left": None, "/right": None}), "--json"])
-    found = json.loads(capsys.readouterr().out)
-    assert [topic["name"] for topic in found["topics"]] == ["/left", "/right"]
-    assert found["start_ns"] == START
-    assert "`topics.image`" in found["problem"]
-
-
 def test_numbers_have_room_beside_long_names_and_types():
     topic = dict.fromkeys(("problem", "gaps", "format"), "") | {"encoding": "cdr", "count": 3000}
     topic |= {"name": "/camera/front_left/image_raw", "schema": "vendor_msgs/msg/RectifiedImage"}
@@ -74,9 +65,3 @@ def test_numbers_have_room_beside_long_names_and_types():
 def test_damage_is_told_and_has_its_exit_code(tmp_path, capsys):
     assert main(["info", str(make("broken/trunc_midchunk.mcap", tmp_path))]) == 3
     assert capsys.readouterr().err.startswith("roadeval: lost: trunc_midchunk.mcap: ")
-
-
-def test_what_is_no_log_is_a_known_problem(tmp_path, capsys):
-    (tmp_path / "notes.txt").write_text("no log")
-    assert main(["info", str(tmp_path / "notes.txt")]) == 1
-    assert "not an MCAP file" in capsys.readouterr().err

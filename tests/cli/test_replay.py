@@ -4,7 +4,7 @@ import pytest
 
 from roadeval import RunConfig, configure
 from roadeval.cli.app import main
-from roadeval.cli.options import OPTIONS, with_flags
+from roadeval.cli.options import OPTIONS, takes, with_flags
 from roadeval.config import PRESETS
 from roadeval.jobs.progress import Progress
 from roadeval.jobs.run.replay import Outcome
@@ -122,7 +122,6 @@ def test_nor_with_a_model_that_a_file_names(tmp_path, capsys):
     [
         ("--road-label 3 --road-label 70000", "--road-label, item 2: must be at most 65535"),
         ("--every 0", "--every: must be at least 1 (given: 0)"),
-        ("--ignore-label 3", "--ignore-label needs --road-label"),
     ],
 )
 def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
@@ -172,18 +171,6 @@ def test_names_of_settings_become_flags(text, shown):
     assert with_flags(text) == shown
 
 
-def test_the_result_goes_to_stdout_and_progress_to_stderr(asked, capsys):
-    main(["replay", "drive.mcap"])
-    shown = capsys.readouterr()
-    assert "0 of 3 frames were evaluated" in shown.out
-    assert shown.err == "replaying: 3 of 3 frames\n"
-
-
-def test_json_is_the_summary_and_nothing_else(asked, capsys):
-    main(["replay", "drive.mcap", "--json"])
-    assert capsys.readouterr().out == FACTS.text()
-
-
 def test_warnings_are_told_even_when_quiet(asked, capsys):
     asked["warnings"] = ("the classifier of filtered calls everything road",)
     assert main(["replay", "drive.mcap", "--quiet"]) == 0
@@ -196,12 +183,6 @@ def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
     asked["losses"] = ("frame 7: its JPEG ends early",)
     assert main(["replay", "drive.mcap", "--quiet"]) == 3
     assert capsys.readouterr().err == "roadeval: lost: frame 7: its JPEG ends early\n"
-
-
-def test_a_configuration_that_cannot_be_used_is_a_known_problem(asked, capsys):
-    assert main(["replay", "drive.mcap", "--config", "no-such.toml"]) == 1
-    assert "no-such.toml" in capsys.readouterr().err
-    assert "config" not in asked
 
 
 def test_the_truth_s_colours_arrive(asked):
@@ -238,3 +219,12 @@ def test_a_path_without_a_name_is_shown_with_one(words, said, capsys):
 def test_every_preset_is_named_in_the_help():
     (preset,) = (option for option in OPTIONS if option.setting == "preset")
     assert (preset.metavar or "").split("|") == [*PRESETS]
+
+
+# --- Which options a command takes ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["frames.keep_corrupt_", "label"])
+def test_a_setting_that_no_option_sets_is_an_error(name):
+    with pytest.raises(ValueError, match=f"no option sets {name}$"):
+        takes("preset", name)

@@ -14,6 +14,7 @@ from roadeval.logs import LogWriter
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
 from tests.e2e.serving import serving
 from tests.fixtures.browser import browser, watched  # noqa: F401
+from tests.fixtures.figures import drawn, without_figures  # noqa: F401
 from tests.fixtures.make import make
 from tests.results.fleet.making import fleet_of
 from tests.training.making import frame
@@ -49,15 +50,21 @@ def at_home(once):
 
     def do(folder: Path) -> Run:
         drive = make("drives/street.mcap", folder)
-        return here("replay", drive, *CLASSES, "--jobs", 2, "--json", cwd=folder)
+        with drawn():
+            return here("replay", drive, *CLASSES, "--jobs", 2, "--json", cwd=folder)
 
     done = once("home", do)
     return done.run, done.folder
 
 
 def of_drive(name: str, *words: Any) -> Callable[[Path], Run]:
-    """Return what replays one of the small drives."""
-    return lambda folder: replay(folder, make(f"drives/{name}.mcap", folder), *words).run
+    """Return what replays one of the small drives, and draws the paper's figures of it."""
+
+    def do(folder: Path) -> Run:
+        with drawn():
+            return replay(folder, make(f"drives/{name}.mcap", folder), *words).run
+
+    return do
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ import yaml
 import roadeval
 from roadeval.cli.app import app
 from roadeval.logs import LogWriter
-from tests.e2e.commands import DEMO, ROADEVAL
+from tests.e2e.commands import DEMO, ROADEVAL, Replayed
 from tests.fixtures.drives import FRAMES, labels, scene, stamp
 from tests.fixtures.make import make
 from tests.networks.making import red_network
@@ -124,20 +124,22 @@ def copy_of_the_demo(folder: Path) -> None:
     shutil.copy(DEMO, folder / "recordings")
 
 
-def results_of_the_demo(folder: Path) -> None:
-    """Do what the first of README.md's two commands does, and make what its others read."""
-    outputs = {"save": folder / "out.rrd", "reports": folder / "reports" / "demo"}
-    count = roadeval.replay(DEMO, **outputs).summary["frames"]["read"]
+def results_of_the_demo(folder: Path, done: Replayed) -> None:
+    """Put what the first of README.md's two commands leaves, and what its others read."""
+    shutil.copy(done.recording, folder / "out.rrd")
+    shutil.copytree(done.reports, folder / "reports" / "demo")
     (folder / "masks").mkdir()
     (folder / "labels").mkdir()
     demo = roadeval.Recording(folder / "out.rrd")
+    roads = {number: demo.truth(number) == 1 for number in demo.frame_numbers}
+    for number, road in roads.items():
+        mask = encoded(np.roll(road, 12, axis=1) * np.uint8(255))
+        (folder / "masks" / f"{number:04}.png").write_bytes(mask)
     with LogWriter(folder / "drive.mcap") as bare:
-        for number in range(count):
+        for number in range(FRAMES):
             bare.image("/camera", stamp(number), encoded(demo.image(number)[..., ::-1]), "png")
-            road = demo.truth(number) == 1
-            for name, mask in (("labels", road), ("masks", np.roll(road, 12, axis=1))):
-                file = folder / name / f"{number:04}.png"
-                file.write_bytes(encoded(mask * np.uint8(255)))
+            label = encoded(roads[number] * np.uint8(255))
+            (folder / "labels" / f"{number:04}.png").write_bytes(label)
 
 
 @pytest.fixture
@@ -146,7 +148,7 @@ def here(page, request, tmp_path) -> Path:
     if page in ("README.md", "docs/tutorial.md"):
         copy_of_the_demo(tmp_path)
         if page == "README.md":
-            results_of_the_demo(tmp_path)
+            results_of_the_demo(tmp_path, request.getfixturevalue("demo"))
         return tmp_path
     world = request.getfixturevalue("world")
     return Path(shutil.copytree(world, tmp_path / "world", copy_function=os.link))

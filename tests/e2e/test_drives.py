@@ -83,12 +83,6 @@ def test_the_filter_harms_on_a_real_street(real):
         assert pooled_error(replayed, "filtered") > pooled_error(replayed, "unfiltered")
 
 
-def test_the_terminal_tells_where_everything_was_written(labelled):
-    assert str(labelled.recording) in labelled.run.stdout
-    assert f"{labelled.reports}/ ({len(labelled.summary['files'])} files)" in labelled.run.stdout
-    assert {*FIGURES, *TABLES} <= {file.name for file in labelled.reports.iterdir()}
-
-
 def test_a_drive_without_truth_gives_masks_and_says_that_nothing_is_scored(unlabelled):
     assert unlabelled.run.returncode == 0, unlabelled.run.stderr
     assert "Nothing to score" in unlabelled.run.stdout

@@ -321,13 +321,6 @@ def test_a_scheduler_that_does_not_answer_is_one_line(drives, tmp_path, monkeypa
     assert said.count("\n") == 1
 
 
-def test_a_folder_without_drives_is_one_line(tmp_path, capsys):
-    (tmp_path / "logs").mkdir()
-    assert main(["fleet", str(tmp_path / "logs"), "-o", str(tmp_path / "f")]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not (tmp_path / "f").exists()
-
-
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EFBIG])
 def test_a_full_disk_ends_the_run_and_what_was_done_before_stays(
     number, drives, ran, tmp_path, monkeypatch
@@ -369,15 +362,6 @@ def test_a_record_that_another_command_has_made_meanwhile_is_not_mixed_with_ours
     assert not (tmp_path / "f" / "fleet.json").exists()
 
 
-def test_a_damaged_record_is_made_again(drives, ran, tmp_path):
-    folder = copied(ran, tmp_path)
-    drive = next(d["drive"] for d in ran.summary["drives"] if d["name"] == "a")
-    record_path(folder, drive).write_text("{")
-    _, submitted = run(drives, folder, keep="worst:1")
-    assert submitted == ["a"]
-    assert tables(folder) == tables(ran.folder)
-
-
 def test_recordings_that_must_be_kept_are_made_where_they_lack(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     _, submitted = run(drives, folder, keep="all")
@@ -397,7 +381,7 @@ def test_a_condition_that_no_drive_can_be_judged_by_is_exit_code_1(drives, ran, 
 
 def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
     log = write(tmp_path / "logs" / "a.mcap", 0)
-    for number in range(6):
+    for number in range(3):
         shutil.copy(log, tmp_path / "logs" / f"copy{number}.mcap")
     outcome, _ = run(log.parent, tmp_path / "f")
     (effect,) = (
@@ -405,9 +389,9 @@ def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
         for each in outcome.summary["effects"]
         if each["metric"] == "ERR" and each["base"] == "unfiltered"
     )
-    assert (effect["units"], effect["groups"]) == (7, 1)
+    assert (effect["units"], effect["groups"]) == (4, 1)
     assert "in 1 group " in outcome.summary["verdict"]
-    assert re.search("copy0-.* is a copy of a-.*, and 5 more are", outcome.summary["warnings"][0])
+    assert re.search("copy0-.* is a copy of a-.*, and 2 more are", outcome.summary["warnings"][0])
 
 
 def test_settings_that_hold_for_no_drive_are_told(tmp_path):

@@ -17,6 +17,7 @@ from roadeval import Recording
 from roadeval.logs import LogWriter
 from roadeval.runtime.text import as_markdown, visible
 from tests.e2e.commands import here
+from tests.fixtures.figures import drawn
 from tests.jobs.making import NS
 from tests.training.making import frame
 
@@ -69,7 +70,8 @@ def told(folder):
         "none": ("inspect", f"none{ESCAPES}.rrd"),
         "usage": ("inspect", f"none{ESCAPES}", f"more{ESCAPES}"),
     }
-    return {name: here(*words, cwd=folder) for name, words in commands.items()}
+    with drawn():
+        return {name: here(*words, cwd=folder) for name, words in commands.items()}
 
 
 def test_every_command_does_what_it_does_for_other_names(told):

@@ -12,6 +12,7 @@ from roadeval.geometry.settings import GroundSettings
 from roadeval.jobs.results.report import collect
 from roadeval.jobs.results.result import DriveResult
 from tests.e2e.commands import here
+from tests.e2e.test_fleet import Here
 from tests.e2e.test_rig import IMAGE, SIZE, a_rig
 from tests.recording.making import paths_of
 
@@ -96,8 +97,7 @@ def test_a_fleet_counts_by_distance_with_the_camera_of_each_drive(metres: Path):
     (metres / "drives.csv").write_text(
         "path,ground.height,ground.pitch,ground.fov\ndrive.mcap,1.42,2.9,59.49\n"
     )
-    run = here("fleet", "drives.csv", "-o", "fleet", "-q", cwd=metres)
-    assert run.returncode == 0, run.stderr
+    roadeval.replay_fleet([metres / "drives.csv"], metres / "fleet", executor=Here())
     scores = roadeval.Result(metres / "fleet").scores
     assert {"0-10m", "40-80m", "from_above"} <= {*scores["region"]}
 
@@ -140,8 +140,8 @@ def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
     heights = {name: each.drive.ground.pose[0] for name, each in facts.cameras.items()}
     assert heights == pytest.approx({"front": 1.42, "rear": 2.5})
     assert {*pd.read_csv(tmp_path / "rig" / "metres.csv")["camera"]} == {"front", "rear"}
-    words = "--config", "rig.toml", "-o", "fleet", "-q"
-    assert here("fleet", "rig.mcap", *words, cwd=tmp_path).returncode == 0
+    config = roadeval.load_config(tmp_path / "rig.toml")
+    roadeval.replay_fleet([tmp_path / "rig.mcap"], tmp_path / "fleet", config, executor=Here())
     folders = (tmp_path / "fleet" / "results").iterdir()
     facts_of = (roadeval.Result(folder).drive.facts for folder in folders)
     found = sorted(facts.drive.ground.pose[0] for facts in facts_of)

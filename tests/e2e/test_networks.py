@@ -4,8 +4,7 @@ import pytest
 
 from tests.e2e.commands import here
 from tests.jobs.making import write_log
-from tests.networks.making import network, red_network
-from tests.networks.test_onnx_file import with_weights_beside
+from tests.networks.making import red_network
 
 
 @pytest.fixture(scope="module")
@@ -59,10 +58,6 @@ def test_a_missing_network(refused, tmp_path):
     assert "there is no such network" in refused(tmp_path / "none.onnx")
 
 
-def test_missing_settings(refused, tmp_path):
-    assert "cannot be read: No such file" in refused(tmp_path / "none.toml")
-
-
 def test_settings_that_name_no_network(refused, tmp_path):
     assert "file must name the network" in refused(toml(tmp_path, "size = [8, 8]\n"))
 
@@ -70,33 +65,3 @@ def test_settings_that_name_no_network(refused, tmp_path):
 def test_a_setting_that_is_not_known(refused, tmp_path):
     said = refused(toml(tmp_path, 'file = "n.onnx"\nsise = [8, 8]\n'))
     assert "mine.toml: net.sise: there is no such setting" in said
-
-
-def test_a_value_that_cannot_be(refused, tmp_path):
-    said = refused(toml(tmp_path, 'file = "n.onnx"\nresize = "squash"\n'))
-    assert "mine.toml: net.resize" in said
-
-
-def test_a_file_that_is_no_network(refused, drive):
-    assert "not an ONNX file" in refused(drive)
-
-
-def test_missing_weights(refused, tmp_path):
-    path = with_weights_beside(tmp_path)
-    (tmp_path / "n.data").unlink()
-    assert "its weights lie in n.data" in refused(path)
-
-
-def test_an_operator_that_is_not_known(refused, tmp_path):
-    assert "Unheard" in refused(network(tmp_path / "n.onnx", operator="Unheard"))
-
-
-def test_a_wrong_size(refused, tmp_path):
-    network(tmp_path / "n.onnx")
-    said = refused(toml(tmp_path, 'file = "n.onnx"\nsize = [20, 20]\n'))
-    assert "takes no input of 20x20" in said
-
-
-def test_what_cannot_be_guessed_is_asked_for(refused, tmp_path):
-    said = refused(network(tmp_path / "n.onnx", input_shape=("n", 3, "h", "w")))
-    assert "inputs: image float32 (?, 3, ?, ?); outputs: road float32" in said

@@ -478,17 +478,6 @@ def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path,
         assert tab.evaluate(cursor) == shape
 
 
-def test_a_chart_is_read_by_the_keyboard(drive, watched):
-    tab = watched(drive.as_uri()).tab
-    chart = tab.locator(".browser .area").first
-    chart.focus()
-    tab.keyboard.press("ArrowRight")
-    tab.keyboard.press("ArrowRight")
-    number = int(re.match(r"frame (\d+)", tab.locator(".tip:visible").inner_text())[1])
-    tab.keyboard.press("Enter")
-    assert frame(tab) == number
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (390, "dark")])
 def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
     drive, fleet, scheme, width, watched

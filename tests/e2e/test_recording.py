@@ -13,6 +13,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval import Recording
 from tests.e2e.commands import CLASSES, replay
+from tests.fixtures.figures import drawn
 from tests.fixtures.make import make
 from tests.recording.making import paths_of
 
@@ -69,7 +70,8 @@ def twice(at_home, tmp_path_factory):
     """The recordings and the tables of one drive, replayed by two workers and by one."""
     _, home = at_home
     folder = tmp_path_factory.mktemp("alone")
-    alone = replay(folder, home / "drives" / "street.mcap", *CLASSES, "--jobs", 1)
+    with drawn():
+        alone = replay(folder, home / "drives" / "street.mcap", *CLASSES, "--jobs", 1)
     return [
         (home / "recordings" / "street.rrd", home / "reports" / "street"),
         (alone.recording, alone.reports),

@@ -155,36 +155,6 @@ def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, t
     assert "undefined on some of" not in words
 
 
-@pytest.mark.parametrize("name", ["not.rrd", "missing.rrd", "empty"])
-def test_what_is_no_result_is_one_line(name, tmp_path):
-    (tmp_path / "not.rrd").write_text("hello")
-    (tmp_path / "empty").mkdir()
-    run = here("report", tmp_path / name)
-    assert run.returncode == 1
-    assert len(run.stderr.splitlines()) == 1
-    assert name in run.stderr
-
-
-def test_a_recording_by_another_program_is_one_line(tmp_path):
-    import rerun as rr
-
-    stream = rr.RecordingStream("somebody_else")
-    stream.save(tmp_path / "theirs.rrd")
-    stream.log("x", rr.TextDocument("y"))
-    stream.flush()
-    stream.disconnect()
-    run = here("report", tmp_path / "theirs.rrd")
-    assert run.returncode == 1
-    assert "somebody_else" in run.stderr
-
-
-def test_a_results_folder_of_another_format_is_one_line(tmp_path):
-    (tmp_path / "summary.json").write_text(json.dumps({"format": {"name": "other"}}))
-    run = here("report", tmp_path)
-    assert run.returncode == 1
-    assert "not of format roadeval-summary" in run.stderr
-
-
 def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetched(
     demo, made, tmp_path, monkeypatch
 ):

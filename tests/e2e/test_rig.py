@@ -15,6 +15,7 @@ from roadeval.data import FrameResult
 from roadeval.evaluation.comparison import Kind
 from roadeval.logs import LogWriter, open_log
 from tests.e2e.commands import DEMO, here
+from tests.e2e.test_fleet import Here
 
 IMAGE, TRUTH = "/camera/image", "/truth/road"
 SIZE, ROAD = (160, 120), np.uint8(255)
@@ -57,9 +58,10 @@ def topics(*cameras: str) -> list[str]:
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rig")
-    a_rig(folder / "rig.mcap", {"front": (0, 40), "copy": (0, 40), "rear": (45, 80)})
+    a_rig(folder / "rig.mcap", {"front": (0, 26), "copy": (0, 26), "rear": (45, 69)})
     run = here("replay", "rig.mcap", *topics("front", "copy", "rear"), cwd=folder)
     assert run.returncode == 0, run.stderr
+    (folder / "screen.txt").write_text(run.stdout)
     for name in ("front", "rear"):
         own = "replay", "rig.mcap", *topics(name), "--save", f"{name}.rrd", "-o", name, "-q"
         assert here(*own, cwd=folder).returncode == 0
@@ -149,11 +151,12 @@ def test_results_have_a_row_for_each_camera(rig: Path):
 
 
 def test_the_first_screen_lists_the_cameras(rig: Path):
-    out = here(
-        "replay", "rig.mcap", *topics("front", "rear"), "-o", "x", "--record", "none", cwd=rig
-    )
-    assert "rig: 2 cameras, 55 of 75 frames were evaluated" in out.stdout
-    assert [line.split()[0] for line in out.stdout.splitlines() if line[:5] in ("front", "rear ")]
+    shown = (rig / "screen.txt").read_text()
+    assert "rig: 3 cameras, 46 of 76 frames were evaluated" in shown
+    listed = [
+        line.split()[0] for line in shown.splitlines() if line[:5] in ("front", "copy ", "rear ")
+    ]
+    assert listed
 
 
 def test_reports_show_all_cameras_and_each(rig: Path):
@@ -213,8 +216,9 @@ def test_a_file_names_the_cameras(rig: Path, tmp_path: Path):
 
 
 def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path, tmp_path: Path):
-    words = *topics("front", "copy"), "-o", tmp_path / "fleet", "--workers", 1, "-q"
-    assert here("fleet", rig / "rig.mcap", *words).returncode == 0
+    cameras = [{"image": f"/{name}{IMAGE}"} for name in ("front", "copy")]
+    config = roadeval.configure({"cameras": cameras})
+    roadeval.replay_fleet([rig / "rig.mcap"], tmp_path / "fleet", config, executor=Here())
     fleet = roadeval.Result(tmp_path / "fleet")
     assert fleet.drives["name"].tolist() == ["rig front", "rig copy"]
     (effect,) = [
@@ -278,12 +282,12 @@ def test_a_recording_of_a_rig_is_opened_by_a_camera(rig: Path):
         roadeval.Recording(rig / "recordings" / "rig.rrd")
 
 
-def test_an_interrupted_run_of_a_rig_is_read_camera_by_camera(rig: Path, tmp_path: Path):
+def test_an_interrupted_run_of_a_rig_is_read_camera_by_camera(rig, tmp_path):
     seen = []
 
     def stop(result: FrameResult) -> None:
         seen.append(result.frame.camera)
-        if len(seen) == 60:
+        if len(seen) == 40:
             raise KeyboardInterrupt
 
     cameras = [{"image": f"/{name}{IMAGE}"} for name in ("front", "copy")]
@@ -296,6 +300,6 @@ def test_an_interrupted_run_of_a_rig_is_read_camera_by_camera(rig: Path, tmp_pat
     result = roadeval.Result(partial)
     assert not result.complete
     counted = result.frames.query("variant == 'filtered' and stage == 'post'")
-    assert counted.groupby("camera").size().between(15, 30).all()
+    assert counted.groupby("camera").size().between(5, 20).all()
     run = here("inspect", partial, "--list", "--camera", "front", "--json")
     assert {each["camera"] for each in json.loads(run.stdout)} == {f"/front{IMAGE}"}

@@ -19,7 +19,6 @@ from roadeval.data import (
     Packed,
     Rows,
     StageResult,
-    Tally,
     Truth,
     VariantResult,
 )
@@ -58,12 +57,6 @@ def a_variant(
         for place, (stage, mask) in enumerate(masks.items())
     ]
     return VariantResult(name, tuple(stages))
-
-
-def a_tally(tp: int, tn: int, fp: int, fn: int, variant: str = "filtered") -> Tally:
-    """A tally of the final mask with these counts."""
-    counts = Counts(tp, tn, fp, fn)
-    return Tally(variant, "post", counts, {}, metrics.of(counts))
 
 
 def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) -> pd.DataFrame:

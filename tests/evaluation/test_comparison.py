@@ -69,21 +69,6 @@ def test_a_variant_that_both_have_on_no_frame_both_is_told():
     assert compare(sides, SETTINGS).notes == (Note(Kind.VARIANT, "a", "b", names=("net",)),)
 
 
-def test_frames_are_matched_by_their_stamps_not_by_their_numbers():
-    base, new = a_side("base", [10, 20, 30]), a_side("new", [10, 20, 30])
-    found = compare([base, altered(new, frame=lambda numbers: numbers + 5)], SETTINGS)
-    assert found.changes[0].difference["ERR"].mean == 0
-
-
-def test_frames_with_the_same_stamp_are_matched_in_their_order():
-    sides = [
-        altered(a_side(name, [10, 20, 30]), stamp_ns=np.zeros_like) for name in ("base", "new")
-    ]
-    (change,) = compare(sides, SETTINGS).changes
-    assert change.frames == 3
-    assert change.difference["ERR"].mean == 0
-
-
 def test_different_drives_stand_side_by_side_without_differences():
     sides = [a_side("a", [10] * 20), a_side("b", [30] * 20, digest="d2")]
     found = compare(sides, SETTINGS)

@@ -28,33 +28,9 @@ def count(masks, truth, regions):
 MASK = pixels("#.#.", "####")
 
 
-def test_each_labelled_pixel_has_one_outcome() -> None:
-    ((whole, _),) = count([MASK], TRUTH, {})
-    assert whole == Counts(tp=3, tn=1, fp=2, fn=1)
-
-
-def test_an_ignored_pixel_is_in_no_count() -> None:
-    everywhere = np.full_like(TRUTH, 255)
-    ((whole, parts),) = count([MASK], everywhere, {"left": pixels("##..", "##..")})
-    assert whole == parts["left"] == Counts()
-
-
-def test_a_region_counts_its_own_pixels_only() -> None:
-    regions = {"left": pixels("##..", "##.."), "top": pixels("####", "....")}
-    ((_, parts),) = count([MASK], TRUTH, regions)
-    assert parts == {
-        "left": Counts(tp=3, tn=0, fp=0, fn=1),
-        "top": Counts(tp=1, tn=1, fp=1, fn=1),
-    }
-
-
 def test_masks_keep_their_order() -> None:
     (none, _), (all_, _) = count([np.zeros_like(TRUTH), np.ones_like(TRUTH)], TRUTH, {})
     assert (none, all_) == (Counts(tn=3, fn=4), Counts(tp=4, fp=3))
-
-
-def test_no_masks_give_no_counts() -> None:
-    assert list(count([], TRUTH, {})) == []
 
 
 @pytest.mark.parametrize("odd", [pixels("##", "##", "##", "##"), pixels("####")])
@@ -88,13 +64,6 @@ def test_counts_equal_scikit_learns_confusion_matrix(
             assert found == Counts(tp, tn, fp, fn)
         else:
             assert found == Counts()
-
-
-@given(images)
-def test_no_labelled_pixel_is_lost(example: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    truth, mask, _ = example
-    ((whole, _),) = count([mask], truth, {})
-    assert whole.n == (truth != 255).sum()
 
 
 def test_the_error_map_names_each_outcome() -> None:

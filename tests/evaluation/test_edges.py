@@ -8,10 +8,9 @@ import pytest
 from scipy.ndimage import distance_transform_cdt, distance_transform_edt
 from skimage.segmentation import find_boundaries
 
-from roadeval.data import IGNORE, FrameResult, Role, TruthBits, ones, pack
+from roadeval.data import IGNORE, FrameResult, Role, TruthBits, pack
 from roadeval.evaluation import score
 from roadeval.evaluation.region import disk
-from roadeval.evaluation.regions.standard import boundary
 from roadeval.evaluation.score import EdgesAndFlicker
 from roadeval.evaluation.score.counts import TRIMAP, boundary_iou, trimap
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
@@ -28,11 +27,6 @@ def edge_of(labels):
     return unpacked(score.edge_of(TruthBits.of(labels)), labels.shape[1])
 
 
-def test_an_edge_is_road_that_touches_non_road_by_side_or_corner():
-    labels = pixels("###.", "####", "####")
-    assert edge_of(labels).tolist() == [[0, 0, 1, 0], [0, 0, 1, 1], [0, 0, 0, 0]]
-
-
 def test_neither_the_border_nor_an_ignored_pixel_makes_an_edge():
     assert not edge_of(pixels("##", "##")).any()
     assert not edge_of(pixels("##?.", "##?.")).any()
@@ -41,22 +35,6 @@ def test_neither_the_border_nor_an_ignored_pixel_makes_an_edge():
 def test_the_neighbourhood_is_a_disk():
     assert disk(1).tolist() == [1, 0]
     assert disk(5).tolist() == [5, 4, 4, 4, 3, 0]
-
-
-def test_a_mask_whose_edge_lies_within_the_width_has_1_and_beyond_it_0():
-    truth = pixels("##......", "##......")
-    near, far = pixels("###.....", "###....."), pixels("####....", "####....")
-    assert one(truth, truth) == 1
-    assert one(near, truth) == 1
-    assert one(far, truth) == 0
-    assert one(far, truth, width=2) == 1
-
-
-def test_by_hand():
-    truth = pixels("##......", "##......")
-    mask = pixels("##...##.", "##......")
-    # Four edge pixels of the mask, two of them near the truth's two: P = 1/2, R = 1.
-    assert one(mask, truth) == pytest.approx(2 / 3)
 
 
 def test_what_the_mask_does_among_ignored_pixels_does_not_count():
@@ -183,12 +161,6 @@ def in_rim(labels, truth, row, column):
     return any(truth[place] != IGNORE and labels[place] == 0 for place in around)
 
 
-def test_boundary_iou_is_undefined_without_road():
-    truth = pixels("..?.", "....")
-    assert math.isnan(rims_overlap(pixels("..#.", "...."), truth))
-    assert rims_overlap(pixels("#...", "...."), truth) == 0
-
-
 def test_an_edge_is_scikit_images_inner_boundary():
     truth, _ = wavy(3, ignored=False)
     inner = find_boundaries(truth, connectivity=2, mode="inner", background=0)
@@ -233,17 +205,6 @@ def test_the_trimap_of_small_masks_equals_a_plain_loop():
         assert near_edge(mask, truth, (1, 3, 4)) == expected
 
 
-def test_a_width_of_the_trimap_is_the_region_of_that_width():
-    truth, mask = wavy(5)
-    packed = TruthBits.of(truth)
-    region, wrong = boundary(packed, 8) & packed.labelled, pack(mask) ^ packed.road
-    assert near_edge(mask, truth)[TRIMAP.index(8)] == [ones(wrong & region), ones(region)]
-
-
-def test_a_truth_without_an_edge_has_no_pixel_near_it():
-    assert near_edge(pixels("##", ".#"), pixels("##", "##")) == [[0, 0]] * len(TRIMAP)
-
-
 # --- Over a drive
 
 
@@ -266,22 +227,6 @@ def told(*results):
 def flicker_of(*frames):
     found = told(*(shown(truth, mask) for truth, mask in frames))
     return {name: found[name] for name in ("flicker", "truth_flicker", "pairs")}
-
-
-def test_flicker_is_the_share_of_labelled_pixels_that_change_beside_the_truth_s_own():
-    moved = pixels("###.", "##.?")
-    mask, other = pixels("##..", "##.."), pixels("#...", "##.#")
-    assert flicker_of((TRUTH, mask), (moved, other)) == {
-        "flicker": 1 / 7,
-        "truth_flicker": 1 / 7,
-        "pairs": 1,
-    }
-
-
-def test_a_pixel_that_either_truth_ignores_is_not_counted():
-    more = pixels("##..", "#?..")
-    mask, other = pixels("##..", "##.."), pixels("##..", "#..#")
-    assert flicker_of((TRUTH, mask), (more, other))["flicker"] == 0
 
 
 def test_a_single_frame_has_none():

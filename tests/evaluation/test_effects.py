@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation.score import CameraMasks, FrameCounts, drive_effects, final_stages
+from roadeval.evaluation.score import CameraMasks, FrameCounts, drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings()
@@ -72,8 +72,3 @@ def test_final_masks_against_one_base_are_corrected_together():
         *[("blind", True, 3)] * 3,
     ]
     assert {each.rates["FPR"].comparisons for each in effects} == {None}
-
-
-def test_the_final_stage_is_post_or_the_last_one():
-    masks = [("a", "svm"), ("a", "post"), ("a", "oddity"), ("b", "svm"), ("b", "smooth")]
-    assert final_stages(masks) == {"a": "post", "b": "smooth"}

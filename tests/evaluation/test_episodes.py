@@ -29,38 +29,9 @@ def test_an_episode_lasts_from_its_first_frame_to_the_first_one_below_the_limit(
     }
 
 
-def test_one_that_lasts_to_the_end_of_the_drive_has_not_recovered():
-    own = found([0, 1, 2, 3], [0.0, 0.2, 0.2, 0.2])
-    assert (own["episodes"], own["recovered"], own["seconds"]) == (1, 0, 2.0)
-    assert own["recovery"] is None
-    assert found([0], [0.2])["longest"] == 0
-
-
-def test_a_lost_frame_lasts_as_long_as_its_stamps_say():
-    own = found([0, 0.1, 0.2, 0.4, 0.5], [0, 0.2, 0.2, 0, 0])
-    assert own["seconds"] == pytest.approx(0.3)
-    assert own["share"] == pytest.approx(0.3 / 0.5)
-
-
 def test_a_few_lost_frames_are_no_gap_within_a_second():
     own = found([0, 0.1, 0.2, 1.2, 1.3], [0, 0.2, 0.2, 0, 0])
     assert (own["seconds"], own["recovered"]) == (1.1, 1)
-
-
-@pytest.mark.parametrize("after", [0.2, 0.0])
-def test_a_gap_ends_an_episode_without_recovery_and_is_in_no_time(after):
-    own = found([0, 0.1, 0.2, 60.2, 60.3, 60.4], [0, 0.2, 0.2, after, 0, 0])
-    assert own["recovered"] == (after > 0)
-    assert own["episodes"] == 1 + (after > 0)
-    assert own["seconds"] == pytest.approx(0.2 if after else 0.1)
-    assert own["share"] == pytest.approx(own["seconds"] / 0.4)
-
-
-def test_labels_that_are_rare_leave_no_gaps():
-    own = found([0, 10, 20, 50, 60], [0, 0.2, 0.2, 0.2, 0])
-    assert (own["seconds"], own["recovered"], own["share"]) == (50, 1, 50 / 60)
-    own = found([0, 10, 20, 51, 60], [0, 0.2, 0.2, 0.2, 0])
-    assert (own["seconds"], own["recovered"], own["share"]) == (19, 1, 19 / 29)
 
 
 def test_a_frame_whose_rate_is_undefined_says_nothing():

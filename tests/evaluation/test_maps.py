@@ -66,12 +66,6 @@ def test_a_large_map_carried_between_bytes_and_cells_loses_nothing():
     assert cells[1].tolist() == total.reshape(85, 2, 100, 2).sum(axis=(1, 3)).tolist()
 
 
-def test_a_change_tells_the_newly_right_from_the_newly_wrong_and_counts_no_ignored_pixel():
-    before, after = pixels("#..#", "##.."), pixels("##..", ".#.#")
-    found = changes([("net", "svm", before), ("net", "post", after)], TRUTH)
-    assert found == {("net", "svm", "net", "post"): Change(repaired=2, spoiled=1, labelled=7)}
-
-
 def test_changes_are_from_stage_to_stage_and_from_final_mask_to_final_mask():
     good, bad = pixels("##..", "##.."), pixels("#...", "##..")
     masks = [("a", "svm", bad), ("a", "post", good), ("b", "post", bad)]

@@ -37,15 +37,6 @@ def test_the_boundary_turns_corners() -> None:
     assert (boundary_of(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
 
 
-def test_road_that_meets_ignored_pixels_has_no_edge_there() -> None:
-    truth = pixels("##???..", "##???..")
-    assert not boundary_of(truth, 1).any()
-
-
-def test_a_frame_of_one_class_has_no_boundary() -> None:
-    assert not boundary_of(pixels("###", "###"), 2).any()
-
-
 def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
     bands = bands_of((7, 2), 5)
     assert list(bands) == ["band_0", "band_1", "band_2", "band_3", "band_4"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import Change, Counts, Health, Packed, Role
+from roadeval.data import Counts, Health, Packed, Role
 from roadeval.evaluation.score import (
     BlindPrior,
     CountsNotConservedError,
@@ -180,12 +180,104 @@ class TestOracles:
         assert list(board.totals()["filtered"]) == ["svm", "post"]
 
 
-def test_changes_and_heat_maps_are_summed_up_over_the_drive() -> None:
-    sums = a_drive(3, a_board(BlindPrior.of_truths([TRUTH])))
-    assert sums.changes["filtered", "svm", "filtered", "post"] == Change(3, 0, 21)
-    assert sums.changes["unfiltered", "post", "filtered", "post"] == Change(0, 3, 21)
-    assert sums.changes["filtered", "post", "unfiltered", "post"] == Change(3, 0, 21)
-    assert sums.changes["blind", "post", "filtered", "post"] == Change(0, 3, 21)
-    side, cells = sums.heat["filtered"].cells()
-    assert (side, cells[:, 1, 1].tolist(), cells[:, 1, 3].tolist()) == (1, [3, 0, 3], [0, 0, 0])
-    assert sums.heat["unfiltered"].cells()[1][:, 1, 1].tolist() == [3, 0, 0]
+# --- The mask that never looks at the image -------------------------------------------------------
+
+
+def test_the_prior_is_the_mean_truth() -> None:
+    prior = BlindPrior.of_truths([pixels("##.."), pixels("#.#."), pixels("#...")])
+    assert prior.road.dtype == np.float32
+    assert prior.road == pytest.approx(np.array([[1, 1 / 3, 1 / 3, 0]]))
+
+
+def test_ignored_pixels_are_left_out_of_the_mean() -> None:
+    prior = BlindPrior.of_truths([pixels("?#?"), pixels("##?")])
+    assert prior.road.tolist() == [[1, 1, 0]]
+
+
+def test_road_is_where_at_least_half_of_the_frames_had_it() -> None:
+    prior = BlindPrior(np.array([[0.0, 0.49, 0.5, 1.0]], np.float32))
+    assert (prior.mask((1, 4)).pixels() == pixels("..##")).all()
+
+
+def test_the_mask_fits_a_frame_of_another_size() -> None:
+    prior = BlindPrior.of_truths([pixels("..##", "..##")])
+    assert (prior.mask((4, 8)).pixels() == pixels(*["....####"] * 4)).all()
+
+
+def test_truths_of_several_sizes_make_one_prior() -> None:
+    prior = BlindPrior.of_truths([pixels("..##"), pixels(*["....####"] * 2)])
+    assert prior.road.tolist() == [[0, 0, 1, 1]]
+
+
+def test_a_prior_needs_a_truth() -> None:
+    with pytest.raises(ValueError, match="at least one"):
+        BlindPrior.of_truths([])
+
+
+def test_nobody_can_spoil_the_shared_mask() -> None:
+    mask = BlindPrior.of_truths([pixels("#.")]).mask((1, 2))
+    with pytest.raises(ValueError, match="read-only"):
+        mask.bits[0, 0] = 0
+
+
+# --- Rates with each seed of the training, from the frames' counts --------------------------------
+
+FRAME_TRUTH = pixels("##..", "##..")
+RIGHT, ONE_WRONG, TWO_WRONG = FRAME_TRUTH, pixels("###.", "##.."), pixels("####", "##..")
+
+
+def with_seeds(name, own, **others):
+    """A variant with a final mask of its own, and those with other seeds, as ``seed_3``."""
+    repeats = {int(seed[5:]): {"post": Packed.of(mask)} for seed, mask in others.items()}
+    return replace(a_variant(name, {"post": own}), repeats=repeats)
+
+
+def a_board_of(*frames, prior=None):
+    board = Scoreboard(
+        EvaluationSettings(boundary_width=1, bands=1), ["filtered", "unfiltered", "net"], prior
+    )
+    for number, variants in enumerate(frames):
+        board.add(board.score(a_frame(FRAME_TRUTH, number), Role.EVALUATED, variants))
+    return board
+
+
+def test_the_rates_stand_in_the_order_of_the_seeds_the_run_s_own_first():
+    filtered = with_seeds("filtered", RIGHT, seed_11=TWO_WRONG, seed_10=ONE_WRONG)
+    unfiltered = with_seeds("unfiltered", ONE_WRONG, seed_10=ONE_WRONG, seed_11=RIGHT)
+    found = a_board_of((filtered, unfiltered)).repeats()
+    assert found["totals"]["filtered"]["post"]["ERR"] == [0, 1 / 8, 2 / 8]
+    assert found["totals"]["filtered"]["post"]["pooled_FPR"] == [0, 1 / 4, 2 / 4]
+    assert found["totals"]["unfiltered"]["post"]["ERR"] == [1 / 8, 1 / 8, 0]
+    assert found["difference"]["post"]["ERR"] == [-1 / 8, 0, 2 / 8]
+
+
+def test_the_rates_are_means_over_the_frames():
+    frames = [
+        (with_seeds("filtered", RIGHT, seed_1=mask),) for mask in (RIGHT, ONE_WRONG, TWO_WRONG)
+    ]
+    found = a_board_of(*frames).repeats()
+    assert found["totals"]["filtered"]["post"]["ERR"] == [0, pytest.approx(1 / 8)]
+    assert found["difference"] == {}
+
+
+def test_masks_that_no_training_made_are_not_among_them():
+    net = a_variant("net", {"post": ONE_WRONG})
+    prior = BlindPrior.of_truths([FRAME_TRUTH])
+    found = a_board_of((with_seeds("filtered", RIGHT, seed_1=RIGHT), net), prior=prior).repeats()
+    assert list(found["totals"]) == ["filtered"]
+
+
+def test_without_a_further_seed_there_is_nothing():
+    assert a_board_of((with_seeds("filtered", RIGHT),)).repeats() == {}
+
+
+def test_a_frame_that_is_not_evaluated_counts_with_no_seed():
+    board = a_board_of((with_seeds("filtered", RIGHT, seed_1=RIGHT),))
+    training = (with_seeds("filtered", TWO_WRONG, seed_1=TWO_WRONG),)
+    board.add(board.score(a_frame(FRAME_TRUTH, 1), Role.TRAINING, training))
+    assert board.repeats()["totals"]["filtered"]["post"]["ERR"] == [0, 0]
+
+
+def test_without_a_filtered_variant_there_is_no_difference():
+    found = a_board_of((with_seeds("unfiltered", RIGHT, seed_1=ONE_WRONG),)).repeats()
+    assert found["difference"] == {}

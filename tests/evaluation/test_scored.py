@@ -4,13 +4,15 @@ import math
 from dataclasses import asdict
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from roadeval.data import Role, Rows
-from roadeval.evaluation import score
-from roadeval.evaluation.score import BlindPrior, Scoreboard
+from roadeval.data import Counts, Health, Role, Rows
+from roadeval.evaluation import metrics, score
+from roadeval.evaluation.score import CLAIMS, BlindPrior, Scoreboard, Window, evidence, judge
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.schema import TABLES
+from roadeval.results.sentences import CLAIMED
 from roadeval.results.tables import read_rows
 from tests.evaluation.making import a_frame, a_table, a_variant, pixels, rows_of
 from tests.results.making import lines as lines_of
@@ -131,3 +133,144 @@ def test_frames_that_changed_most_are_those_that_changed_at_all(harmed, places):
 def test_a_change_that_is_undefined_is_none(harmed):
     changes = np.array([math.nan] * 4)
     assert not len(score.most_changed(SECONDS, changes, 5, harmed=harmed))
+
+
+# --- When a frame is fine, degraded or failed -----------------------------------------------------
+
+
+def with_error(percent: int, road: int = 50) -> dict[str, float]:
+    """Rates of a frame of 100 pixels, of which ``percent`` are called road wrongly."""
+    return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
+
+
+def test_few_errors_are_fine() -> None:
+    assert judge(with_error(14), None) is Health.OK
+
+
+@pytest.mark.parametrize(("percent", "health"), [(15, Health.DEGRADED), (25, Health.FAILED)])
+def test_many_errors_degrade_and_more_fail(percent: int, health: Health) -> None:
+    assert judge(with_error(percent), None) is health
+
+
+def test_finding_next_to_no_road_fails_however_little_there_is() -> None:
+    missed = metrics.of(Counts(tp=0, tn=95, fp=0, fn=5))
+    assert judge(missed, None) is Health.FAILED
+
+
+def test_a_frame_without_road_fails_by_its_errors_only() -> None:
+    assert judge(metrics.of(Counts(tn=100)), None) is Health.OK
+    assert judge(metrics.of(Counts(tn=70, fp=30)), None) is Health.FAILED
+
+
+@pytest.mark.parametrize(("blind", "health"), [(7, Health.OK), (5, Health.DEGRADED)])
+def test_losing_to_blind_by_more_than_the_margin_degrades(blind: int, health: Health) -> None:
+    assert judge(with_error(8), with_error(blind)) is health
+
+
+# --- The paper's claims, on windows written by hand -----------------------------------------------
+
+NAN = float("nan")
+
+
+def counted(held: int, windows: int, short_held: int, short: int) -> dict[str, int]:
+    return {"held": held, "windows": windows, "short_held": short_held, "short": short}
+
+
+def windows(variant: str, stage: str, errs: list[float], frames: list[int]) -> list[Window]:
+    """Windows of a mask: the same value for every rate."""
+    return [
+        Window(number, 0, 0, count, variant, stage, dict.fromkeys(("ERR", "FPR", "FNR"), err), {})
+        for number, (err, count) in enumerate(zip(errs, frames, strict=True))
+    ]
+
+
+def test_full_windows_and_shorter_ones_are_counted_apart() -> None:
+    frames = [10, 10, 10, 3]
+    found = evidence(
+        windows("filtered", "post", [0.1, 0.3, 0.1, 0.1], frames)
+        + windows("unfiltered", "post", [0.2, 0.2, 0.2, 0.2], frames),
+        size=10,
+    )
+    assert found["filter_ERR"] == counted(2, 3, 1, 1)
+
+
+def test_equal_rates_do_not_bear_a_claim_out() -> None:
+    with_filter = windows("filtered", "post", [0.2], [10])
+    without = windows("unfiltered", "post", [0.2], [10])
+    assert evidence(with_filter + without, 10)["filter_FPR"] == counted(0, 1, 0, 0)
+
+
+def test_a_window_where_a_rate_is_undefined_is_in_no_count() -> None:
+    found = evidence(
+        windows("filtered", "post", [0.1, NAN], [10, 10])
+        + windows("unfiltered", "post", [0.2, 0.2], [10, 10]),
+        size=10,
+    )
+    assert found["filter_FNR"] == counted(1, 1, 0, 0)
+
+
+def test_stages_are_held_against_those_before_them() -> None:
+    found = evidence(
+        windows("filtered", "similarity", [0.3], [10])
+        + windows("filtered", "svm", [0.2], [10])
+        + windows("filtered", "post", [0.25], [10]),
+        size=10,
+    )
+    assert found == {"svm_ERR": counted(1, 1, 0, 0), "post_ERR": counted(0, 1, 0, 0)}
+
+
+def test_every_claim_has_words() -> None:
+    assert [*CLAIMS] == [*CLAIMED]
+
+
+# --- What a report makes of the tables ------------------------------------------------------------
+
+
+def test_pairs_subtract_the_same_frames_only():
+    frames = a_table({POST: [10, 20, 30], CONTROL_POST: [10, 25]})
+    paired = score.pairs(rows_of(frames), "filtered", "unfiltered")
+    assert paired["frame"].tolist() == [0, 1]
+    assert paired["ERR"].tolist() == pytest.approx([0, -0.05])
+    assert paired["wrong"].tolist() == [0, -5]
+
+
+def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
+    regions = pd.DataFrame(
+        [
+            (0, "filtered", "post", "boundary", 5, 0, 5, 0, 10),
+            (0, "filtered", "post", "interior", 40, 45, 5, 0, 90),
+            (0, "filtered", "post", "shadow", 0, 0, 0, 0, 0),
+        ],
+        columns=list(TABLES["regions"].names[2:]),
+    )
+    found = score.by_region(rows_of(regions))
+    assert [*found] == [(name, "filtered") for name in ("boundary", "interior", "shadow")]
+    boundary, _, shadow = found.values()
+    assert boundary["ERR"] == 0.5
+    assert [each["pixels"] for each in found.values()] == pytest.approx([0.1, 0.9, 0.0])
+    assert [each["errors"] for each in found.values()] == pytest.approx([0.5, 0.5, 0.0])
+    assert math.isnan(shadow["ERR"])
+
+
+def test_a_perfect_stage_is_judged_on_the_frames_that_have_both_masks():
+    frames = a_table({("filtered", "svm"): [40, 40, 40], POST: [10, 20, 30]})
+    oracles = a_table({("filtered", "svm"): [0, 0], POST: [4, 6]}).assign(oracle="svm")
+    rows = rows_of(oracles).replace(oracle=rows_of(oracles)["oracle"].astype(str))
+    (found,) = score.perfect_stages(rows, rows_of(frames))
+    assert (found["variant"], found["oracle"], found["frames"]) == ("filtered", "svm", 2)
+    assert (found["ERR"], found["as_is"]) == pytest.approx((0.05, 0.15))
+    assert list(score.perfect_stages(rows.take(slice(0)), rows_of(frames))) == []
+
+
+@pytest.mark.parametrize(
+    ("chains", "order"),
+    [
+        ([("svm", "post"), ("trees", "post")], ["svm", "trees", "post"]),
+        ([("net", "post"), ("svm", "post", "smooth")], ["net", "svm", "post", "smooth"]),
+        ([("svm",), ("net",)], ["svm", "net"]),
+        ([("a", "b"), ("b", "a")], ["a", "b"]),
+        ([], []),
+    ],
+)
+def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
+    assert score.merged(chains) == order

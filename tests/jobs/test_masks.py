@@ -12,7 +12,6 @@ from roadeval import RoadevalError
 from roadeval.jobs.run.prepared import identity
 from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
 from tests.e2e.commands import here
-from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, settings, write_log
 
 IN_LOG = "/net/road_mask_prediction"
@@ -62,7 +61,7 @@ def masks(base, **tables):
 
 
 @pytest.fixture(scope="module")
-def outcome(places, figures, tmp_path_factory):
+def outcome(places, tmp_path_factory):
     """A replay with the masks of all places side by side; with those in the log, rolled alike."""
     inside = tmp_path_factory.mktemp("inside")
     drive = inside / "drive.mcap"
@@ -87,8 +86,7 @@ def outcome(places, figures, tmp_path_factory):
         half={"path": "half"},
     )
     config = settings(masks={"inside": IN_LOG}).override({"masks": beside})
-    with figures():
-        return roadeval.replay(drive, config, save=inside / "out.rrd", reports=inside / "reports")
+    return roadeval.replay(drive, config, save=inside / "out.rrd", reports=inside / "reports")
 
 
 WHOLE = ("number", "stamp", "npy", "classes", "confidence", "named", "other", "order")
@@ -181,13 +179,6 @@ def test_workers_make_no_difference_to_curves(places, tmp_path):
     assert found[0] == found[1]
 
 
-def test_without_a_probability_there_are_no_curves(places, tmp_path):
-    config = settings(record="none").override({"masks": masks(places, net={"path": "number"})})
-    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
-    assert "curves" not in done.summary
-    assert not (tmp_path / "reports" / "probabilities.csv").exists()
-
-
 def test_variants_are_compared_where_they_differ(outcome):
     found = roadeval.compare([outcome.reports], variants=["inside", "unfiltered"])
     regions = {row.region for row in found.comparison.regions}
@@ -221,37 +212,12 @@ def test_a_variant_of_one_result_is_held_against_another_of_another(outcome, pla
     assert "(inside)" in found.comparison.results[0].label
 
 
-def test_a_page_shows_both_variants_under_their_own_names(outcome, tmp_path):
-    recording = tmp_path / "other.rrd"
-    drive = outcome.summary["log"]["path"]
-    roadeval.replay(drive, settings(), save=recording, reports=tmp_path / "reports")
-    run = here(
-        *("compare", outcome.recording, recording, "--variant", "confidence=unfiltered"),
-        *("-o", tmp_path / "page.html", "-q"),
-    )
-    assert run.returncode == 0
-    assert "unfiltered: errors" in (tmp_path / "page.html").read_text()
-
-
 def refused(places, **table) -> str:
     config = settings().override({"masks": {"net": table}})
     with pytest.raises(RoadevalError) as caught:
         roadeval.replay(places / "drive.mcap", config, reports=places / "refused")
     assert not (places / "refused").exists()
     return str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("shift", "message"),
-    [
-        (1, "its numbers are 1 to 26, and the frames' 0 to 25"),
-        (500, "none of them belongs to a frame by number: theirs are 500 to 525"),
-    ],
-)
-def test_masks_that_belong_to_no_frame_or_to_the_next_are_refused(places, tmp_path, shift, message):
-    for number in range(FRAMES):
-        cv2.imwrite(str(tmp_path / f"{number + shift}.png"), np.eye(4, dtype=np.uint8))
-    assert message in refused(places, path=str(tmp_path))
 
 
 def test_masks_of_another_time_are_refused(places, tmp_path):
@@ -327,14 +293,6 @@ def test_the_command_takes_them_and_says_what_is_wrong_with_a_file(places, tmp_p
     assert "the name is taken" in twice.stderr
 
 
-def test_a_run_is_repeated_by_its_file(places, tmp_path):
-    config = settings(record="none").override({"masks": {"net": {"path": f"{places}/number"}}})
-    one = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "a")
-    again = roadeval.load_config(tmp_path / "a" / "run.toml")
-    two = roadeval.replay(places / "drive.mcap", again, reports=tmp_path / "b")
-    assert two.summary["totals"] == one.summary["totals"]
-
-
 def test_masks_of_other_content_make_another_recording_wherever_they_lie(places):
     def of(digest, path):
         config = settings().override({"masks": {"net": {"path": path}}})
@@ -342,20 +300,3 @@ def test_masks_of_other_content_make_another_recording_wherever_they_lie(places)
             return identity(log, config, {"net": digest})
 
     assert of("1", "here") == of("1", "there") != of("2", "here")
-
-
-def test_a_drive_of_a_fleet_is_replayed_again_when_its_masks_change(places, tmp_path):
-    own = tmp_path / "masks" / "drive"
-    own.mkdir(parents=True)
-    for file in (places / "number").iterdir():
-        (own / file.name).write_bytes(file.read_bytes())
-    config = settings().override({"masks": {"net": {"path": f"{tmp_path}/masks/{{drive}}"}}})
-    drives = [places / "drive.mcap"]
-
-    def replayed():
-        return roadeval.replay_fleet(drives, tmp_path / "fleet", config, executor=Here()).replayed
-
-    assert (replayed(), replayed()) == (1, 0)
-    np.save(own / "25.npy", np.zeros((1, 1)))
-    (own / "frame_0025.png").unlink()
-    assert replayed() == 1

@@ -121,13 +121,6 @@ def test_a_network_that_has_changed_since_is_refused(once, folder, tmp_path):
         run(folder / "drive.mcap", tmp_path, again)
 
 
-def test_numbers_do_not_depend_on_threads(once, folder, tmp_path):
-    to, _ = once
-    run(folder / "drive.mcap", tmp_path, with_network(folder / "red.onnx", jobs=4))
-    tables = [pd.read_csv(each / "reports" / "frames.csv") for each in (to, tmp_path)]
-    assert tables[0].equals(tables[1])
-
-
 def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder, tmp_path):
     def known_by(path):
         with open_log(folder / "drive.mcap") as log:

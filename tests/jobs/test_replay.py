@@ -3,8 +3,6 @@
 import json
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,11 +49,9 @@ def frames_of(folder: Path) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def once(drive, figures, tmp_path_factory):
-    """The run whose figures are looked at."""
+def once(drive, tmp_path_factory):
     folder = tmp_path_factory.mktemp("once")
-    with figures():
-        return folder, run(drive, folder, jobs=2)
+    return folder, run(drive, folder, jobs=2)
 
 
 def test_every_frame_is_accounted_for(once):
@@ -79,49 +75,11 @@ def test_training_and_unlabelled_frames_are_in_no_table(once):
     assert set(regions.frame) == set(frames_of(folder).frame)
 
 
-def test_every_variant_and_stage_is_in_the_tables(once):
-    folder, _ = once
-    rows = frames_of(folder)
-    assert set(zip(rows.variant, rows.stage, strict=True)) == {
-        *((v, s) for v in ("filtered", "unfiltered") for s in ("similarity", "svm", "post")),
-        ("blind", "post"),
-    }
-
-
-def test_counts_are_conserved_in_every_row(once):
-    rows = frames_of(once[0])
-    assert (rows.TP + rows.TN + rows.FP + rows.FN == rows.N).all()
-    assert (rows.N == 24 * 32).all()
-
-
-def test_the_last_window_says_how_short_it_is(once):
-    windows = pd.read_csv(once[0] / "reports" / "windows.csv")
-    assert windows[windows.window == windows.window.max()].frames.unique() == [5]
-
-
-def test_the_recording_holds_the_masks_that_were_scored(once):
-    folder, outcome = once
-    recording = roadeval.Recording(outcome.recording)
-    scored = frames_of(folder).set_index(["frame", "variant", "stage"])
-    for number in (10, 25):
-        truth = recording.truth(number)
-        for stage in ("similarity", "svm", "post"):
-            mask = recording.layer("unfiltered", stage, number)
-            assert ((mask == 1) & (truth == 1)).sum() == scored.TP[number, "unfiltered", stage]
-            assert ((mask == 1) & (truth == 0)).sum() == scored.FP[number, "unfiltered", stage]
-
-
 def test_the_summary_file_is_the_outcome_s_summary(once):
     folder, outcome = once
     written = json.loads((folder / "reports" / "summary.json").read_text())
     assert written["format"] == {"name": "roadeval-summary", "version": 4}
     assert written == json.loads(outcome.facts.text())
-
-
-def test_no_partial_file_is_left(once):
-    folder, _ = once
-    assert sorted(p.name for p in folder.iterdir()) == ["out.rrd", "reports"]
-    assert not [p for p in (folder / "reports").iterdir() if p.name.startswith(".")]
 
 
 def test_the_number_of_workers_changes_no_number_and_no_identity(drive, once, tmp_path):
@@ -132,28 +90,19 @@ def test_the_number_of_workers_changes_no_number_and_no_identity(drive, once, tm
     assert identity_of(outcome.recording) == identity_of(once[1].recording)
 
 
-def test_the_same_drive_under_another_configuration_has_another_identity(drive, once, tmp_path):
-    outcome = run(drive, tmp_path, max_frames=12)
-    assert identity_of(outcome.recording) != identity_of(once[1].recording)
-
-
 def test_frames_after_training_can_be_left_out(drive, tmp_path):
     outcome = run(drive, tmp_path, train_frames=4, gap=5)
     assert outcome.summary["frames"]["skipped"]["gap after training"] == 5
     assert frames_of(tmp_path).frame.min() == 9
 
 
-def test_a_model_file_leaves_its_own_frames_out_and_evaluates_the_rest(drive, tmp_path):
+def test_training_frames_of_the_drive_itself_are_left_out_and_warned_of(drive, tmp_path):
     model = roadeval.train([drive], tmp_path / "m.model", settings(train_frames=5))
     outcome = run(drive, tmp_path, model=tmp_path / "m.model")
     assert outcome.summary["frames"]["trained_on"] == len(model.digests) == 5
     assert outcome.summary["frames"]["evaluated"] == 20
-
-
-def test_training_frames_of_the_drive_itself_are_warned_of(drive, tmp_path):
-    roadeval.train([drive], tmp_path / "m.model", settings(train_frames=5))
-    warnings = run(drive, tmp_path, model=tmp_path / "m.model").summary["warnings"]
-    assert any("5 of the model's 5 training frames lie in this drive; their" in w for w in warnings)
+    warned = "5 of the model's 5 training frames lie in this drive; their"
+    assert any(warned in text for text in outcome.summary["warnings"])
 
 
 @pytest.fixture(scope="module")
@@ -261,11 +210,13 @@ def test_a_further_variant_is_run_like_the_two(drive, tmp_path):
     assert roadeval.Recording(outcome.recording).layer("wide", "rings", 12).max() == 2
 
 
-def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
+def test_a_mask_in_the_log_is_scored_as_a_variant_without_oracles(drive, tmp_path):
     outcome = run(drive, tmp_path, masks={"net": "/net/road_mask_prediction"})
     total = outcome.summary["totals"]["net"]["post"]
     assert (total["ERR"], total["frames"]) == (0, 15)
     assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
+    assert set(outcome.summary["oracles"]) == {"filtered", "unfiltered"}
+    assert outcome.summary["beyond"]["net"]["boundary_F"] == 1
 
 
 def test_folders_are_made_and_a_run_that_is_refused_leaves_nothing(drive, tmp_path):
@@ -299,22 +250,14 @@ def test_what_the_log_lost_is_told(tmp_path):
     assert outcome.summary["losses"] == list(outcome.losses)
 
 
-def test_a_log_without_truth_is_recorded_and_not_scored(tmp_path):
-    log = write_log(tmp_path / "plain.mcap", truth=False)
-    outcome = run(log, tmp_path)
-    assert outcome.summary["totals"] == {}
-    assert "no road truth" in outcome.warnings[0]
-    assert not (tmp_path / "reports" / "frames.csv").exists()
-    assert roadeval.Recording(outcome.recording).layer("filtered", "post", 15).shape == (24, 32)
-
-
-def test_a_broken_frame_costs_itself_alone_and_is_named(tmp_path):
+def test_a_broken_frame_costs_itself_alone_is_named_and_is_no_neighbour(tmp_path):
     log = write_log(tmp_path / "hurt.mcap", broken=13)
     outcome = run(log, tmp_path)
     assert outcome.summary["frames"]["decoded"] == 25
     assert outcome.summary["frames"]["evaluated"] == 14
     assert "13" in outcome.losses[0]
     assert 13 not in set(frames_of(tmp_path).frame)
+    assert outcome.summary["beyond"]["filtered"]["pairs"] == 2 + 5 + 4
 
 
 def test_without_a_recording_the_tables_are_the_same(drive, once, tmp_path):
@@ -351,12 +294,6 @@ def test_the_worst_frames_pictures_are_those_of_the_highest_err(drive, tmp_path,
     final = frames_of(tmp_path).query("stage == 'post' and variant != 'blind'")
     worst = final.groupby("frame").ERR.max().sort_values(ascending=False, kind="stable")
     assert list(recording.frame_numbers) == sorted(worst.index[:4])
-
-
-@pytest.mark.parametrize("rule", ["worst", "worst:0", "some", "every:-1", ""])
-def test_another_rule_is_refused(drive, tmp_path, rule):
-    with pytest.raises(RoadevalError, match="choose all, masks, worst:K"):
-        run(drive, tmp_path, record=rule)
 
 
 def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
@@ -445,6 +382,7 @@ def test_a_run_that_ends_removes_an_earlier_one_s_partial_recording_and_says_so(
         f"removed {left}, the partial recording of an earlier run: this one is whole"
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.rrd", "reports"]
+    assert not [*(tmp_path / "reports").glob(".*")]
     assert left.name not in json.dumps(outcome.summary)
 
 
@@ -543,16 +481,6 @@ def test_changes_are_what_the_recorded_masks_show(once):
     assert (step.repaired, step.spoiled, step.N) == (repaired, spoiled, 15 * 24 * 32)
 
 
-def test_heat_maps_add_up_to_the_tables(once):
-    folder, _ = once
-    heat = (
-        ResultsFolder(folder / "reports").table("heat").groupby("variant")[["labelled", "FP", "FN"]]
-    )
-    final = frames_of(folder).query("stage == 'post'").groupby("variant")[["N", "FP", "FN"]]
-    for variant, sums in heat.sum().iterrows():
-        assert sums.tolist() == final.sum().loc[variant].tolist()
-
-
 def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_table(once):
     folder, outcome = once
     oracles = ResultsFolder(folder / "reports").table("oracles")
@@ -565,23 +493,12 @@ def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_tabl
     assert total["FP"] == oracles[oracles.variant == "filtered"].FP.sum()
 
 
-def test_a_mask_in_the_log_has_no_oracles(drive, tmp_path):
-    outcome = run(drive, tmp_path, masks={"net": "/net/road_mask_prediction"})
-    assert set(outcome.summary["oracles"]) == {"filtered", "unfiltered"}
-    assert outcome.summary["beyond"]["net"]["boundary_F"] == 1
-
-
 def test_flicker_is_counted_from_each_evaluated_frame_to_the_next_one_read(once, drive, tmp_path):
     """Frame 20 has no truth, so neither 19 to 20 nor 20 to 21 is a pair."""
     _, outcome = once
     assert outcome.summary["beyond"]["filtered"]["pairs"] == 9 + 4
     every = run(drive, tmp_path, every=2, train_frames=4).summary
     assert every["beyond"]["filtered"]["pairs"] == (6 - 1) + (2 - 1)
-
-
-def test_a_broken_frame_is_no_neighbour(tmp_path):
-    log = write_log(tmp_path / "hurt.mcap", broken=13)
-    assert run(log, tmp_path).summary["beyond"]["filtered"]["pairs"] == 2 + 5 + 4
 
 
 def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once):
@@ -597,12 +514,6 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
     number = int(frames["frame"].iloc[0])
     assert recording.image(number).shape == (small["height"], small["width"], 3)
     assert recording.layer("filtered", "post", number).shape == (small["height"], small["width"])
-
-
-@pytest.mark.parametrize("scale", [0, -1, 1.01, float("nan")])
-def test_a_scale_that_is_no_share_is_refused(scale):
-    with pytest.raises(RoadevalError, match=r"`frames\.scale`: must be"):
-        settings(scale=scale)
 
 
 def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
@@ -673,16 +584,3 @@ def test_without_truth_there_is_no_rate_for_seeds_to_spread(tmp_path, monkeypatc
     assert len(fits) == 1
     assert "seeds" not in outcome.summary
     assert outcome.warnings[0].startswith("there is no road truth to score against")
-
-
-def test_tables_and_figures_alone_are_made_without_pandas(drive, tmp_path):
-    code = f"""
-import sys
-import roadeval
-
-config = roadeval.configure({{"output": {{"record": "none"}}}})
-made = roadeval.replay({str(drive)!r}, config, reports={str(tmp_path / "reports")!r})
-print("fig3a_error_rate.png" in made.summary["files"], "pandas" in sys.modules)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "True False\n"

@@ -1,5 +1,6 @@
 """Frames and truth out of a log."""
 
+import json
 import os
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,12 +17,12 @@ from roadeval.logs import (
     LogConfig,
     LogError,
     TopicSettings,
+    describe,
     open_log,
 )
 from roadeval.logs.container import records
 from roadeval.logs.container.records import Message
 from roadeval.logs.topics.reader import UNREADABLE
-from tests.fixtures.make import make
 from tests.fixtures.shared import shared
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
@@ -45,29 +46,11 @@ def test_frames_come_with_image_truth_and_times(tmp_path: Path) -> None:
     assert frames[0].truth[:, 0].tolist() == [0, 0, 0, 1, 1, 1]
 
 
-def test_the_cameras_own_file_is_kept(tmp_path: Path) -> None:
-    data = jpeg(grey(90))
-    path = ros2_log(tmp_path / "a.mcap", [("/camera", START, compressed(START, data))])
-    with open_log(path) as log:
-        frame = next(log.frames(log.select())).decode()
-    assert bytes(frame.payload) == data
-    assert frame.media_type == "image/jpeg"
-
-
 def test_labels_logged_after_all_images_are_found(tmp_path: Path) -> None:
     path = drive(tmp_path / "late.mcap", STAMPS, STAMPS[::2], delay=3600 * SECOND)
     with open_log(path) as log:
         frames = log.frames(log.select())
         assert [frame.labelled for frame in frames] == [True, False] * 5
-
-
-def test_an_unlabelled_log_works(tmp_path: Path) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS)
-    with open_log(path) as log:
-        selection = log.select()
-        frame = next(log.frames(selection)).decode()
-    assert frame.truth is None
-    assert any("no truth" in reason for reason in selection.reasons)
 
 
 def test_a_topic_is_not_scored_against_itself(tmp_path: Path) -> None:
@@ -81,13 +64,6 @@ def test_a_topic_is_not_scored_against_itself(tmp_path: Path) -> None:
             pytest.raises(LogError, match=reason),
         ):
             log.select()
-
-
-def test_frames_can_be_read_again(tmp_path: Path) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS)
-    with open_log(path) as log:
-        selection = log.select()
-        assert len(list(log.frames(selection))) == len(list(log.frames(selection))) == 10
 
 
 def test_a_range_is_half_open_and_keeps_the_numbers(tmp_path: Path) -> None:
@@ -136,18 +112,6 @@ def test_without_any_time_images_and_labels_pair_in_their_order(tmp_path: Path) 
         selection = log.select()
         assert [frame.labelled for frame in log.frames(selection)] == [True] * 3
     assert any("their order take their place" in reason for reason in selection.reasons)
-
-
-def test_split_files_in_a_folder_are_one_drive(tmp_path: Path) -> None:
-    (tmp_path / "bag").mkdir()
-    for part in range(3):
-        stamps = STAMPS[3 * part : 3 * part + 3]
-        drive(tmp_path / "bag" / f"bag_{part}.mcap", stamps, stamps)
-    with open_log(tmp_path / "bag") as log:
-        frames = list(log.frames(log.select()))
-    assert log.name == "bag"
-    assert [frame.stamp_ns for frame in frames] == STAMPS[:9]
-    assert all(frame.labelled for frame in frames)
 
 
 def test_a_file_of_a_folder_that_is_no_log_costs_its_part_only(tmp_path: Path) -> None:
@@ -268,20 +232,6 @@ def check_drive(path: Path, labels: LabelSettings, frames: int, *, labelled: boo
 STREET = LabelSettings((3,), (11,))
 
 
-@pytest.mark.parametrize(
-    ("name", "labels", "frames", "labelled"),
-    [
-        ("street", STREET, 30, True),
-        ("car_park", LabelSettings(), 30, True),
-        ("unlabelled", LabelSettings(), 15, False),
-    ],
-)
-def test_small_drives(
-    tmp_path: Path, name: str, labels: LabelSettings, frames: int, labelled: bool
-) -> None:
-    check_drive(make(f"drives/{name}.mcap", tmp_path), labels, frames, labelled=labelled)
-
-
 @pytest.mark.parametrize("folder", shared("drives"))
 @pytest.mark.parametrize(
     ("name", "labels", "frames", "labelled"),
@@ -308,3 +258,22 @@ def test_a_pipe_is_no_log_and_never_waited_for(tmp_path: Path) -> None:
 def test_a_device_is_no_log() -> None:
     with pytest.raises(LogError, match="/dev/null: is a device"):
         open_log("/dev/null")
+
+
+# --- All that there is to say about a log, as plain data ------------------------------------------
+
+BEGIN = 1_700_000_000 * SECOND
+
+
+def test_a_log_is_described_for_machines(tmp_path: Path) -> None:
+    stamps = [BEGIN + i * SECOND for i in (0, 1, 2, 3, 9)]
+    path = drive(tmp_path / "drive.mcap", stamps, stamps[:2])
+    found = json.loads(json.dumps(describe(path).as_dict()))
+    camera, labels = found["topics"]
+    assert (camera["name"], camera["kind"], camera["format"]) == ("/camera", "compressed", "jpeg")
+    assert (camera["count"], camera["rate_hz"], camera["size"]) == (5, 1.0, [8, 6])
+    assert camera["gaps"] == [[stamps[3], stamps[4]]]
+    assert (labels["channels"], labels["count"]) == (1, 2)
+    assert found["bytes"] == path.stat().st_size
+    assert found["picks"][0] == "image: /camera (the only camera image)"
+    assert (found["problem"], found["damage"], found["losses"]) == ("", [], [])

@@ -1,10 +1,7 @@
 """Moments as people write them."""
 
-from typing import Any
-
 import pytest
 
-from roadeval.config import ConfigError, configure
 from roadeval.logs import LogError, parse_time
 
 SECOND = 1_000_000_000
@@ -36,11 +33,3 @@ def test_a_time_is_read_to_the_nanosecond(text: str, ns: int, relative: bool) ->
 def test_anything_else_is_refused(text: str) -> None:
     with pytest.raises(LogError, match="is no time"):
         parse_time(text)
-
-
-@pytest.mark.parametrize(
-    "given", [{"start": "soon"}, {"end": "-3"}, {"every": 0}, {"max_frames": 0}]
-)
-def test_settings_of_frames_are_checked(given: dict[str, Any]) -> None:
-    with pytest.raises(ConfigError, match=next(iter(given))):
-        configure({"frames": given})

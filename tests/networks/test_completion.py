@@ -99,6 +99,32 @@ def test_weights_beside_the_file_are_used(tmp_path):
 
 # --- What is asked for ----------------------------------------------------------------------------
 
+ASKED = {
+    "a size that it does not take": ({}, {"size": (20, 20)}, "takes no input of 20x20"),
+    "which of several outputs": ({"spare": True}, {}, "`net.outputs`"),
+    "an output that is not there": ({}, {"outputs": ("seg",)}, "has no output 'seg'"),
+    "which of three classes": ({"classes": 3}, {}, "name the classes of its 3 that are road"),
+    "which labels": ({"last": "ArgMax"}, {}, "`net.road`"),
+    "a class that is not there": ({}, {"road": (2,)}, "has no class 2, but 2 from 0"),
+    "a name that no class has": (
+        {"classes": 3, "metadata": CITY},
+        {"road": ("street",)},
+        "it has 0 road, 1 sidewalk, 2 sky",
+    ),
+    "one class beats no other": ({"classes": 1}, {"decide": "argmax"}, "`net.decide`"),
+    "four images at once": ({"input_shape": (4, 3, 12, 16)}, {}, "inputs: image"),
+    "five channels": ({"input_shape": (1, 5, 12, 16)}, {}, "inputs: image"),
+    "an operator that is not known": ({"operator": "Unheard"}, {}, "cannot run the network: "),
+    "an output that is no map": ({"last": "GlobalAveragePool"}, {}, "is no map of the image"),
+    "numbers that no image has": ({"dtype": TensorProto.INT64}, {}, "takes no image"),
+}
+
+
+@pytest.mark.parametrize("what", ASKED)
+def test_what_a_network_leaves_open_or_cannot_take_is_said(what, tmp_path):
+    made, settings, said = ASKED[what]
+    assert said in asked(network(tmp_path / "n.onnx", **made), **settings)
+
 
 def test_a_size_that_is_left_open(tmp_path):
     path = network(tmp_path / "n.onnx", input_shape=("n", 3, "h", "w"))
@@ -108,66 +134,10 @@ def test_a_size_that_is_left_open(tmp_path):
     assert read(path, size=(32, 24)).size == (32, 24)
 
 
-def test_a_size_that_the_network_does_not_take(tmp_path):
-    assert "takes no input of 20x20" in asked(network(tmp_path / "n.onnx"), size=(20, 20))
-
-
-def test_which_of_several_outputs_tells_of_road(tmp_path):
-    said = asked(network(tmp_path / "n.onnx", spare=True))
-    assert "`net.outputs`" in said
-    assert "r1 float32" in said
-
-
-def test_an_output_that_is_not_there(tmp_path):
-    assert "has no output 'seg'" in asked(network(tmp_path / "n.onnx"), outputs=("seg",))
-
-
-def test_which_of_three_classes_are_road(tmp_path):
-    path = network(tmp_path / "n.onnx", classes=3)
-    assert "name the classes of its 3 that are road" in asked(path)
-
-
-def test_which_labels_are_road(tmp_path):
-    path = network(tmp_path / "n.onnx", last="ArgMax")
-    assert "`net.road`" in asked(path)
-
-
-def test_a_class_that_is_not_there(tmp_path):
-    assert "has no class 2, but 2 from 0" in asked(network(tmp_path / "n.onnx"), road=(2,))
-    path = network(tmp_path / "c.onnx", classes=3, metadata=CITY)
-    assert "it has 0 road, 1 sidewalk, 2 sky" in asked(path, road=("street",))
-
-
-def test_one_class_beats_no_other(tmp_path):
-    said = asked(network(tmp_path / "n.onnx", classes=1), decide="argmax")
-    assert "`net.decide`" in said
-
-
-@pytest.mark.parametrize("shape", [(4, 3, 12, 16), (1, 5, 12, 16)])
-def test_an_input_that_takes_no_image(shape, tmp_path):
-    assert "inputs: image" in asked(network(tmp_path / "n.onnx", input_shape=shape))
-
-
-def test_an_operator_that_is_not_known(tmp_path):
-    said = asked(network(tmp_path / "n.onnx", operator="Unheard"))
-    assert "cannot run the network" in said
-    assert "Unheard" in said
-
-
 def test_an_order_of_lengths_that_is_left_open(tmp_path):
     path = network(tmp_path / "n.onnx", input_shape=(1, "c", "h", "w"))
     assert "`net.layout`" in asked(path)
     assert read(path, layout="NCHW", size=SIZE).channels == "rgb"
-
-
-def test_an_output_that_is_no_map(tmp_path):
-    path = network(tmp_path / "n.onnx", last="GlobalAveragePool")
-    assert "is no map of the image" in asked(path)
-
-
-def test_a_type_of_numbers_that_no_image_has(tmp_path):
-    path = network(tmp_path / "n.onnx", dtype=TensorProto.INT64)
-    assert "takes no image" in asked(path)
 
 
 def test_no_file(tmp_path):

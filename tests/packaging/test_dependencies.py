@@ -4,8 +4,11 @@ import ast
 import re
 import sys
 import tomllib
+from importlib import import_module
 from importlib.metadata import packages_distributions
 from pathlib import Path
+
+import pytest
 
 import roadeval
 
@@ -42,3 +45,16 @@ def test_every_import_is_of_a_declared_dependency():
         if not declared & {plain(each) for each in distributions.get(module, ())}
     }
     assert not undeclared
+
+
+# --- The benchmarks follow the package: nothing but a person runs most of them --------------------
+
+MODULES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for path in sorted((ROOT / "benchmarks").rglob("*.py"))
+]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_benchmark_finds_what_it_imports(module):
+    import_module(module.removesuffix(".__init__"))

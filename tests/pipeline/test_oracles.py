@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import Packed
+from roadeval.pipeline.chain import Chain, Pipeline
 from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.stage import Output, View
 from roadeval.pipeline.stages import STAGES
@@ -122,3 +123,53 @@ def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):
     alone = dict(other.oracles(SEEN, outputs, ROAD, None, {}))["svm"]
     shared = dict(other.oracles(SEEN, outputs, ROAD, None, known))["svm"]
     assert_same(shared["post"], alone["post"])
+
+
+# --- A chain that takes over what another of the same stages has computed -------------------------
+
+PICTURE = View.of(noise(40, 60))
+
+
+def of(*names: str) -> Chain:
+    return chain_of(names, {name: SETTINGS["paper"][name] for name in names})
+
+
+def never(view):
+    pytest.fail("it ran again")
+
+
+def test_the_masks_are_those_of_the_chain_itself():
+    chain = of(*NAMES)
+    results = list(chain.run(PICTURE))
+    masks = dict(chain.repeated(PICTURE, [output for _, output in results]))
+    assert list(masks) == ["similarity", "svm", "post"]
+    for name, output in results:
+        if output.mask is not None:
+            np.testing.assert_array_equal(masks[name].pixels(), output.mask.pixels())
+
+
+def test_a_filter_that_learns_nothing_does_not_run_again():
+    chain = of(*NAMES)
+    outputs = [output for _, output in chain.run(PICTURE)]
+    filter_, *rest = chain.steps
+    blocked = Chain((type(filter_)(filter_.stage, filter_.settings, never), *rest))
+    assert list(dict(blocked.repeated(PICTURE, outputs))) == ["similarity", "svm", "post"]
+
+
+def test_other_parameters_give_their_own_masks():
+    chain, other = of(*NAMES), chain_of(NAMES, SETTINGS["paper"] | {"svm": wide()})
+    outputs = [output for _, output in chain.run(PICTURE)]
+    expected = {name: output.mask for name, output in other.run(PICTURE)}
+    masks = dict(other.repeated(PICTURE, outputs))
+    np.testing.assert_array_equal(masks["svm"].pixels(), expected["svm"].pixels())
+    assert (masks["svm"].pixels() != outputs[2].mask.pixels()).any()
+
+
+def wide():
+    return type(SETTINGS["paper"]["svm"])(gamma=0.01, c=0.1)
+
+
+def test_a_chain_that_learns_nothing_has_nothing_to_repeat():
+    chain = Pipeline.default(["shadow"]).bind({})
+    outputs = [output for _, output in chain.run(PICTURE)]
+    assert dict(chain.repeated(PICTURE, outputs)) == {}

@@ -14,15 +14,6 @@ def paths(**changes):
     return [path for path, _ in layout(**changes).images()]
 
 
-def test_every_layer_of_every_variant_has_a_path():
-    assert {"/filtered/ndi", "/filtered/rings", "/filtered/post"} < set(paths())
-
-
-def test_truth_and_error_maps_are_there_only_where_there_is_truth():
-    assert {"/truth", "/filtered/errors"} < set(paths())
-    assert not {"/truth", "/filtered/errors"} & set(paths(has_truth=False))
-
-
 def test_true_shadow_is_there_only_where_the_log_has_it():
     assert "/true_shadow" in paths(has_shadow_truth=True)
     assert "/true_shadow" not in paths()

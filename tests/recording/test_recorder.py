@@ -1,7 +1,6 @@
 """The recording as a file: complete under its name, partial where a run ended early."""
 
 import errno
-import json
 import os
 import re
 import shutil
@@ -16,16 +15,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError, RecordRule, views
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, views
 from roadeval.recording.recorder import LEAST_FREE, UNWRITTEN
 from roadeval.recording.rows import CHUNK_BYTES, PendingRows
 from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import (
     RESULTS,
-    SUMMARY,
     layout,
-    paths_of,
-    record,
     rerun,
     result,
     rows_of,
@@ -61,37 +57,10 @@ def test_an_interrupt_before_the_first_frame_leaves_nothing(place, tmp_path, mon
     assert not list(tmp_path.iterdir())
 
 
-def test_reruns_own_tool_finds_no_fault(recording):
-    assert rerun("verify", recording.path) == 0
-
-
-def test_the_same_input_gives_the_same_recording_but_for_the_timing(drive, tmp_path):
-    slower = [
-        replace(each, variants=tuple(_slower(variant) for variant in each.variants))
-        for each in drive
-    ]
-    hours = {**RESULTS, "summary": json.dumps({**SUMMARY, "seconds": {"filtered": {"post": 9}}})}
-    record(tmp_path / "a.rrd", drive)
-    record(tmp_path / "b.rrd", slower, texts=hours)
-    assert rerun("compare", "--unordered", tmp_path / "a.rrd", tmp_path / "b.rrd") != 0
-    for name in ("a", "b"):
-        whole = tmp_path / f"{name}.rrd"
-        timing = [path for path in paths_of(whole) if path.startswith("/timing/")]
-        drops = [word for path in timing for word in ("--drop-entity", path)]
-        assert rerun("filter", *drops, whole, "-o", tmp_path / f"{name}.same.rrd") == 0
-    same = [tmp_path / "a.same.rrd", tmp_path / "b.same.rrd"]
-    assert rerun("compare", "--unordered", *same) == 0
-
-
 def test_when_the_run_took_place_is_not_recorded(recording):
     file = RrdFile(recording.path)
     assert file.static("/__properties", "RecordingInfo:start_time") is None
     assert file.static("/__properties", "RecordingInfo:name") == "street"
-
-
-def _slower(variant):
-    stages = tuple(replace(stage, seconds=stage.seconds * 3) for stage in variant.stages)
-    return replace(variant, stages=stages)
 
 
 def test_flushed_frames_wait_no_more(drive, tmp_path):
@@ -335,13 +304,6 @@ def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
 
 def _recorder(path):
     return Recorder(path, layout())
-
-
-def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
-    with NullRecorder() as recorder:
-        recorder.write(recorder.encode(drive[0], 0))
-        recorder.flush()
-        recorder.finish(RESULTS)
 
 
 def test_what_fails_at_the_close_alone_is_raised_and_what_failed_first_is_kept(

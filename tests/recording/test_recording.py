@@ -12,10 +12,7 @@ from roadeval.data import Health, Role
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, rrd_file
 from roadeval.recording.rrd_file import RrdFile
 from tests.recording.making import (
-    HEIGHT,
     RESULTS,
-    SUMMARY,
-    WIDTH,
     frame,
     layout,
     record,
@@ -35,11 +32,6 @@ def test_masks_and_labels_of_every_frame_come_back_equal(drive, recording):
                 np.testing.assert_array_equal(back, layer.array)
 
 
-def test_ndi_comes_back_to_its_code(drive, recording):
-    codes = next(drive[3].variants[0].layers()).array
-    np.testing.assert_allclose(recording.layer("filtered", "ndi", 3), codes / 127.5 - 1, atol=1e-6)
-
-
 def test_truth_and_error_map_come_back_equal(drive, recording):
     np.testing.assert_array_equal(recording.truth(4), drive[4].frame.truth)
     errors = recording.layer("filtered", "errors", 4)
@@ -53,10 +45,6 @@ def test_the_cameras_own_file_is_passed_on(tmp_path):
     back = record(tmp_path / "out.rrd", [replace(unscored(0), frame=logged)]).image(0)
     decoded = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR_RGB)
     np.testing.assert_array_equal(back, decoded)
-
-
-def test_a_raw_image_is_recorded_in_its_own_size(recording):
-    assert recording.image(0).shape == (HEIGHT, WIDTH, 3)
 
 
 def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tmp_path):
@@ -90,21 +78,10 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
         assert rows_of(recording, path, component) == {4: 1, 5: 1, 6: 0, 11: 1, 12: 0}
 
 
-def test_the_tables_lines_come_back_as_a_table(recording):
-    assert list(recording.frames.frame) == list(range(2, 19))
-    assert recording.frames.ERR.tolist() == [0.25] * 17
-
-
 def test_a_drive_without_rows_gives_an_empty_table_with_its_columns(tmp_path):
     frames = record(tmp_path / "out.rrd", [unscored(0)]).frames
     assert frames.empty
     assert "ERR" in frames.columns
-
-
-def test_results_come_back(recording):
-    assert recording.complete
-    assert recording.summary == SUMMARY
-    assert recording.windows.ERR.tolist() == [0.25]
 
 
 def test_rates_facts_and_milliseconds_are_series(recording):
@@ -180,11 +157,6 @@ def test_a_recording_that_tells_no_format_is_of_an_earlier_version(recording, tm
 def test_an_unknown_layer_is_answered_with_those_that_exist(recording):
     with pytest.raises(RecordingError, match=r"no /filtered/depth; there are .*/filtered/ndi"):
         recording.layer("filtered", "depth", 3)
-
-
-def test_an_unknown_frame_is_told(recording):
-    with pytest.raises(RecordingError, match="nothing on frame 99"):
-        recording.image(99)
 
 
 @pytest.mark.parametrize("content", [b"", b"RR", b"\x89MCAP0\r\n", b"frame,stamp_ns\n"])

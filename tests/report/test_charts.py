@@ -1,6 +1,5 @@
 """Which charts are made of which rows: each number where it belongs, in its own look."""
 
-import sys
 from dataclasses import replace
 from itertools import combinations
 
@@ -11,10 +10,9 @@ from roadeval.data import colours
 from roadeval.evaluation.comparison import Change
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.stats import Difference
-from roadeval.report import charts as folder
-from roadeval.report.chart import ChartKind, Look, legend, looks, looks_of_results
+from roadeval.report.chart import ChartKind, looks, looks_of_results
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import DRAWN, MEAN, ForestRow, figures_over_drive
+from roadeval.report.charts.standard import DRAWN, MEAN, ForestRow
 from tests.evaluation.making import a_table, rows_of
 
 FILTERED, UNFILTERED = (colours.hex_of(c) for c in (colours.FILTERED, colours.UNFILTERED))
@@ -35,12 +33,6 @@ def test_variants_differ_by_more_than_their_colour():
         assert replace(one, colour="") != replace(other, colour="")
 
 
-def test_the_colours_are_those_of_the_design():
-    found = looks(["filtered", "unfiltered", "blind"])
-    assert [look.colour for look in found.values()] == [FILTERED, UNFILTERED, "#8A8A8A"]
-    assert found["blind"].dash == "dotted"
-
-
 def test_of_several_results_a_variant_keeps_its_hue_and_a_result_its_dash():
     masks = {f"{r}: {v}": (r, v) for v in ("filtered", "robust") for r in ("old", "new")}
     found = looks_of_results(masks)
@@ -48,11 +40,6 @@ def test_of_several_results_a_variant_keeps_its_hue_and_a_result_its_dash():
     assert found["old: robust"].colour == found["new: robust"].colour
     assert found["old: robust"].dash == found["old: filtered"].dash == "solid"
     assert found["new: robust"].dash == found["new: filtered"].dash == "dashed"
-
-
-def test_variants_of_one_result_are_compared_in_their_own_looks():
-    names = ["filtered", "robust"]
-    assert looks_of_results({name: (name, name) for name in names}) == looks(names)
 
 
 # --- Rates ----------------------------------------------------------------------------------------
@@ -63,14 +50,6 @@ def test_lines_go_along_the_drive_whatever_the_table_s_order():
     (chart,) = charts.over_frames(rows.take(np.array([4, 3, 2, 5, 0, 1])), ["ERR"])
     (line,) = chart.series
     assert numbers(line) == [(0, 10), (1, 20), (2, 30)]
-
-
-def test_each_rate_of_the_stages_has_its_own_chart_and_the_baseline_is_a_level():
-    own = {"ERR": 0.1, "FPR": 0.2, "FNR": None}
-    totals = {"filtered": {"svm": own, "post": own}, "blind": {"post": own}}
-    for chart, value in zip(charts.stages(totals), (10, 20, np.nan), strict=True):
-        for series in chart.series:
-            np.testing.assert_allclose(series.y, [value, value])
 
 
 def test_stages_of_variants_stand_in_the_order_of_their_chains():
@@ -87,42 +66,12 @@ def test_a_rate_that_is_better_higher_need_not_begin_at_zero(monkeypatch):
     assert [chart.from_zero for chart in made] == [True, False]
 
 
-def test_a_region_has_its_error_rate_and_its_share_of_the_errors():
-    table = {("lit", "filtered"): {"pixels": 0.5, "ERR": 0.1, "errors": 0.3}}
-    titles = {"lit": "in light", "dark": "not counted"}
-    left, right = charts.regions(table, ["filtered"], titles)
-    assert left.names == right.names == ["in light", "not counted"]
-    np.testing.assert_allclose(left.series[0].y, [10, np.nan])
-    np.testing.assert_allclose(right.series[0].y, [30, np.nan])
-    np.testing.assert_allclose(right.share, [50, np.nan])
-
-
 def test_equal_shades_are_equal_shares_in_every_map():
     maps = {name: np.full((2, 1, 1), share) for name, share in (("a", 0.1), ("b", 0.4))}
     made = [*charts.heat(maps)]
     assert [each.title for each in made] == ["FP of a", "FN of a", "FP of b", "FN of b"]
     assert [each.top for each in made] == pytest.approx([40] * 4)
     assert (made[0].most, made[0].colour, made[1].colour) == (10, colours.FP, colours.FN)
-
-
-def test_the_covered_share_is_in_percent():
-    chart = charts.coverage({"filtered": {3: 0.25, 8: 0.5}})
-    assert numbers(chart.series[0]) == [(3, 25), (8, 50)]
-
-
-ADDED = """
-from roadeval.report.charts.standard import OverDrive, over_windows
-
-FIGURE = OverDrive("Accuracy.", lambda windows: over_windows(windows, ["ACC"]))
-"""
-
-
-def test_a_figure_over_the_drive_is_one_file_in_the_folder(tmp_path, monkeypatch):
-    (tmp_path / "accuracy.py").write_text(ADDED)
-    monkeypatch.setattr(folder, "__path__", [*folder.__path__, str(tmp_path)])
-    *_, last = figures_over_drive()
-    assert last.caption == "Accuracy."
-    sys.modules.pop("roadeval.report.charts.accuracy")
 
 
 # --- Differences ----------------------------------------------------------------------------------
@@ -136,16 +85,6 @@ def test_the_differences_of_frames_have_their_mean_across():
     assert [*own.points()] == [(7, pytest.approx(10)), (9, pytest.approx(-20))]
     assert own.look.colour == FILTERED
     assert (chart.level.name, chart.level.value) == ("mean", -5)
-
-
-def test_a_comparison_shows_changes_with_their_intervals():
-    unsure = replace(CHANGE, low=None, high=None)
-    changes = {"ERR": CHANGE, "FPR": unsure, "FNR": CHANGE}
-    row = Change("new", "filtered", "post", True, 1, 12, {}, {}, changes)
-    first, second, _ = charts.changes([row])
-    (own,) = first.series
-    assert (own.y, own.low, own.high) == ([1], [-2], [4])
-    assert np.isnan(second.series[0].low).all()
 
 
 def test_each_result_of_another_drive_has_a_row():
@@ -206,11 +145,3 @@ def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
 
 
 # --- Legends --------------------------------------------------------------------------------------
-
-
-def test_a_legend_has_what_several_charts_show_once():
-    rows = rows_of(a_table({("net", "post"): [10, 20], ("blind", "post"): [1, 2]}))
-    keys = legend(charts.over_frames(rows, ["ERR", "FPR"]))
-    assert [(key.name, key.kind) for key in keys] == [("net", "both"), ("blind", "both")]
-    assert keys[0].look == looks(["net"])["net"]
-    assert isinstance(keys[0].look, Look)

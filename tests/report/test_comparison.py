@@ -15,7 +15,7 @@ from roadeval.evaluation.comparison import (
     judge,
 )
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table, Text
+from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table
 from roadeval.report.chart import Chart, ChartKind, Series, looks
 from roadeval.report.comparison import LONGEST, comment, document, markdown
 from roadeval.report.pdf.typeset import pdf
@@ -53,11 +53,11 @@ def over_drive():
     return [Chart("ERR", ChartKind.LINES, series)]
 
 
-def test_a_comment_of_ten_thousand_masks_still_fits_and_says_that_it_was_cut():
+def test_a_comment_of_a_thousand_masks_still_fits_and_says_that_it_was_cut():
     whole = comment(a_comparison(), LIMITS)
     assert whole.startswith("## roadeval: failed, 1 of 2 limits exceeded\n")
     assert "left out here" not in whole
-    masks = tuple(replace(CHANGE, variant=f"variant_{number}") for number in range(10_000))
+    masks = tuple(replace(CHANGE, variant=f"variant_{number}") for number in range(1_000))
     cut = comment(making.a_comparison(*masks), LIMITS)
     assert 65_000 < len(cut) <= LONGEST == 65_536
     assert cut.endswith("writes all of it.\n")
@@ -75,40 +75,6 @@ def test_markdown_has_exceeded_limits_first_and_names_do_not_break_its_tables():
     assert "- the \\<gap\\> does not say which log it is of: nothing is subtracted" in lines
 
 
-def test_the_document_has_the_numbers_and_the_frames():
-    words = text(pdf(document(a_comparison(), LIMITS, over_drive())))
-    for wanted in ("Limits exceeded", FAILED, "+1.20", "the <gap>", "new|er"):
-        assert wanted in words
-
-
-def test_exceeded_and_kept_limits_are_two_lists():
-    lists = blocks(BulletList, a_comparison())
-    assert [(each.title, list(each.items)) for each in lists[:2]] == [
-        ("Limits exceeded", [FAILED]),
-        ("Limits kept", [KEPT]),
-    ]
-
-
-def test_each_result_has_a_table_of_every_rate_of_final_masks_and_of_err_of_others():
-    svm = replace(CHANGE, stage="svm", final=False)
-    rows = svm, CHANGE, replace(CHANGE, variant="wide"), replace(CHANGE, result="newest")
-    first, second, *_ = blocks(Table, a_comparison(changes=rows))
-    assert [each.caption for each in (first, second)] == [
-        "new|er against base",
-        "newest against base",
-    ]
-    assert [row[:3] for row in plain_rows(first)] == [
-        ["filtered", "svm", "ERR"],
-        ["", "post", "ERR"],
-        ["", "", "FPR"],
-        ["", "", "FNR"],
-        ["wide", "post", "ERR"],
-        ["", "", "FPR"],
-        ["", "", "FNR"],
-    ]
-    assert first.breaks == [4]
-
-
 def test_a_variant_of_which_no_stage_changed_has_no_rows():
     svm = a_change(a_difference(0, 0, 0), "wide", result="new|er")
     rows = CHANGE, replace(svm, stage="svm", final=False), svm
@@ -117,22 +83,6 @@ def test_a_variant_of_which_no_stage_changed_has_no_rows():
     post = replace(CHANGE, variant="wide")
     table, *_ = blocks(Table, a_comparison(changes=(*rows[:2], post)))
     assert [row[:2] for row in plain_rows(table)][3:5] == [["wide", "svm"], ["", "post"]]
-
-
-def test_the_variants_of_a_single_result_are_in_one_table():
-    rows = [replace(CHANGE, result=name, variant=name) for name in ("filtered", "wide")]
-    table, *_ = blocks(Table, a_comparison(changes=rows))
-    assert table.caption == "against base"
-    assert {row[0] for row in table.rows} == {"filtered", "wide", ""}
-
-
-def test_the_changed_settings_follow_the_verdict():
-    changed = (Note(Kind.SETTINGS, "base", "new|er", settings=PRESETS),)
-    comparison = a_comparison(changed_settings=changed)
-    second, first = (note.text for note in blocks(Text, comparison)[:2])
-    assert first == "Changed settings: preset paper to gated."
-    assert second.startswith("On these 12 frames new|er instead of base raises ERR of post")
-    assert markdown(comparison, ()).splitlines()[4].startswith("Changed settings:")
 
 
 def test_different_drives_are_laid_side_by_side():
@@ -208,16 +158,6 @@ def made_of(kind):
     return [b for b in document(COMPARED, JUDGED, []).blocks if isinstance(b, kind)]
 
 
-def test_over_drives_the_drives_are_counted_and_what_is_sure_is_marked():
-    table = made_of(Table)[0]
-    assert table.caption == "new against base: 30 drives in common"
-    rows = [row for row in plain_rows(table) if row[2] == "ERR"]
-    assert [(row[0], row[-1].endswith(" *")) for row in rows] == [
-        ("filtered", True),
-        ("unfiltered", False),
-    ]
-
-
 def test_drives_that_changed_are_listed_the_surest_first():
     table = made_of(Table)[1]
     rows = plain_rows(table)
@@ -235,10 +175,3 @@ def test_the_document_of_several_drives_has_the_plots():
     words = text(pdf(document(COMPARED, JUDGED, [])))
     assert "filtered: over 30 drives new instead of base raises ERR of post" in words
     assert "Holm's correction for the 2 differences of ERR" in words
-
-
-def test_markdown_names_the_drives_that_changed():
-    lines = markdown(COMPARED, JUDGED).splitlines()
-    assert "### Drives on which filtered changed, the surest first" in lines
-    assert "| drive\\_27 |" in "\n".join(lines)
-    assert f"- {judged(JUDGED[0])}".replace(">", "\\>") in lines

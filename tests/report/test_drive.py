@@ -3,9 +3,9 @@
 from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.frames import FrameBrowser
-from roadeval.results.facts import DriveFacts, FrameAccount
+from roadeval.results.facts import FrameAccount
 from tests.report.making import VARIANTS, some_findings
-from tests.report.sections.test_thresholds import findings as thresholded
+from tests.report.sections.test_drive import findings as thresholded
 
 
 def sections(findings):
@@ -33,12 +33,3 @@ def test_of_a_run_that_was_cut_the_evaluated_frames_are_counted():
     account = FrameAccount(evaluated=17, trained_on=10)
     findings = some_findings(totals={}, frames=account)
     assert document(findings).subtitle.startswith("17 frames")
-
-
-def test_the_drives_facts_stand_below_its_name():
-    drive = DriveFacts("street", width=40, height=20, rate_hz=14.9999)
-    about = {"versions": {"roadeval": "1.2"}, "run": {"preset": "paper"}}
-    page = document(some_findings(totals={}, drive=drive, **about))
-    assert page.title == "street"
-    assert page.subtitle == "1210 frames, 40 × 20, 15 Hz, preset paper, roadeval 1.2"  # noqa: RUF001
-    assert page.footer == "street, drive.rrd"

@@ -112,55 +112,11 @@ def names(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.texts[2:]]
 
 
-def test_figure_3a_shows_err_of_every_final_mask_in_percent() -> None:
-    table = a_table(4)
-    (ax,) = error_rate("drive", rows_of(table)).axes
-    assert len(ax.lines) == 3
-    for line, variant in zip(ax.lines[::-1], BY_DEFAULT, strict=True):
-        own = table[(table["variant"] == variant) & (table["stage"] == "post")]
-        assert line.get_label().startswith(variant)
-        assert line.get_ydata() == pytest.approx(100 * own["ERR"].to_numpy())
-
-
-def test_figure_3b_shows_fpr_and_fnr_apart() -> None:
-    table = a_table(4)
-    figure = fp_fn_rate("drive", rows_of(table))
-    for ax, rate in zip(figure.axes, ("FPR", "FNR"), strict=True):
-        assert rate in ax.get_ylabel()
-        for line, variant in zip(ax.lines[::-1], BY_DEFAULT, strict=True):
-            own = table[(table["variant"] == variant) & (table["stage"] == "post")]
-            assert line.get_ydata() == pytest.approx(100 * own[rate].to_numpy())
-
-
 def test_a_variant_without_post_is_shown_by_its_last_stage() -> None:
     table = a_table(2, ("net",)).query("stage == 'svm'")
     (ax,) = error_rate("drive", rows_of(table)).axes
     assert len(ax.lines) == 1
     assert "svm" in texts(error_rate("drive", rows_of(table)))
-
-
-def test_the_axes_of_two_rates_are_close_and_do_not_touch() -> None:
-    upper, lower = (ax.get_position() for ax in drawn(fp_fn_rate("d", rows_of(a_table(3)))).axes)
-    gap = (upper.y0 - lower.y1) / upper.height
-    assert 0.05 < gap < 0.2
-
-
-def test_the_masks_stand_below_the_title_and_within_the_figure() -> None:
-    figure = drawn(masks_of([an_example()]))
-    title = min(text.get_window_extent().y0 for text in figure.texts)
-    for ax in figure.axes:
-        box = ax.get_window_extent()
-        assert box.x0 >= 0
-        assert box.y0 >= 0
-        assert box.x1 <= figure.bbox.x1
-        assert box.y1 < title
-
-
-def test_rates_are_in_percent_from_zero() -> None:
-    (ax,) = drawn(error_rate("drive", rows_of(a_table(4)))).axes
-    labels = [label.get_text() for label in ax.get_yticklabels()]
-    assert labels[0] == "0 %"
-    assert all(label.endswith(" %") for label in labels)
 
 
 @pytest.mark.parametrize("rows", [1, 12, 3600])
@@ -214,13 +170,6 @@ def test_a_long_drive_is_drawn_as_means_of_rows() -> None:
     assert "the mean of 24 rows of 10 frames" in texts(figure)
 
 
-def test_figure_2_has_a_row_a_frame_and_a_column_a_mask() -> None:
-    figure = masks_of([an_example(7), an_example(33)])
-    assert [len(row) for row in pictures(figure)] == [4, 4]
-    titles = ["camera image", "filtered", "unfiltered", "ground truth"]
-    assert names(figure) == ["frame 7", *titles, "frame 33"]
-
-
 def test_figure_2_without_truth_has_no_column_for_it() -> None:
     figure = masks_of([an_example(truth=False)])
     assert names(figure) == ["frame 7", "camera image", "filtered", "unfiltered"]
@@ -244,22 +193,6 @@ def test_ignored_pixels_are_greyed() -> None:
     figure = masks_of([ExampleFrame(1, example.image, truth, example.masks)])
     assert pictures(figure)[0][3][0, 0].tolist() == [120, 120, 120]
     assert "ignored" in texts(figure)
-
-
-@pytest.mark.parametrize(("value", "said"), [(255, True), (1, False)])
-def test_the_legend_speaks_of_ignored_pixels_where_there_are_some(value: int, said: bool) -> None:
-    example = an_example()
-    truth = np.ones_like(example.image[..., 0])
-    truth[0, 0] = value
-    figure = masks_of([ExampleFrame(7, example.image, truth, example.masks)])
-    assert ("grey: ignored" in texts(figure)) is said
-
-
-def test_large_images_are_shrunk() -> None:
-    big = ExampleFrame(
-        1, np.zeros((600, 1200, 3), np.uint8), None, {"net": np.zeros((600, 1200), np.uint8)}
-    )
-    assert {picture.shape for picture in pictures(masks_of([big]))[0]} == {(200, 400, 3)}
 
 
 def test_a_frame_without_a_mask_is_faded_in_its_column() -> None:

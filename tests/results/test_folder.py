@@ -144,16 +144,6 @@ def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
     assert heat[["labelled", "FP", "FN"]].sum().tolist() == own[["N", "FP", "FN"]].sum().tolist()
 
 
-def test_oracles_have_a_row_per_frame_variant_oracle_and_stage_and_read_back(
-    tmp_path: Path,
-) -> None:
-    write(tmp_path)
-    told = ResultsFolder(tmp_path).table("oracles")
-    assert told[["frame", "variant", "oracle", "stage"]].to_numpy().tolist() == [
-        [number, "filtered", "svm", "post"] for number in (5, 6, 7)
-    ]
-
-
 def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_removed(
     tmp_path: Path,
 ) -> None:
@@ -185,13 +175,6 @@ def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -
     bands = regions[regions["region"].str.startswith("band_")]
     summed = bands.groupby(["frame", "variant"])["FP"].sum().to_dict()
     assert summed == whole.groupby(["frame", "variant"])["FP"].sum().to_dict()
-
-
-def test_two_runs_give_equal_bytes(tmp_path: Path) -> None:
-    write(tmp_path / "a")
-    write(tmp_path / "b")
-    for name in names(tmp_path / "a"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
 def test_lines_end_alike_everywhere(tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 import hashlib
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -143,13 +141,3 @@ def test_a_name_that_no_result_can_hold_is_damage(name):
 def test_a_long_one_is_quoted_in_part():
     with pytest.raises(ResultsError, match=r"column variant holds '\+{40}', which is no name"):
         read_table("oracles", HEADER + line(variant="+" * 10_000))
-
-
-@pytest.mark.parametrize("text", ["", HEADER, HEADER + line()])
-def test_rows_are_read_without_pandas(text):
-    code = (
-        "import sys; from roadeval.results.tables import read_rows; "
-        f"read_rows('oracles', {text!r}); print('pandas' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"

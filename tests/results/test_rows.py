@@ -5,11 +5,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.comparison import junit_xml
 from roadeval.results.over_drives import drive_cases
 from roadeval.results.rows import drive_row, score_rows, sum_rows
+from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES, Kind, documentation
 from tests.results.making import facts_of
 
 
@@ -64,3 +66,29 @@ def test_the_case_of_a_drive_says_why_it_has_no_score_and_what_was_lost(status, 
     (case,) = ElementTree.fromstring(xml)
     assert [part.tag for part in case] == [kind] * bool(kind)
     assert "".join(part.get("message") or part.text for part in case) == said
+
+
+# --- One schema a table: what is written, read and documented is the same -------------------------
+
+
+@pytest.mark.parametrize("name", ["frames", "oracles", "windows"])
+def test_every_metric_is_a_column(name):
+    rates = [column.name for column in TABLES[name].columns if column.kind is Kind.RATE]
+    assert rates[: len(METRICS)] == list(METRICS)
+
+
+@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
+def test_every_column_has_a_name_of_its_own_and_a_line_of_documentation(table):
+    assert len(set(table.names)) == len(table.names)
+    for column in table.columns:
+        assert column.doc
+        text = documentation([table.name], "csv")
+        assert f"| `{column.name}` | {column.kind} | {column.doc} |" in text
+
+
+def test_every_table_begins_with_its_drive_and_camera_and_is_of_one_drive_or_of_many():
+    assert {*OF_A_DRIVE, *OF_DRIVES} == {*TABLES}
+    assert all(
+        [n for n in table.names if n != "rank"][:2] == ["drive", "camera"]
+        for table in TABLES.values()
+    )

@@ -210,16 +210,3 @@ def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
         "version computes 3; train it again"
     ]
     assert [path.name for path in tmp_path.iterdir()] == ["x.model"]
-
-
-def test_the_command_ends_with_one_line_and_code_1(arrays, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    spoilt = {**arrays, "filtered/svm/weights": np.zeros((2, 2))}
-    with Path("x.model").open("wb") as file:
-        np.savez(file, **spoilt)
-    assert main(["replay", str(DEMO), "--model", "x.model"]) == 1
-    assert capsys.readouterr().err.splitlines() == [
-        "roadeval: error: x.model: a damaged model file: filtered/svm: weights has the shape "
-        "(2, 2) instead of (m,); train it again"
-    ]
-    assert [path.name for path in tmp_path.iterdir()] == ["x.model"]

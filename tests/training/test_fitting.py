@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
+from roadeval.config import ConfigError, configure
+from roadeval.data import NON_ROAD, ROAD
 from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import View
 from roadeval.training import TrainingError, TrainingSettings, fit
+from roadeval.training.learning import WIDTH, patch_truth, sample
 from tests.training.making import frame, pipelines
 
 FRAMES = [frame(n) for n in range(3)]
@@ -45,12 +49,6 @@ def test_training_twice_gives_the_same_model():
     np.testing.assert_array_equal(machines[0].weights, machines[1].weights)
 
 
-def test_the_model_remembers_its_frames():
-    model = fit(FRAMES, pipelines(), TrainingSettings())
-    assert model.digests == {f.digest() for f in FRAMES}
-    assert frame(9).digest() not in model.digests
-
-
 def test_no_frames_are_an_error():
     with pytest.raises(TrainingError, match="no frame to train on"):
         fit([], pipelines(), TrainingSettings())
@@ -61,18 +59,6 @@ def test_one_class_alone_is_an_error_that_names_the_frames():
     sky.truth[:] = 0
     with pytest.raises(TrainingError, match="frames 4 to 4 do not show both road and non-"):
         fit([sky], pipelines(), TrainingSettings())
-
-
-def test_insisting_on_truth_where_there_is_none_is_an_error():
-    with pytest.raises(TrainingError, match="no truth to train on"):
-        fit([frame(labelled=False)], pipelines(), TrainingSettings(source="truth"))
-
-
-def test_without_truth_the_patch_teaches():
-    unlabelled = [frame(n, labelled=False) for n in range(3)]
-    model = fit(unlabelled, pipelines(), TrainingSettings())
-    assert model.source == "patch"
-    assert model.prior is None
 
 
 def test_a_collapsed_classifier_is_reported():
@@ -87,3 +73,142 @@ def test_a_collapsed_classifier_is_reported():
 def test_a_sound_classifier_is_not_reported():
     only = {"unfiltered": pipelines()["unfiltered"]}
     assert fit(FRAMES, only, TrainingSettings()).warnings == ()
+
+
+# --- Which pixels train ---------------------------------------------------------------------------
+
+HALF = np.repeat([[1], [0]], [4, 4], axis=0).repeat(10, axis=1).astype(np.uint8)
+
+
+def test_both_classes_are_drawn_equally_from_every_frame():
+    pixels = sample([HALF, HALF], TrainingSettings(pixels_per_class=5))
+    assert len(pixels.road) == 20
+    for number in (0, 1):
+        for road in (True, False):
+            assert ((pixels.frame == number) & (pixels.road == road)).sum() == 5
+
+
+def test_drawn_pixels_bear_their_label():
+    pixels = sample([HALF], TrainingSettings(pixels_per_class=7))
+    np.testing.assert_array_equal(HALF[pixels.row, pixels.column] == 1, pixels.road)
+
+
+def test_no_pixel_is_drawn_twice():
+    pixels = sample([HALF], TrainingSettings(pixels_per_class=40))
+    assert len(set(zip(pixels.row.tolist(), pixels.column.tolist(), strict=True))) == 80
+
+
+def test_ignored_pixels_are_never_drawn():
+    truth = HALF.copy()
+    truth[:, 3:] = 255
+    pixels = sample([truth], TrainingSettings(pixels_per_class=100))
+    assert len(pixels.road) == 2 * 12
+    assert pixels.column.max() == 2
+
+
+def test_the_rarer_class_sets_the_size_of_both():
+    truth = np.zeros((10, 10), np.uint8)
+    truth[0, :3] = 1
+    pixels = sample([truth], TrainingSettings(pixels_per_class=50))
+    assert (pixels.road.sum(), (~pixels.road).sum()) == (3, 3)
+
+
+def test_a_frame_without_road_still_gives_its_other_pixels():
+    pixels = sample([np.zeros_like(HALF), HALF], TrainingSettings(pixels_per_class=4))
+    assert (pixels.road.sum(), (~pixels.road).sum()) == (4, 4)
+    assert set(pixels.frame[~pixels.road]) == {0, 1}
+
+
+@pytest.mark.parametrize("frames", [1, 7, 60])
+def test_the_sample_is_bounded_however_many_frames_there_are(frames):
+    pixels = sample([HALF] * frames, TrainingSettings(max_pixels=40))
+    assert len(pixels.road) <= 40
+
+
+def test_one_class_alone_gives_no_sample():
+    assert len(sample([np.ones((4, 4), np.uint8)], TrainingSettings()).road) == 0
+
+
+def test_the_seed_settles_the_draw():
+    drawn = [sample([HALF], TrainingSettings(pixels_per_class=5, seed=s)) for s in (1, 1, 2)]
+    np.testing.assert_array_equal(drawn[0].column, drawn[1].column)
+    assert (drawn[0].column != drawn[2].column).any()
+
+
+# --- What the reference patch teaches -------------------------------------------------------------
+
+HEIGHT = 120
+SETTINGS = TrainingSettings()
+
+
+def street(grey=100, kerb=112, pavement=100, shade=0.8):
+    """A street with noise, a kerb and a pavement on its right, and a shadow across its middle."""
+    image = np.full((2 * HEIGHT, 2 * WIDTH, 3), float(grey))
+    image[:, 2 * kerb :] = pavement
+    image[:, 2 * kerb : 2 * kerb + 4] = 0.5 * grey
+    image[120:150] *= shade
+    noise = np.random.default_rng(0).normal(0, 1, image.shape[:2])
+    return (image + noise[..., None]).clip(0, 255).astype(np.uint8)
+
+
+def test_what_is_reached_without_crossing_a_kerb_is_road():
+    truth = patch_truth(street(), SETTINGS)
+    low = truth[100:]
+    assert (low[:, :216] == ROAD).mean() > 0.99
+    assert (low[:, 232:] == NON_ROAD).mean() > 0.99
+
+
+def test_the_pavement_is_road_where_the_kerb_is_lowered():
+    lowered = street()
+    lowered[200:] = street(kerb=WIDTH)[200:]
+    assert (patch_truth(lowered, SETTINGS)[100:, 232:] == ROAD).mean() > 0.5
+
+
+def test_the_further_one_may_reach_the_more_is_road():
+    found = [
+        (patch_truth(street(), TrainingSettings(far=far))[100:, 232:] == ROAD).mean()
+        for far in (1.0, 20.0)
+    ]
+    assert found[0] < 0.01
+    assert found[1] > 0.99
+
+
+def test_nothing_above_the_horizon_is_road():
+    grey = np.full((40, 60, 3), 120, np.uint8)
+    truth = patch_truth(grey, TrainingSettings(horizon=0.4))
+    assert (truth[:16] == NON_ROAD).all()
+    assert (truth[16:] == ROAD).all()
+
+
+@pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])
+def test_the_patch_is_road_whatever_it_shows(shape):
+    image = np.random.default_rng(0).integers(0, 256, (*shape, 3), dtype=np.uint8)
+    truth = patch_truth(image, TrainingSettings(horizon=1.0, far=0.01))
+    assert truth.dtype == np.uint8
+    np.testing.assert_array_equal(truth == ROAD, patch_mask(*shape, ReferencePatch()) > 0)
+
+
+# --- What cannot be asked of a training -----------------------------------------------------------
+
+
+def test_the_settings_of_each_seed_are_those_of_one_training():
+    each = list(TrainingSettings(seed=2, seeds=3, frames=4).by_seed())
+    assert each == [TrainingSettings(seed=seed, frames=4) for seed in (2, 3, 4)]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"seeds": 2, "model": "city.model"}, "`training.model` is trained already"),
+        ({"seeds": 2, "seed": 1_000_000_000}, "no seed may be above 1000000000"),
+        ({"seeds": 0}, "must be at least 1"),
+    ],
+)
+def test_seeds_that_cannot_be_are_refused(given, said):
+    with pytest.raises(ConfigError, match=said):
+        configure({"training": given})
+
+
+def test_a_model_file_may_be_used_and_a_single_seed_be_the_last():
+    assert TrainingSettings(model="city.model").seeds == 1
+    assert TrainingSettings(seed=1_000_000_000).seeds == 1

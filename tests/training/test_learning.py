@@ -205,14 +205,6 @@ def test_a_model_from_a_file_leaves_pictures_of_its_own_frames_out(tmp_path):
     assert schedule.use(frames[4].frame) == Use(Role.EVALUATED, frozenset({0, 1, 2}))
 
 
-def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
-    frames = log(6)
-    model, _ = learn(frames, frames=2)
-    save_model(model, tmp_path / "m.model")
-    _, schedule = from_file(tmp_path / "m.model", PIPELINES)
-    assert roles(frames, schedule) == "tteeee"
-
-
 def test_training_frames_are_spread_over_a_drive():
     frames = log(20, unlabelled=(0,))
     chosen = [f.number for f in spread(lambda: frames, 4, labelled=True)]

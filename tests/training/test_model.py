@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import tracemalloc
+from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import Mock
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -13,7 +14,7 @@ import pytest
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
-from roadeval.training.model import GREATEST_SIZE
+from roadeval.training.model import GREATEST_SIZE, arrays_of, from_arrays
 from tests.training.making import frame, pipelines
 
 FEW = {"trees": {"trees": 10, "features": ["place"]}}
@@ -52,15 +53,6 @@ def test_a_model_reads_back_equal(model, path):
 def test_the_same_model_gives_the_same_bytes(model, path, tmp_path):
     save_model(model, tmp_path / "again.model")
     assert (tmp_path / "again.model").read_bytes() == path.read_bytes()
-
-
-def test_nothing_is_left_beside_the_model(path):
-    assert [p.name for p in path.parent.iterdir()] == [path.name]
-
-
-def test_the_settings_it_was_made_for_are_accepted(path):
-    for name, pipeline in pipelines().items():
-        load_model(path).require(name, pipeline, path)
 
 
 def test_other_settings_are_refused_by_name(path):
@@ -224,3 +216,60 @@ def test_a_file_in_the_place_of_a_folder_is_one_line(model, path):
 def test_a_folder_is_no_model(tmp_path):
     with pytest.raises(RoadevalError, match="cannot read the model: is a folder"):
         load_model(tmp_path)
+
+
+# --- What a stage has learnt as named arrays, and back --------------------------------------------
+
+
+@dataclass(frozen=True)
+class Line:
+    slope: np.ndarray
+    start: float
+
+
+@dataclass(frozen=True)
+class Lines:
+    upper: Line
+    count: int
+    lower: Line | None = None
+
+
+LINE = Line(np.array([1.0, 2.0]), 0.5)
+
+
+def test_parts_have_the_name_of_their_field_before_theirs():
+    assert arrays_of(Lines(LINE, 1)).keys() == {"upper/slope", "upper/start", "count"}
+    both = arrays_of(Lines(LINE, 2, Line(np.array([3.0]), 7.0)))
+    assert both["lower/slope"].tolist() == [3]
+    assert both["lower/start"] == 7
+
+
+@pytest.mark.parametrize("lower", [None, Line(np.array([3.0]), 7.0)])
+def test_they_come_back_as_they_were(lower):
+    found = from_arrays(Lines, arrays_of(Lines(LINE, 2, lower)))
+    np.testing.assert_array_equal(found.upper.slope, LINE.slope)
+    assert (found.upper.start, found.count, type(found.count)) == (0.5, 2, int)
+    assert (found.lower is None) == (lower is None)
+    if lower:
+        assert found.lower.start == 7
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"upper/slope": None}, "slope"),
+        ({"upper/slope": None, "upper/start": None}, "slope, start"),
+        ({"count": None}, "count"),
+        ({"lower/slope": np.zeros(2)}, "start"),
+        ({"lower": np.zeros(2)}, "lower"),
+        ({"upper/": np.zeros(2)}, ""),
+        ({"upper/end": np.zeros(2)}, "end"),
+        ({"count/x": np.zeros(2)}, "count/x"),
+        ({"middle/slope": np.zeros(2)}, "middle/slope"),
+    ],
+)
+def test_arrays_that_are_missing_or_unknown_are_named(changed, named):
+    arrays = arrays_of(Lines(LINE, 1)) | changed
+    arrays = {name: array for name, array in arrays.items() if array is not None}
+    with pytest.raises(ValueError, match=f"missing or unknown arrays: {named}$"):
+        from_arrays(Lines, arrays)

@@ -1,5 +1,6 @@
 """The synthetic world of the benchmarks, and the drive of it that ships."""
 
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -44,8 +45,9 @@ def same_scene():
 
 @pytest.fixture(scope="module")
 def frames(same_scene):
-    """Ten seconds of seed 0: few and small frames."""
-    return list(render_drive(RenderSettings(frames=50, width=160, height=120, rate_hz=5.0)))
+    """The journey of the shipped drive: half as many and small frames."""
+    small = replace(SHIPPED, frames=50, width=160, height=120, rate_hz=1.0)
+    return list(render_drive(small))
 
 
 def messages(path):
@@ -101,11 +103,11 @@ def test_a_drive_that_cannot_be_rendered_is_refused(wrong):
         RenderSettings(**wrong)
 
 
-def test_the_same_settings_give_the_same_bytes_and_another_seed_others(tmp_path):
-    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
-        write_drive(tmp_path / name, RenderSettings(frames=2, width=160, height=120, seed=seed))
-    first, again, other = ((tmp_path / name).read_bytes() for name in "abc")
-    assert first == again != other
+def test_the_same_settings_give_the_same_bytes(tmp_path):
+    for name in "ab":
+        write_drive(tmp_path / name, RenderSettings(frames=2, width=160, height=120, seed=3))
+    first, again = ((tmp_path / name).read_bytes() for name in "ab")
+    assert first == again
     found = messages(tmp_path / "a")
     assert [topic for topic, _, _ in found] == [IMAGE_TOPIC, ROAD_TOPIC, SHADOW_TOPIC] * 2
     assert found[0][1] == found[1][1] == found[2][1] == found[3][1] - 100_000_000

@@ -53,22 +53,11 @@ def test_independent_frames_give_about_students_interval() -> None:
     assert (found.low, found.high) == pytest.approx((low, high), abs=0.1 * (high - low))
 
 
-def test_more_confidence_needs_a_wider_interval() -> None:
-    usual, surer = of(INDEPENDENT), of(INDEPENDENT, EvaluationSettings(confidence=0.99))
-    assert surer.low < usual.low < usual.high < surer.high
-
-
 def test_an_interval_and_its_p_value_are_those_of_the_mean_s_distribution() -> None:
     found, known = of(INDEPENDENT), mean_distribution(INDEPENDENT)
     assert (found.low, found.high) == pytest.approx(known.interval(0.95), rel=1e-6)
     assert found.p == pytest.approx(known.p_value(), rel=1e-6)
     assert found.effective == pytest.approx(known.frames)
-
-
-@pytest.mark.parametrize("shift", [0.0, 0.002, 0.005, 0.02])
-def test_an_interval_leaves_out_zero_where_the_p_value_is_small(shift: float) -> None:
-    found = of(INDEPENDENT - 0.01 + shift)
-    assert (found.low > 0 or found.high < 0) == (found.p < 0.05)
 
 
 def test_a_handful_of_frames_gives_no_interval() -> None:
@@ -112,27 +101,6 @@ def test_intervals_hold_about_as_often_as_they_claim(rho: float, frames: int) ->
     drives = [mean_distribution(autoregression(rng, frames, rho)) for _ in range(150)]
     held = np.mean([drive.p_value() >= 0.05 for drive in drives])
     assert 0.9 <= held <= 0.99
-
-
-def with_p(p: float | None) -> Difference:
-    return Difference(0.1, 0.0, 0.2, p, 0.95, "frames", 91)
-
-
-def test_holm_s_correction_is_that_of_statsmodels() -> None:
-    values = [0.03, 0.001, 0.2, 0.04, 0.011]
-    found = holm([with_p(p) for p in values])
-    assert [each.p_holm for each in found] == pytest.approx(
-        multipletests(values, method="holm")[1].tolist()
-    )
-    assert {each.comparisons for each in found} == {5}
-    assert [each.p for each in found] == values
-
-
-def test_what_was_not_tested_is_not_counted() -> None:
-    same = Difference(0.0, 0.0, 0.0, 1.0, 0.95, "frames", 91)
-    found = holm([with_p(0.01), with_p(None), same, with_p(0.02)])
-    assert [each.p_holm for each in found] == [0.02, None, None, 0.02]
-    assert [each.comparisons for each in found] == [2, None, None, 2]
 
 
 # --- Corrections of p-values

@@ -47,12 +47,6 @@ def test_logs_joined_end_to_end_are_read_one_after_the_other(tmp_path, count):
     assert not any("are missing" in each for each in told)
 
 
-def test_joined_logs_of_other_lengths_are_read_as_well(tmp_path):
-    parts = [logged(tmp_path / f"{n}.mcap", 4 + 9 * n, first=100 * n) for n in range(2)]
-    (found,), _ = read(tmp_path, b"".join(parts))
-    assert found == 4 + 13
-
-
 @pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.ZSTD])
 def test_no_message_of_an_intact_chunk_is_lost_where_bytes_are_missing(tmp_path, compression):
     data = logged(tmp_path / "whole.mcap", 40, compression=compression)

@@ -16,7 +16,6 @@ from tests.fixtures.make import LOGS, make
 from tests.fixtures.shared import SHARED, both, shared
 from tests.measuring import PEAK
 
-CAM = "/cam/image/compressed"
 WHOLE = ""
 
 BROKEN = {

@@ -25,27 +25,6 @@ def row(data: bytes, encoding: str, width: int = 1, **more: Any) -> list[list[in
     return pixels
 
 
-@pytest.mark.parametrize(
-    ("encoding", "data"),
-    [
-        ("rgb8", [10, 20, 30]),
-        ("RGB8", [10, 20, 30]),
-        ("bgr8", [30, 20, 10]),
-        ("8UC3", [30, 20, 10]),
-        ("rgba8", [10, 20, 30, 99]),
-        ("bgra8", [30, 20, 10, 99]),
-        ("8UC4", [30, 20, 10, 99]),
-    ],
-)
-def test_channels_are_put_in_order(encoding: str, data: list[int]) -> None:
-    assert row(bytes(data), encoding) == [[10, 20, 30]]
-
-
-@pytest.mark.parametrize("encoding", ["mono8", "8UC1"])
-def test_grey_fills_all_channels(encoding: str) -> None:
-    assert row(b"\x07\x09", encoding, 2) == [[7, 7, 7], [9, 9, 9]]
-
-
 def test_sixteen_bits_keep_the_upper_half() -> None:
     assert row(b"\x34\x12", "mono16") == [[0x12] * 3]
     assert row(b"\x12\x34", "mono16", big_endian=True) == [[0x12] * 3]

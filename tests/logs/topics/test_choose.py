@@ -132,9 +132,3 @@ def test_label_images_with_loss_are_picked_where_there_is_a_tolerance() -> None:
     assert choose_truth(topics, topics[0], None, labels).topic == topics[1]
     assert choose_shadow(topics, topics[0], None, labels).topic == topics[2]
     assert choose_shadow(topics, topics[0], None, LabelSettings()).topic is None
-
-
-def test_a_named_topic_without_messages_is_refused() -> None:
-    topics = [camera("/cam"), TopicInfo("/labels", "Image", "cdr", TopicKind.IMAGE, 0)]
-    with pytest.raises(LogError, match=r"`topics\.truth` /labels: the topic holds no message"):
-        choose_truth(topics, topics[0], "/labels", LabelSettings())

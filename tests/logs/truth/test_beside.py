@@ -175,14 +175,6 @@ def test_two_labels_of_one_frame_are_refused_by_name(drive, tmp_path):
     assert all(str(tmp_path / "two" / part / "1.png") in message for part in ("a", "b"))
 
 
-def test_half_of_the_labels_are_half_of_the_frames(drive, tmp_path):
-    path = images(tmp_path / "truth", "1.png", "3.png", "5.png")
-    run, summary = replay(drive, path)
-    assert run.returncode == 0
-    assert summary["frames"]["evaluated"] == 3
-    assert summary["frames"]["skipped"] == {"unlabelled": 3}
-
-
 # --- Sizes and damage -----------------------------------------------------------------------------
 
 
@@ -206,16 +198,6 @@ def test_a_damaged_file_among_many_loses_its_frame(drive, tmp_path):
     assert summary["frames"]["skipped"] == {"undecodable": 1}
 
 
-def test_a_damaged_annotation_file_among_many_loses_its_frame(drive, tmp_path):
-    path = shutil.copytree(LABELS / "labelme", tmp_path / "truth")
-    (path / "frame_0001.json").write_text('{"shapes": [')
-    run, summary = replay(drive, path, "--road-label", "road")
-    assert run.returncode == 3
-    assert "lost: frame 1: " in run.stderr
-    assert "frame_0001.json: cannot be read as labels: " in run.stderr
-    assert summary["frames"]["evaluated"] == 2
-
-
 @pytest.mark.parametrize("name", ["1.png", "1.npy", "a.json", "a.xml", "1.txt"])
 def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
     path = tmp_path / "truth"
@@ -225,11 +207,6 @@ def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
     assert run.returncode == 1
     assert len(run.stderr.splitlines()) == 1
     assert run.stderr.startswith("roadeval: error: ")
-
-
-def test_an_empty_folder_is_refused(drive, tmp_path):
-    assert "no image in it" in refusal(drive, images(tmp_path / "truth"))
-    assert "no such folder" in refusal(drive, tmp_path / "nowhere")
 
 
 def test_a_note_beside_label_images_is_no_label(drive, tmp_path):
@@ -316,10 +293,7 @@ WRONG = {
 def test_what_cannot_be_drawn_is_one_line(drive, tmp_path, what):
     began = time.perf_counter()
     path = written(tmp_path / "truth", "a.json", WRONG[what])
-    run, _ = replay(drive, path, "--road-label", "road")
-    assert run.returncode == 1, run.stderr
-    assert len(run.stderr.splitlines()) == 1
-    assert str(path) in run.stderr
+    assert str(path) in refusal(drive, path, "road")
     assert time.perf_counter() - began < 20
 
 

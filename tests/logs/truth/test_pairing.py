@@ -2,11 +2,21 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roadeval.logs.topics.reader import UNREADABLE
-from roadeval.logs.truth.pairing import Pairing, Partners, frames_of
+from roadeval.logs.truth.pairing import (
+    ALONE_NS,
+    Clock,
+    Pairing,
+    Partners,
+    clock_of,
+    frames_of,
+    tolerance,
+)
 
 
 class Stamps:
@@ -22,64 +32,35 @@ class Stamps:
         return self.stamps[position]
 
 
-def pairs(images: Sequence[int], labels: Sequence[int], tolerance: int = 0) -> list[int | None]:
+NOW = 1_700_000_000_123_456_789
+PAIRED = {
+    "equal stamps": ([10, 20, 30], [10, 20, 30], 0, [0, 1, 2]),
+    "an image without a label": ([10, 20, 30], [10, 30], 0, [0, None, 1]),
+    "no label": ([10], [], 0, [None]),
+    "a nanosecond apart": ([NOW], [NOW + 1], 0, [None]),
+    "neighbours a nanosecond apart": ([NOW, NOW + 1], [NOW, NOW + 1], 0, [0, 1]),
+    "the nearest within the tolerance": ([10, 20, 30], [12, 21, 36], 5, [0, 1, None]),
+    "a label's nearest image alone": ([10, 14], [13], 5, [None, 0]),
+    "an exact pair before a near image": ([10, 11], [11], 5, [None, 0]),
+    "the first of two equally near images": ([10, 14], [12], 5, [0, None]),
+    "repeated stamps in their order": ([10, 10, 20], [10, 10, 20], 0, [0, 1, 2]),
+    "more images than labels of a stamp": ([7] * 9, [7] * 7, 0, [*range(7), None, None]),
+    "more labels than images of a stamp": (
+        [3, *[7] * 9, 9],
+        [*[7] * 12, 9],
+        0,
+        [None, *range(9), 12],
+    ),
+    "a repeated image and one label": ([10, 10, 20], [10, 20], 0, [0, None, 1]),
+    "logged out of order": ([10, 30, 20, 40], [20, 10, 40, 30], 0, [1, 3, 0, 2]),
+    "unreadable": ([10, UNREADABLE, 30], [10, UNREADABLE, 30], 0, [0, None, 2]),
+}
+
+
+@pytest.mark.parametrize(("images", "labels", "tolerance", "found"), PAIRED.values(), ids=PAIRED)
+def test_each_image_gets_the_label_that_is_its_own(images, labels, tolerance, found):
     partners = Partners(Pairing(Stamps(images), Stamps(labels), tolerance))
-    return [partners.of(image) for image in range(len(images))]
-
-
-def test_equal_stamps_are_a_pair() -> None:
-    assert pairs([10, 20, 30], [10, 20, 30]) == [0, 1, 2]
-
-
-def test_an_image_without_a_label_stays_alone() -> None:
-    assert pairs([10, 20, 30], [10, 30]) == [0, None, 1]
-
-
-def test_stamps_that_differ_by_one_nanosecond_are_not_equal() -> None:
-    now = 1_700_000_000_123_456_789
-    assert pairs([now], [now + 1]) == [None]
-    assert pairs([now, now + 1], [now, now + 1]) == [0, 1]
-
-
-def test_the_nearest_within_the_tolerance_is_taken() -> None:
-    assert pairs([10, 20, 30], [12, 21, 36], tolerance=5) == [0, 1, None]
-
-
-def test_a_label_goes_to_its_nearest_image_only() -> None:
-    assert pairs([10, 14], [13], tolerance=5) == [None, 0]
-
-
-def test_an_exact_pair_keeps_its_label_from_a_near_image() -> None:
-    assert pairs([10, 11], [11], tolerance=5) == [None, 0]
-
-
-def test_of_two_equally_near_images_the_first_gets_the_label() -> None:
-    assert pairs([10, 14], [12], tolerance=5) == [0, None]
-
-
-def test_repeated_stamps_pair_in_their_order() -> None:
-    assert pairs([10, 10, 20], [10, 10, 20]) == [0, 1, 2]
-
-
-def test_a_stamp_that_comes_many_times_pairs_each_once() -> None:
-    assert pairs([7] * 9, [7] * 7) == [*range(7), None, None]
-    assert pairs([3, *[7] * 9, 9], [*[7] * 12, 9]) == [None, *range(9), 12]
-
-
-def test_a_repeated_image_does_not_take_the_only_label_twice() -> None:
-    assert pairs([10, 10, 20], [10, 20]) == [0, None, 1]
-
-
-def test_neighbours_logged_out_of_order_are_found() -> None:
-    assert pairs([10, 30, 20, 40], [20, 10, 40, 30]) == [1, 3, 0, 2]
-
-
-def test_an_image_or_label_that_cannot_be_read_has_no_partner() -> None:
-    assert pairs([10, UNREADABLE, 30], [10, UNREADABLE, 30]) == [0, None, 2]
-
-
-def test_no_labels_no_partner() -> None:
-    assert pairs([10], []) == [None]
+    assert [partners.of(image) for image in range(len(images))] == found
 
 
 def test_only_stamps_near_the_one_looked_for_are_read() -> None:
@@ -132,3 +113,56 @@ def test_labels_far_apart_are_read_one_at_a_time():
     assert partners.of(705) is None
     assert images.read == {705}
     assert labels.read <= {34, 35, 36}
+
+
+# --- By what images and labels are paired ---------------------------------------------------------
+
+BAD = UNREADABLE
+TIMES = [100, 200, 300]
+
+
+class Topic:
+    """The messages of a topic, of which only stamps and log times are known."""
+
+    def __init__(self, stamps, times):
+        self.stamp = stamps.__getitem__
+        self.log_times = np.array(times)
+
+    def __len__(self):
+        return len(self.log_times)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "times", "clock"),
+    [
+        ([1, 2, 3], TIMES, Clock.STAMP),
+        ([0, 0, 0], TIMES, Clock.LOG_TIME),
+        ([7, 7, 7], TIMES, Clock.LOG_TIME),
+        ([0, 0, 0], [100, 100, 100], Clock.ORDER),
+        ([7], [100], Clock.STAMP),
+        ([0], [100], Clock.LOG_TIME),
+        # Of all images but one nothing can be read: that its stamp is the only one says nothing.
+        ([BAD, 7, BAD], TIMES, Clock.STAMP),
+        ([*[BAD] * 20, 7, 8], list(range(22)), Clock.STAMP),
+    ],
+)
+def test_stamps_count_unless_they_are_zero_or_equal(stamps, times, clock):
+    assert clock_of(Topic(stamps, times)) is clock
+
+
+@pytest.mark.parametrize(
+    ("stamps", "times", "asked_ms", "found"),
+    [
+        ([0, 1000, 2000, 3000], TIMES, None, 50),
+        # Written in one go: the log times say nothing.
+        ([0, 1000, 2000, 3000], [7, 7, 7, 7], None, 500),
+        ([0, BAD, 2000, BAD], [7, 7, 7, 7], None, 1000),
+        ([0, 1000, 2000, 3000], TIMES, 1.5, 1_500_000),
+        ([1000], [100], None, ALONE_NS),
+        ([1000], [100], 1.5, 1_500_000),
+    ],
+)
+def test_half_the_frame_period_may_lie_between_an_image_and_its_label(
+    stamps, times, asked_ms, found
+):
+    assert tolerance(Topic(stamps, times), asked_ms) == found

@@ -214,34 +214,6 @@ def test_a_video_is_packed_frame_by_frame_and_read_by_foxgloves_decoder(
     assert times == [40_000_000 * i for i in range(count)]
 
 
-NAMES = {
-    "Cityscapes": (
-        "aachen_{}_000019_leftImg8bit.png",
-        [f"aachen_{{}}_000019_gtFine_{kind}.png" for kind in ("labelIds", "color", "instanceIds")],
-    ),
-    "KITTI": ("um_{}.png", ["um_road_{}.png"]),
-}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_labels_with_the_names_of_a_data_set_belong_to_their_images(name, tmp_path):
-    image, labels = NAMES[name]
-    for folder in ("images", "labels"):
-        (tmp_path / folder).mkdir()
-    for number in ("000001", "000002"):
-        cv2.imwrite(str(tmp_path / "images" / image.format(number)), np.zeros((4, 6, 3), np.uint8))
-        for value, label in enumerate(labels, start=int(number)):
-            pixels = np.full((4, 6), value, np.uint8)
-            cv2.imwrite(str(tmp_path / "labels" / label.format(number)), pixels)
-        (tmp_path / "labels" / f"aachen_{number}_000019_gtFine_polygons.json").write_text("{}")
-    found = pack(tmp_path / "images", tmp_path / "log.mcap", masks=tmp_path / "labels")
-    assert (found.labelled, found.warnings) == (2, ())
-    config = LogConfig(labels=LabelSettings(road=(1,), ignore=(2,)))
-    with open_log(tmp_path / "log.mcap", config) as log:
-        truths = [frame.decode().truth.max() for frame in log.frames(log.select())]
-    assert truths == [1, 255]
-
-
 @pytest.mark.parametrize("labels", ["labels/a.json", "labels", "images"])
 def test_labels_of_an_annotation_tool_are_said_to_be_for_a_replay(labels, tmp_path):
     for folder in ("images", "labels"):

@@ -96,8 +96,3 @@ def test_metrics_are_json_with_a_schema_and_undefined_rates_are_null(tmp_path: P
     assert fields["timestamp"] == {"sec": STAMP // 10**9, "nsec": 5}
     assert (fields["TP"], fields["FP"], fields["N"]) == (1, 1, 2)
     assert (fields["ERR"], fields["TNR"]) == (0.5, None)
-
-
-def test_the_same_results_give_the_same_bytes(tmp_path: Path) -> None:
-    first, second = write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap")
-    assert first.read_bytes() == second.read_bytes()

@@ -207,19 +207,6 @@ def street(kerb=74, height=48, width=96):
     return np.broadcast_to(image, (height, width, 3)).astype(np.uint8)
 
 
-@pytest.mark.parametrize("kind", range(3))
-def test_a_kerb_is_a_step_for_whatever_lies_beyond_it(kind):
-    found = planes("paths", scene_of(street(), 96, PATCH))[kind]
-    assert found[:, 78:].min() > 1.5 * found[:, :72].max()
-
-
-def test_a_kerb_that_ends_is_walked_around():
-    ends = street()
-    ends[:28, 74:76] = 98
-    around, behind = (planes("paths", scene_of(s, 96, PATCH))[0][30, 84] for s in (ends, street()))
-    assert around < 0.75 * behind
-
-
 def test_barriers_are_the_greatest_of_four_pixels(scene):
     tones = tones_of(scene.fine)
     edge = np.hypot(*slopes(tones[0]))
@@ -248,19 +235,6 @@ def test_squared_barriers_are_costs_of_a_path(scene):
         close(found, expected, 0.02)
 
 
-def test_a_path_of_squares_would_rather_go_around_a_kerb():
-    ends = street()
-    ends[:20, 74:76] = 98
-    names, behind = names_of(("barriers",)), {}
-    for kind, image in (("ends", ends), ("whole", street())):
-        large = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-        found = planes("barriers", scene_of(large, 96, PATCH))
-        for way in ("over", "around"):
-            behind[way, kind] = found[names.index(f"barriers.{way}_edge")][30, 84]
-    share = {way: behind[way, "ends"] / behind[way, "whole"] for way in ("over", "around")}
-    assert share["around"] < 0.5 * share["over"] < 0.5
-
-
 def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
     found = features(scene, ALL)
     names = names_of(ALL)
@@ -275,13 +249,6 @@ def test_only_lit_ground_lies_beyond_the_end_of_the_road():
     far, light = np.meshgrid(np.float32([0, 1, 1.5, 3]), np.float32([-2, -0.8, -0.55, -0.3, 1]))
     expected = np.outer([0, 0, 0.5, 1, 1], [0, 0, 0.5, 2])
     close(beyond(far, light), expected)
-
-
-def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
-    image = np.full((96, 128, 3), 100, np.uint8)
-    image[:, 100] = 40
-    dark = planes("barriers", scene_of(image, 64, PATCH))[9]
-    assert dark[40, 60] > 2 * dark[40, 40]
 
 
 def test_steepness_does_not_depend_on_where_arrays_lie_in_memory():

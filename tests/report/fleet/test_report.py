@@ -7,14 +7,14 @@ import pytest
 
 from roadeval.jobs.results.report import write_report
 from roadeval.jobs.results.result import Result
-from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
+from roadeval.report.blocks import Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf
 from roadeval.report.sections import drive, drives, provenance, summary
 from roadeval.results.fleet import FleetFolder
 from tests.report.making import column, links_within, opened, plain_rows, reader, text, the
 from tests.results.fleet import making
-from tests.results.fleet.making import RUN, fleet_of
+from tests.results.fleet.making import fleet_of
 
 
 @pytest.fixture(scope="module")
@@ -147,13 +147,6 @@ def test_what_was_run_is_told_with_its_seed_and_folds(findings):
     assert "fold" not in told
 
 
-def test_several_seeds_are_told(tmp_path):
-    run = RUN | {"training": {"seed": 4, "seeds": 3}}
-    found = FleetFolder(fleet_of(tmp_path / "f", 1, frames=0, run=run))
-    told = " ".join(b.text for b in blocks(provenance.of_drives, found) if isinstance(b, Text))
-    assert "training seed 4 and 2 more" in told
-
-
 def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):
     path = write_report(folder)
     assert path == folder / "report.pdf"
@@ -191,14 +184,6 @@ def test_two_drives_of_one_name_are_told_apart(folder, tmp_path):
     (copy / "fleet.json").write_text(replace(found.facts, drives=drives_).text())
     names = (FleetFolder(copy)).names
     assert len(set(names.values())) == 12
-
-
-def test_a_plain_list_says_that_nothing_is_known(tmp_path):
-    fleet = fleet_of(tmp_path / "f", 2, frames=0, broken=False)
-    found = FleetFolder(fleet)
-    vars(found)["drives"] = {d: row | {"trained_on": 0} for d, row in found.drives.items()}
-    listed = the(BulletList, blocks(summary.section, found))
-    assert (list(listed.items), listed.tone) == (["Nothing known."], "plain")
 
 
 def test_its_contents_lead_to_its_sections(tmp_path):

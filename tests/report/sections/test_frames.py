@@ -1,14 +1,15 @@
 """The frames to look at: what is said about each, and how to open it."""
 
+import cv2
 import numpy as np
 import pytest
 
-from roadeval.data.words import MINUS
+from roadeval.data import ERRORS
 from roadeval.report.blocks import Command, ImageGrid, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections.frames import NO_COMMAND, worst_frames
-from tests.report.making import column, plain_rows, rates, some_findings, the
+from roadeval.report.sections.frames import NO_COMMAND, strip, worst_frames
+from tests.report.making import plain_rows, rates, some_findings, the
 
 
 def a_frame(number, **changes):
@@ -28,23 +29,6 @@ def said(blocks):
     return [block.text for block in the(TwoColumns, blocks).left]
 
 
-def test_a_bad_frame_is_shown_with_its_rates_the_stage_at_fault_and_its_notes():
-    (blocks,) = shown(some_findings(worst=[a_frame(7)]))
-    assert said(blocks) == [
-        "Frame 7",
-        "Stamp 12.345 s",
-        "filtered: svm without the filter leaves 10.0 % wrong, the filter adds 20.0 pp, post adds "
-        "10.0 pp.",
-        "A note. Another.",
-    ]
-    assert plain_rows(the(TwoColumns, blocks).right[0]) == [
-        ["filtered", "40.00", "30.00", "20.00"],
-        ["unfiltered", "50.00", "60.00", "70.00"],
-    ]
-    assert [cell.bold for cell in column(the(TwoColumns, blocks).right[0], "ERR")] == [True, False]
-    assert the(Command, blocks).text == "open frame 7"
-
-
 def test_what_the_filter_did_is_said_once():
     parts = {"svm": 0.1, "filter": 0.2, "post": 0.1}
     notes = ("The filter raised ERR by 21.0 pp on this frame.", "filtered finds nothing.")
@@ -54,18 +38,6 @@ def test_what_the_filter_did_is_said_once():
     assert rest == ["filtered finds nothing."]
     (blocks,) = shown(some_findings(worst=[a_frame(7, parts={"post": 0.4}, notes=notes)]))
     assert said(blocks)[2:] == [" ".join(notes)]
-
-
-def test_helped_and_harmed_frames_are_told_apart():
-    findings = some_findings(
-        worst=[a_frame(1)], helped=[a_frame(2, change=-0.1)], harmed=[a_frame(3, change=0.1)]
-    )
-    worst, helped, harmed = shown(findings)
-    assert worst[0].text == "The worst frames"
-    assert helped[0].text == "Frames that the filter helped most"
-    assert said(helped)[-1] == f"The filter changes ERR by {MINUS}10.00 pp."
-    assert harmed[0].text == "Frames that the filter harmed most"
-    assert said(harmed)[-1] == "The filter changes ERR by +10.00 pp."
 
 
 @pytest.mark.parametrize(("count", "columns"), [(3, 4), (4, 4), (5, 5), (6, 6), (7, 4), (9, 5)])
@@ -95,3 +67,47 @@ def test_where_no_frame_is_the_worst_that_is_told():
     assert the(Text, worst_frames(some_findings())).text == (
         "ERR of filtered is undefined on every frame, so no frame is the worst."
     )
+
+
+# --- A frame on a page ----------------------------------------------------------------------------
+
+IMAGE, MASK = np.zeros((4, 6, 3), np.uint8), np.zeros((4, 6), np.uint8)
+
+
+def test_a_strip_has_the_outcomes_first_and_then_a_row_of_layers_a_variant():
+    frame = NotableFrame(
+        7,
+        12_345_000_000,
+        "filtered",
+        {"filtered": rates(0.4, 0.3, 0.2)},
+        notes=["A note."],
+        images=[LayerImage("camera", IMAGE), LayerImage("filtered: errors", IMAGE, ERRORS, MASK)],
+        layers=[
+            [LayerImage(title, IMAGE, ERRORS, MASK) for title in ("filtered: ndi", "svm")],
+            [],
+        ],
+    )
+    found = strip(frame, ["filtered"], "open it")
+    assert [*found.sentences] == ["Stamp 12.345 s", "A note."]
+    assert plain_rows(found.rates) == [["filtered", "40.00", "30.00", "20.00"]]
+    assert [(row.title, [each.name for each in row.pictures]) for row in found.rows] == [
+        ("", ["camera", "filtered: errors"]),
+        ("filtered", ["filtered: ndi", "filtered: svm"]),
+        ("", []),
+    ]
+
+
+def test_outcomes_are_at_most_640_pixels_across_and_layers_300():
+    image, mask = np.zeros((4, 700, 3), np.uint8), np.zeros((4, 700), np.uint8)
+    outcome, layer = (LayerImage(title, image, ERRORS, mask) for title in ("errors", "svm"))
+    frame = NotableFrame(
+        7, 0, "filtered", {"filtered": rates(0.4)}, images=[outcome], layers=[[layer]]
+    )
+    found = strip(frame, ["filtered"])
+    assert [[across(each) for each in row.pictures] for row in found.rows] == [[640], [300]]
+
+
+def across(picture):
+    """Pixels across a picture's file."""
+    content = np.frombuffer(picture.image.content, np.uint8)
+    return cv2.imdecode(content, cv2.IMREAD_COLOR).shape[1]

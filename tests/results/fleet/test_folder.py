@@ -8,7 +8,16 @@ import pytest
 from pyarrow import parquet
 
 from roadeval import Result
-from roadeval.results.fleet import FleetFolder, recording_path
+from roadeval.results.fleet import (
+    FleetFolder,
+    Record,
+    frames_path,
+    read_record,
+    record_path,
+    recording_path,
+)
+from roadeval.results.rows import Key, cells
+from roadeval.results.schema import OF_DRIVES
 from roadeval.results.tables import ResultsError
 from tests.results.fleet.making import fleet_of
 
@@ -25,11 +34,6 @@ def folder(made, tmp_path):
 
 def change(path, **parts):
     path.write_text(json.dumps(json.loads(path.read_text()) | parts))
-
-
-def test_what_was_written_is_read(folder):
-    fleet = Result(folder)
-    assert len(fleet.drives) == len(fleet.summary["drives"]) == 5
 
 
 @pytest.mark.parametrize(
@@ -128,3 +132,53 @@ def test_a_worst_frame_whose_recording_was_not_kept_opens_where_its_log_is_trust
     kept.parent.mkdir(exist_ok=True)
     kept.touch()
     assert fleet.inspect(first).endswith("--worst 1")
+
+
+# --- The record of a drive: written and read back as it was ---------------------------------------
+
+
+def write(folder):
+    """Write a record whose drive has frames, and a file with a name that is no text."""
+    row = {"drive": "a", "evaluated": 100}
+    rows = {name: [] for name in OF_DRIVES} | {"drives": cells("drives", Key("a", ""), [row])}
+    made = Record("a", "asked", {"caf\udce9.mcap": [1, 2]}, rows)
+    (folder / "records").mkdir()
+    made.write(folder)
+    return made
+
+
+def test_a_file_s_name_that_is_no_text_comes_back(tmp_path):
+    made = write(tmp_path)
+    read = read_record(tmp_path, "a")
+    assert read is not None
+    assert read.stamp == made.stamp
+
+
+@pytest.mark.parametrize(("was", "now"), [(" 100,", " 900,"), (" 100,", ' "1",'), ("[1, 2]", "[]")])
+def test_a_record_that_was_changed_is_none(tmp_path, was, now):
+    write(tmp_path)
+    path = record_path(tmp_path, "a")
+    text = path.read_text()
+    assert text.count(was) == 1
+    path.write_text(text.replace(was, now))
+    assert read_record(tmp_path, "a") is None
+
+
+def test_a_record_without_a_check_sum_is_none(tmp_path):
+    write(tmp_path)
+    path = record_path(tmp_path, "a")
+    content = json.loads(path.read_text())
+    del content["digest"]
+    path.write_text(json.dumps(content))
+    assert read_record(tmp_path, "a") is None
+
+
+def test_a_drive_is_whole_where_its_summary_and_the_frames_that_it_has_are_there(tmp_path):
+    made = write(tmp_path)
+    summary, frames = tmp_path / "results" / "a" / "summary.json", frames_path(tmp_path, "a")
+    summary.parent.mkdir(parents=True)
+    summary.touch()
+    assert not made.is_whole(tmp_path)
+    frames.parent.mkdir(parents=True)
+    frames.touch()
+    assert made.is_whole(tmp_path)
