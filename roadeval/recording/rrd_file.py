@@ -32,8 +32,8 @@ _BEGIN: Final = 12
 """Bytes before the first header."""
 _HEADER: Final = struct.Struct("<QQ")
 """The kind of a message, and its length in bytes."""
-_ROWS: Final = 2
-"""The kind of a message with rows."""
+_LAST, _ROWS = 0, 2
+"""The kinds of the last message, and of one with rows."""
 _END: Final = struct.Struct("<QQI8sI")
 """The place of the index and its length; a checksum, `_END_MAGIC` and a version."""
 _END_MAGIC: Final = b"RRF2FOOT"
@@ -276,7 +276,7 @@ def _written(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Place]]]:
     while offset <= end:
         file.seek(offset - _HEADER.size)
         kind, size = _HEADER.unpack(file.read(_HEADER.size))
-        if offset + size > end:
+        if kind == _LAST or offset + size > end:
             return
         if kind == _ROWS:
             message = file.read(size)
