@@ -430,7 +430,7 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
         return base.override({key: value for key, value in tables.items() if key != "preset"})
 
 
-def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = True) -> RunConfig:
+def load_config(path: str | Path, *, trusted: bool = True) -> RunConfig:
     """Read the configuration of a run from a TOML file.
 
     A `ConfigError` if the file is missing, no TOML, or holds a key or a value that cannot be used.
@@ -439,14 +439,11 @@ def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = 
     ----------
     path
         The file, in the shape that the top of this module describes.
-    preset
-        The preset to start from where the file names none; ``paper`` otherwise.
     trusted
         Whether the user has named the file. One that came with results, or in a recording, loads
         no code.
     """
-    base = {} if preset is None else {"preset": preset}
-    return configure({**base, **read_tables(path, trusted=trusted)}, where=str(path))
+    return configure(read_tables(path, trusted=trusted), where=str(path))
 
 
 def log_config(tables: Mapping[str, Any]) -> LogConfig:
