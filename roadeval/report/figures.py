@@ -15,9 +15,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import matplotlib as mpl
-import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.image import FigureImage
@@ -28,26 +26,15 @@ from roadeval.data import (
     BASELINE,
     FILTERED,
     IGNORE,
-    ROAD,
     UNFILTERED,
-    Mask,
     Rgb,
     Rows,
-    Truth,
     as_plain,
-    colours,
 )
 from roadeval.evaluation import score
 from roadeval.report.chart import FAINT, thinned
 from roadeval.report.charts.standard import over_windows
-from roadeval.report.images import (
-    EXAMPLE_WIDTH,
-    ExampleFrame,
-    faded,
-    finest_jpeg,
-    shrink,
-    variants_of,
-)
+from roadeval.report.images import ExampleFrame, finest_jpeg, pictures_of
 from roadeval.report.pdf.typeset import figure_as
 from roadeval.runtime.text import elided, visible
 from roadeval.runtime.threads import ordered
@@ -254,9 +241,7 @@ GAP: Final = 0.05
 
 def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
     """Draw figure 2 of the paper: the image, each variant's mask over it, and the truth over it."""
-    truth = any(example.truth is not None for example in examples)
-    names = variants_of(examples)
-    rows = [_pictures(example, names, truth=truth) for example in examples]
+    rows = [*pictures_of([example.small() for example in examples])]
     height, width = rows[0]["camera image"].shape[:2]
     across = (WIDTH - LEFT) / len(rows[0])
     down = (across - GAP) * height / width + GAP
@@ -268,7 +253,7 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
 
     title = visible(f"Road masks on {drive}")
     write(0.1, 0.1, title, size=11, weight="bold", color=INK, va="top")
-    write(0.1, 0.32, _legend(examples, names), size=8.5, color=FAINT, va="top")
+    write(0.1, 0.32, _legend(examples), size=8.5, color=FAINT, va="top")
     for number, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
         top, bottom = TOP + number * down, TOP + (number + 1) * down - GAP
         name = f"frame {example.frame}" if down > 0.7 else str(example.frame)
@@ -285,41 +270,15 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
     return figure
 
 
-def _pictures(example: ExampleFrame, variants: Sequence[str], *, truth: bool) -> dict[str, Rgb]:
-    """Return an example's pictures by their columns' titles."""
-    image = shrink(example.image, EXAMPLE_WIDTH)
-    pictures = {"camera image": image}
-    for name in variants:
-        mask = example.masks.get(name)
-        pictures[name] = faded(image) if mask is None else _overlay(image, mask)
-    return pictures | ({"ground truth": _overlay(image, example.truth)} if truth else {})
-
-
-def _legend(examples: Sequence[ExampleFrame], names: Sequence[str]) -> str:
+def _legend(examples: Sequence[ExampleFrame]) -> str:
     ignored = any(e.truth is not None and (e.truth == IGNORE).any() for e in examples)
-    missing = any(len(e.masks) < len(names) for e in examples)
+    names = {name for e in examples for name in e.masks}
+    missing = any(names - e.masks.keys() for e in examples)
     return (
-        "Green with a white edge: road"
+        "Green: road"
         + "; grey: ignored, counted nowhere" * ignored
         + "; faded: there is no mask of this frame" * missing
     )
-
-
-def _overlay(image: Rgb, labels: Mask | Truth | None) -> Rgb:
-    """Draw a mask or a truth over the image: road tinted, with a white edge; ignored pixels grey.
-
-    The edge tells the road apart in a black and white print, too.
-    """
-    if labels is None:
-        return image
-    small = shrink(labels, EXAMPLE_WIDTH, labels=True)
-    picture = image.astype(np.float32)
-    for value, colour, strength in ((ROAD, colours.ROAD, 0.45), (IGNORE, colours.IGNORE, 0.8)):
-        here = small == value
-        picture[here] += strength * (np.array(colour, np.float32) - picture[here])
-    road = (small == ROAD).view(np.uint8)
-    picture[cv2.erode(road, np.ones((3, 3), np.uint8)) != road] = 255
-    return np.rint(picture).astype(np.uint8)
 
 
 class Picture(FigureImage):

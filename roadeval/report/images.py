@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import LayerKind, LayerSpec, Mask, Rgb, Truth
+from roadeval.data import TRUTH, LayerKind, LayerSpec, Mask, Rgb, Truth, mask_spec
 from roadeval.report.blocks import ImageFile
 
+ROAD: Final = mask_spec("road", "road")
 EXAMPLE_WIDTH: Final = 400
 """Pixels across an example's picture, at most."""
 WIDTH: Final = 420
@@ -63,9 +64,22 @@ class ExampleFrame:
         )
 
 
-def variants_of(examples: Sequence[ExampleFrame]) -> list[str]:
-    """Return the variants that have a mask of one of the frames."""
-    return list(dict.fromkeys(name for example in examples for name in example.masks))
+def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
+    """Yield each example's pictures by their titles: the image, and masks and truth over it.
+
+    A variant that has no mask of a frame has the image nearly white. All have the same titles.
+    """
+    names = dict.fromkeys(name for each in examples for name in each.masks)
+    labelled = any(each.truth is not None for each in examples)
+    for each in examples:
+        found = {"camera image": each.image}
+        for name in names:
+            mask = each.masks.get(name)
+            over = None if mask is None else painted(LayerImage(name, each.image, ROAD, mask))
+            found[name] = faded(each.image) if over is None else over
+        if labelled:
+            found["truth"] = painted(LayerImage("truth", each.image, TRUTH, each.truth))
+        yield found
 
 
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:

@@ -29,8 +29,7 @@ from roadeval.report.charts.standard import (
     figures_over_drive,
 )
 from roadeval.report.findings import Findings
-from roadeval.report.images import variants_of
-from roadeval.report.sections.common import example_pictures
+from roadeval.report.images import ExampleFrame, LayerImage, jpeg, pictures_of
 from roadeval.report.tables import differences_table, stages_table, thresholds_table, variant_cell
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import CLAIMED, correction
@@ -40,10 +39,8 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     """Yield the rates over the drive as the paper shows them."""
     told = [*_claims(findings)]
     if findings.examples:
-        pictures = [*example_pictures(findings.examples)]
-        columns = len(variants_of(findings.examples)) + 2
         caption = "The paper's figure 2: input and output images, and the truth."
-        told.append(ImageGrid(pictures, columns, caption=caption))
+        told.append(_examples(findings.examples, caption))
     told += [
         Figure(charts, figure.caption)
         for figure in figures_over_drive()
@@ -52,6 +49,17 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     if told:
         yield Heading("Over the drive")
         yield Details("The paper's claims, and its figures 2, 3a and 3b", told)
+
+
+def _examples(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
+    """Return a row a frame: the image, each variant's mask over it, and the truth over it."""
+    rows = [*pictures_of(examples)]
+    pictures = [
+        (title if place else f"frame {example.frame}", jpeg(LayerImage(title, picture)))
+        for example, row in zip(examples, rows, strict=True)
+        for place, (title, picture) in enumerate(row.items())
+    ]
+    return ImageGrid(pictures, len(rows[0]), caption=caption)
 
 
 def _claims(findings: Findings) -> Iterator[Block]:
@@ -361,8 +369,7 @@ def masks(findings: Findings) -> Iterator[Block]:
         "whether the filter helps, not which stage is at fault. What follows is what was computed."
     )
     if findings.examples:
-        pictures = list(example_pictures(findings.examples))
-        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 1)
+        yield _examples(findings.examples)
     if findings.coverage:
         yield Figure(
             [coverage(findings.coverage)],
