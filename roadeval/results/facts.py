@@ -130,7 +130,7 @@ class LogFacts:
     digest: str
 
 
-class _Document:
+class Document:
     """A JSON document of facts, with its format and a checksum."""
 
     FORMAT: ClassVar[Mapping[str, Any]]
@@ -209,7 +209,7 @@ class _Document:
 
 
 @dataclass(frozen=True)
-class Facts(_Document):
+class Facts(Document):
     """The facts of one drive: the content of ``summary.json``."""
 
     verdict: str
@@ -387,7 +387,7 @@ class ConditionFacts:
 
 
 @dataclass(frozen=True)
-class FleetFacts(_Document):
+class FleetFacts(Document):
     """The facts of many drives: the content of ``fleet.json``."""
 
     verdict: str

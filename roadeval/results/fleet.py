@@ -7,7 +7,6 @@ settings, model and version, and its other files are there.
 from __future__ import annotations
 
 import json
-import math
 import shlex
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,11 +28,10 @@ from roadeval.results.facts import (
     FLEET,
     SUMMARY,
     ConditionFacts,
+    Document,
     FleetFacts,
     Member,
     check_format,
-    digest_of,
-    is_as_written,
     is_fleet,
     json_text,
     plain,
@@ -75,8 +73,6 @@ PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
 """Frames that the table of the worst names."""
-_KEPT: Final = ("drive", "asked", "stamp", "rows")
-"""Parts of a record's file that ``digest`` covers."""
 
 Cells = Sequence[Any]
 """A row's values in the order of its table's columns; None if it is undefined."""
@@ -251,19 +247,23 @@ class FleetFolder:
                 yield self.frames(drive).to_pandas()
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+@dataclass(frozen=True)
+class Record(Document):
     """The record of a drive: its rows in the fleet's tables, and what they were made of."""
 
     drive: str
     """Its name in the fleet."""
     asked: str
     """Digest of what was asked: settings, model and version."""
-    stamp: Mapping[str, Any] | None
+    stamp: Mapping[Any, Any] | None
     """Sizes and times of the log's files, which show cheaply whether it has changed; None where
-    they could not be read."""
+    they could not be read. A file's name may hold bytes that are no text."""
     rows: Mapping[str, Sequence[Cells]] = field(default_factory=dict)
     """Its rows of each table in `roadeval.results.schema.OF_DRIVES`."""
+
+    FORMAT = FLEET_FORMAT
+    AGAIN = AGAIN
+    RESULTS = ("drive", "asked", "stamp", "rows")
 
     def value(self, column: str) -> Any:
         """Return a value of the drive's own row in ``drives``."""
@@ -284,63 +284,32 @@ class Record:
             needed.append(frames_path(folder, self.drive))
         return all(path.exists() for path in needed)
 
+    @property
+    def fits(self) -> bool:
+        """Whether the rows have their tables' columns, and the drive its row."""
+        widths = all(
+            len(row) == len(TABLES[name].names)
+            for name in OF_DRIVES
+            for row in self.rows.get(name, ())
+        )
+        return widths and {*OF_DRIVES} == self.rows.keys() and len(self.rows["drives"]) == 1
+
     def write(self, folder: Path) -> None:
         """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
-        content = {
-            "format": FLEET_FORMAT,
-            "drive": self.drive,
-            "asked": self.asked,
-            "stamp": self.stamp,
-            "rows": {
-                name: [
-                    [None if isinstance(c, float) and not math.isfinite(c) else c for c in row]
-                    for row in rows
-                ]
-                for name, rows in self.rows.items()
-            },
-        }
-        content["digest"] = digest_of(content, _KEPT)
-        # All in ASCII: the name of a file may hold bytes that are no text.
-        put(record_path(folder, self.drive), json.dumps(content, allow_nan=False).encode())
+        content = json.dumps(self.as_dict(), allow_nan=False)
+        put(record_path(folder, self.drive), content.encode())
 
 
 def read_record(folder: Path, drive: str) -> Record | None:
     """Read the record of a drive; None without one that is whole and of this version."""
+    path = record_path(folder, drive)
     try:
-        content = read_json(read_bounded(record_path(folder, drive)))
-    except (FileNotFoundError, NotADirectoryError):
-        return None
+        record = Record.parse(read_bounded(path), path)
+    except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
+        return None  # not there, not ours, or not whole: it is made again
     except OSError as error:
-        raise ResultsError(f"{record_path(folder, drive)}: {error.strerror}") from error
-    except ValueError:
-        return None  # not ours, or not whole: it is made again
-    match content:
-        case {
-            "format": dict(form),
-            "drive": str(name),
-            "asked": str(asked),
-            "stamp": dict() | None as stamp,
-            "rows": dict(rows),
-            "digest": {"parts": list(parts)},
-        } if (
-            form == FLEET_FORMAT
-            and name == drive
-            and parts == [*_KEPT]
-            and is_as_written(content)
-            and _fits(rows)
-        ):
-            return Record(name, asked, stamp, rows)
-    return None
-
-
-def _fits(rows: Mapping[str, Any]) -> bool:
-    """Return whether the rows have their tables' columns, and the drive its row."""
-    widths = all(
-        isinstance(rows.get(name), list)
-        and all(isinstance(row, list) and len(row) == len(TABLES[name].names) for row in rows[name])
-        for name in OF_DRIVES
-    )
-    return widths and len(rows["drives"]) == 1
+        raise ResultsError(f"{path}: {error.strerror}") from error
+    return record if record.drive == drive and record.fits else None
 
 
 class _Records:

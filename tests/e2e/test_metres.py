@@ -28,7 +28,7 @@ def metres(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = "--camera", "camera.toml", "--save", "out.rrd", "-o", "out"
     run = here("replay", "drive.mcap", *words, cwd=folder)
     assert run.returncode == 0, run.stderr
-    assert "ERR %, on the ground" in run.stdout
+    assert "Errors by distance, and on the ground" in run.stdout
     return folder
 
 

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
+from roadeval.cli.screens import tables
 from roadeval.data.words import timestamp
-from roadeval.runtime.text import visible
+from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
+    from rich.console import Console
 
 NS = 1_000_000_000
-NAME = 28
-"""Letters of a topic's name that stay in a line, so that the numbers beside it have room."""
 
 
 def show(found: Mapping[str, Any], out: Console) -> None:
     """Print what `roadeval.logs.describe` found, as plain data."""
     out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
     out.print()
-    out.print(_topics(found["topics"], out.width))
+    tables.show_table(_topics(found["topics"]), out)
     for topic in found["topics"]:
         if topic["problem"]:
             out.print(f"{topic['name']} cannot be read: {topic['problem']}", soft_wrap=True)
@@ -53,26 +52,21 @@ def _gap(gap: tuple[int, int], start: int) -> str:
     return f"gap of {(after - before) / NS:.2f} s, {(before - start) / NS:.2f} s after the start"
 
 
-def _topics(topics: list[dict[str, Any]], room: int) -> RenderableType:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
-    longest = max((len(visible(topic["name"])) for topic in topics), default=0)
-    table.add_column("topic", overflow="fold", min_width=min(longest, NAME))
-    # The longest word would be kept whole, and push the numbers out.
-    table.add_column("carries", overflow="fold", max_width=room // 5)
-    for name in ("size", "messages", "rate"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for topic in topics:
-        table.add_row(
-            topic["name"],
-            _carries(topic),
-            "x".join(str(side) for side in topic["size"] or ()),
-            str(topic["count"]),
-            _rate(topic["rate_hz"]),
-        )
-    return table
+def _topics(topics: Sequence[Mapping[str, Any]]) -> Table:
+    return Table(
+        ["topic", "carries", "size", "messages", "rate"],
+        [
+            [
+                topic["name"],
+                _carries(topic),
+                "x".join(str(side) for side in topic["size"] or ()),
+                str(topic["count"]),
+                _rate(topic["rate_hz"]),
+            ]
+            for topic in topics
+        ],
+        text_columns=(0, 1),
+    )
 
 
 def _rate(rate: float | None) -> str:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roadeval.cli import console
 from roadeval.cli.screens import tables
-from roadeval.data.words import counted, percent
-from roadeval.evaluation.metres import ABOVE
+from roadeval.data.words import counted
 from roadeval.evaluation.score import Measured
 from roadeval.recording.viewer import has_screen
-from roadeval.report.blocks import Block, Table, Text
+from roadeval.report.blocks import Block, Text
+from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import (
     cameras_table,
     differences_table,
@@ -60,26 +61,13 @@ def _scores(facts: Facts, metres: Sequence[Measured]) -> Iterator[Block]:
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
     if metres:
-        yield by_distance(metres)
+        yield distance_table([asdict(each) for each in metres], [*facts.finals])
 
 
 def _why_nothing(frames: FrameAccount) -> str:
     if frames.labelled:
         return "every frame with road truth was trained on or left out"
     return "no frame that was read has road truth"
-
-
-def by_distance(metres: Sequence[Measured]) -> Table:
-    """Tabulate ERR of final masks by distance ahead, and by area of the ground seen from above."""
-    errors = [each for each in metres if each.measure == "ERR"]
-    found = {(each.variant, each.where): each.value for each in errors}
-    places = list(dict.fromkeys(each.where for each in errors))
-    rows = [
-        [variant, *(percent(found[variant, place]) for place in places)]
-        for variant in dict.fromkeys(each.variant for each in errors)
-    ]
-    heads = ["by area" if place == ABOVE else place for place in places]
-    return Table(["ERR %, on the ground", *heads], rows)
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

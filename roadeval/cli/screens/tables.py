@@ -72,7 +72,8 @@ def _texts(table: Table, place: int) -> list[str]:
 
 def ascii_of(number: str) -> str:
     """Return a number as `roadeval.data.words` writes it, with a hyphen for minus and dash."""
-    return number.replace(words.MINUS, "-").replace(words.DASH, "-")
+    plain_signs = {words.MINUS: "-", words.DASH: "-", "\N{ALMOST EQUAL TO}": "~"}
+    return number.translate(str.maketrans(plain_signs))
 
 
 def _parts(table: Table, columns: Sequence[Sequence[str]], room: int) -> Iterator[list[int]]:
