@@ -72,8 +72,8 @@ def _texts(table: Table, place: int) -> list[str]:
 
 def ascii_of(number: str) -> str:
     """Return a number as `roadeval.data.words` writes it, with a hyphen for minus and dash."""
-    plain_signs = {words.MINUS: "-", words.DASH: "-", "\N{ALMOST EQUAL TO}": "~"}
-    return number.translate(str.maketrans(plain_signs))
+    signs = f"{words.MINUS}{words.DASH}\N{ALMOST EQUAL TO}"
+    return number.translate(str.maketrans(signs, "--~"))
 
 
 def _parts(table: Table, columns: Sequence[Sequence[str]], room: int) -> Iterator[list[int]]:
