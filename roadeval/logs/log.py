@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -263,10 +263,11 @@ class Log:
         other.config, other._with_truth, other._of_rig = config, None, True
         return other
 
-    def frames(self, selection: Selection) -> FrameStream:
+    def frames(self, selection: Selection, only: Collection[int] | None = None) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.
 
-        A `LogError` if there is none in the range.
+        ``only`` are the numbers of some of them, which alone are read then. A `LogError` if there
+        is none in the range.
         """
         asked, times = self.config.frames, selection.camera.images.log_times
         first, last = 0, len(times)
@@ -286,7 +287,10 @@ class Log:
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
-        return FrameStream(selection, last - first, numbers[:: asked.every][: asked.max_frames])
+        numbers = numbers[:: asked.every][: asked.max_frames]
+        if only is not None:
+            numbers = [each for each in numbers if each in only]
+        return FrameStream(selection, last - first, numbers)
 
     def _labelled(self, selection: Selection) -> list[int]:
         """Return the numbers of the frames that have truth; they are looked for once."""

@@ -246,8 +246,13 @@ def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Sch
     return model, Schedule(model.digests, likeness=known)
 
 
+Frames = Callable[..., Iterable[LoggedFrame]]
+"""Returns the frames of a range, in order and from the first at each call; given some numbers it
+may leave out all others."""
+
+
 def from_log(
-    frames: Callable[[], Iterable[LoggedFrame]],
+    frames: Frames,
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
@@ -258,14 +263,13 @@ def from_log(
 ) -> tuple[tuple[Model, ...], Schedule]:
     """Train on some frames of a log, with each seed of the settings.
 
-    A `TrainingError` if there is nothing to learn from, or nothing left to evaluate. ``frames``
-    returns the frames of the selected range, in order and from the first at each call; only as many
-    are decoded as are needed, and ``on_frame`` is called with the number of those so far.
-    ``labelled`` says that the log's truth may be used: then only frames that have one train, and
-    some must be left to evaluate. Where no frame of the range has one, the first ones train.
-    ``base`` is what was learnt from other drives. With ``picks`` those train that were picked by
-    rank. Returned are the model of each seed, the first
-    with the warnings of all, and which frames are left out.
+    A `TrainingError` if there is nothing to learn from, or nothing left to evaluate. Of the
+    ``frames`` of the selected range only as many are decoded as are needed, and ``on_frame`` is
+    called with the number of those so far. ``labelled`` says that the log's truth may be used: then
+    only frames that have one train, and some must be left to evaluate. Where no frame of the range
+    has one, the first ones train. ``base`` is what was learnt from other drives. With ``picks``
+    those train that were picked by rank. Returned are the model of each seed, the first with the
+    warnings of all, and which frames are left out.
     """
     if base is not None:
         _require_adaptable(pipelines)
@@ -288,8 +292,10 @@ def from_log(
             f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
             "or run what learns nothing with `only`"
         )
-    choose = _spread_out if settings.placement == "spread" else _from_the_first
-    chosen = ranked or choose(candidates, settings, on_frame, by_truth=by_truth)
+    if settings.placement == "spread":
+        chosen = ranked or _spread_out(candidates, frames, settings, on_frame, by_truth=by_truth)
+    else:
+        chosen = ranked or _from_the_first(candidates, settings, on_frame, by_truth=by_truth)
     held, count = chosen.held, len(chosen.held.frames)
     warnings = []
     if held.is_full:
@@ -443,9 +449,7 @@ class Chosen:
     """How many of the frames chosen do not train, for they cannot be decoded."""
 
 
-def _candidates(
-    frames: Callable[[], Iterable[LoggedFrame]], *, labelled: bool
-) -> tuple[Iterator[LoggedFrame], bool]:
+def _candidates(frames: Frames, *, labelled: bool) -> tuple[Iterator[LoggedFrame], bool]:
     """Return the labelled frames and True; if there are none, all frames and False."""
     if labelled:
         with_truth = (frame for frame in frames() if frame.labelled)
@@ -454,9 +458,7 @@ def _candidates(
     return iter(frames()), False
 
 
-def _of_picks(
-    frames: Callable[[], Iterable[LoggedFrame]], picks: Picks, on_frame: Callable[[int], None]
-) -> Chosen | None:
+def _of_picks(frames: Frames, picks: Picks, on_frame: Callable[[int], None]) -> Chosen | None:
     """Choose all frames that were picked by rank and labelled since; None without any."""
     held, ranked = HeldFrames(), picks.stamps_of(Why.RANKED)
     for _, frame in decoded(e for e in frames() if e.labelled and e.stamp_ns in ranked):
@@ -491,6 +493,7 @@ def _from_the_first(
 
 def _spread_out(
     candidates: Iterator[LoggedFrame],
+    frames: Frames,
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
     *,
@@ -499,21 +502,22 @@ def _spread_out(
     """Choose ``settings.frames`` frames at equal distances; a gap lies on both sides of each.
 
     Without ``settings.gap`` the gap is a quarter of that distance, and at least one frame. The
-    parameters and errors are those of `_from_the_first`, but all candidates are taken.
+    parameters and errors are those of `_from_the_first`, but all candidates are taken, and those
+    that are chosen are read again.
     """
-    every = list(candidates)
-    asked = frozenset(evenly([each.number for each in every], settings.frames))
-    held, _ = _hold((each for each in every if each.number in asked), settings.frames, on_frame)
+    every = [each.number for each in candidates]
+    asked = frozenset(evenly(every, settings.frames))
+    held, _ = _hold((e for e in frames(asked) if e.number in asked), settings.frames, on_frame)
     trained = {frame.number for frame in held.frames}
-    places = [place for place, each in enumerate(every) if each.number in trained]
+    places = [place for place, number in enumerate(every) if number in trained]
     gap = settings.gap
     if gap is None:
         gap = max(1, len(every) // max(4 * len(trained), 1))
     near = {place + by for place in places for by in range(-gap, gap + 1)} - {*places}
-    left = [each.number for place, each in enumerate(every) if place not in near | {*places}]
+    left = [number for place, number in enumerate(every) if place not in near | {*places}]
     if by_truth and trained and not left:
         raise _none_left(len(trained), len(near & {*range(len(every))}), len(every))
-    beside = frozenset(each.number for place, each in enumerate(every) if place in near)
+    beside = frozenset(number for place, number in enumerate(every) if place in near)
     lost = 0 if held.is_full else len(asked) - len(trained)
     return Chosen(held, beside, left[0] if left else None, lost)
 

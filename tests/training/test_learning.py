@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from weakref import WeakSet
 
 import pytest
 
@@ -22,7 +23,7 @@ PIPELINES = {
 }
 
 
-@dataclass
+@dataclass(eq=False)
 class Logged:
     """A frame of a log, as `logs` would hand it out."""
 
@@ -59,7 +60,9 @@ def learn(logged, *, labelled: bool = True, **settings):
 
 def with_seeds(logged, *, labelled: bool = True, **settings):
     wanted = TrainingSettings(**settings)
-    return from_log(lambda: logged, PIPELINES, wanted, lambda done: None, labelled=labelled)
+    return from_log(
+        lambda only=None: logged, PIPELINES, wanted, lambda done: None, labelled=labelled
+    )
 
 
 def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
@@ -124,6 +127,23 @@ def test_what_a_further_seed_warns_of_is_told_with_it(monkeypatch):
     own, of_5 = "filtered: svm has collapsed", "seed 5: filtered: svm has collapsed"
     assert first.warnings == (own, of_5)
     assert len(others) == 2
+
+
+def test_frames_along_a_drive_are_not_held_before_some_are_chosen():
+    alive, most, asked = WeakSet(), [], []
+
+    def frames(only=None):
+        asked.append(only)
+        for number in range(40) if only is None else sorted(only):
+            each = Logged(frame(number))
+            alive.add(each)
+            most.append(len(alive))
+            yield each
+
+    wanted = TrainingSettings(frames=4, placement="spread")
+    from_log(frames, PIPELINES, wanted, lambda done: None, labelled=True)
+    assert asked == [None, {0, 10, 20, 30}]
+    assert max(most) <= 3
 
 
 def test_frames_right_after_training_can_be_left_out():
@@ -295,7 +315,7 @@ def adapt(logged, path, pipelines, **settings):
     base, _ = from_file(path, pipelines)
     wanted = TrainingSettings(model=str(path), adapt=True, **settings)
     (model,), schedule = from_log(
-        lambda: logged, pipelines, wanted, lambda done: None, labelled=True, base=base
+        lambda only=None: logged, pipelines, wanted, lambda done: None, labelled=True, base=base
     )
     return base, model, schedule
 
