@@ -573,9 +573,9 @@ def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
 
 
 def test_without_truth_there_is_no_rate_for_seeds_to_spread(tmp_path, monkeypatch):
-    def counted(*given):
+    def counted(*given, **named):
         fits.append(given)
-        return fit(*given)
+        return fit(*given, **named)
 
     fits, fit = [], learning.fit
     monkeypatch.setattr(learning, "fit", counted)
