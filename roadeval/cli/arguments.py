@@ -125,8 +125,10 @@ def configuration(given: Given) -> RunConfig:
         config = config.with_tuned(given.get("tunes", ()))
         if "only" in given:
             config = config.override({"only": given["only"]})
-    with in_file(ground := str(given.get("ground", ""))):
-        config = config.override({"ground": read_tables(ground) if ground else {}})
+    if path := given.get("ground"):
+        ground = read_tables(path)
+        with in_file(str(path)):
+            config = config.override({"ground": ground})
     config = config.with_drives(
         DriveSettings.of({**read_tables(file), "path": drive}, file)
         for drive, file in given.get("drives", ())
@@ -148,8 +150,9 @@ def of_a_log(given: Given) -> LogConfig:
         _check_names(given, "topics.masks")
         found = log_config({**_tables(given), **_cameras(given)})
     if path := given.get("ground"):
+        ground = read_tables(path)
         with in_file(str(path)):
-            return replace(found, ground=log_config({"ground": read_tables(path)}).ground)
+            return replace(found, ground=log_config({"ground": ground}).ground)
     return found
 
 

@@ -197,6 +197,12 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert Picks.read(work / "at_once").stamps_of(Why.RANDOM) == after.stamps_of(Why.RANDOM)
 
 
+def test_of_results_the_recording_is_taken(work):
+    done = here("pick", "reports", "-n", 1, "-o", "one", cwd=work)
+    assert "one: 1 frame to label: 1 drawn at random of" in done.stdout + done.stderr
+    assert Picks.read(work / "one").log == Picks.read(work / "to_label").log
+
+
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
     shutil.copy(work / "street.mcap", work / "second.mcap")
     words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 20)
@@ -218,12 +224,18 @@ def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, tru
     [
         (("out.rrd", "-n", 5, "-o", "reports"), "holds something else"),
         (("out.rrd", "-n", 5, "-o", "x", "--by", "nobody"), "no variant nobody; there are"),
-        (("reports", "-n", 5, "-o", "x"), "reports"),
+        (("moved", "-n", 5, "-o", "x"), "moved: its recording is not where it was"),
+        (("whole.mcap", "-n", 5, "-o", "x"), "whole.mcap: every frame has truth"),
         (("nothing.rrd", "-n", 5, "-o", "x"), "nothing.rrd"),
     ],
 )
 def test_what_cannot_be_picked_is_one_line(work, words, said):
-    done = here("pick", *words, cwd=work)
+    shutil.copy(work / "street.mcap", work / "whole.mcap")
+    facts = json.loads((work / "reports" / "summary.json").read_text())
+    facts["run"]["output"]["save"] = "elsewhere.rrd"
+    (work / "moved").mkdir()
+    (work / "moved" / "summary.json").write_text(json.dumps(facts))
+    done = here("pick", *words, "--quiet", cwd=work)
     assert done.returncode == 1
     assert said in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1

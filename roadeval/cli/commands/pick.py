@@ -27,8 +27,8 @@ def pick(
         typer.Argument(
             metavar="DRIVE|RESULT",
             show_default=False,
-            help="Camera logs (MCAP), which are replayed first, recordings (.rrd) of them, or a "
-            "fleet's folder.",
+            help="Camera logs (MCAP), which are replayed first, results of them with their "
+            "recordings, or a fleet's folder.",
             readable=False,
         ),
     ],
@@ -63,6 +63,7 @@ def pick(
     """
     arguments.one_camera(given)
     config = arguments.configuration(given)
+    from roadeval.data.words import counted
     from roadeval.jobs.results.pick import pick as run
     from roadeval.logs import Why
 
@@ -79,7 +80,7 @@ def pick(
         ranked, by = len(each.added) - random, each.picks.method["ranked_by"]
         doubt = f", {ranked} most in doubt (by {by})" if ranked else ""
         of = f"{random} drawn at random of {len(each.picks.stamps):,}"
-        console.emit(f"{each.folder}: {len(each.added)} frames to label: {of}{doubt}")
+        console.emit(f"{each.folder}: {counted(len(each.added), 'frame')} to label: {of}{doubt}")
     if found and not quiet:
         out = console.results()
         out.print(f"Correct {found[0].folder}/proposals, and put the results into labels/.")

@@ -22,7 +22,7 @@ from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.logs import Picked, Picks, Proposal, Why, digest_of, proposal_files
 from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, as_read
-from roadeval.results.facts import is_fleet
+from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
 from roadeval.runtime.files import AnyPath, put, writing
@@ -68,8 +68,8 @@ def pick(
     Parameters
     ----------
     source
-        A recording, a log, which is replayed first, or a fleet's folder, of which the recordings
-        that were kept are taken; or several of these.
+        A recording or the results folder beside it, a log, which is replayed first, or a fleet's
+        folder, of which the recordings that were kept are taken; or several of these.
     count
         How many frames to label; of several drives each gives as many as its length asks for.
     folder
@@ -102,27 +102,31 @@ def pick(
                 made, run = Path(place, f"{number}.rrd"), run_toml(config, each.name, VERSION)
                 own_reports = Path(place, "reports")
                 replay(each, masks, save=made, reports=own_reports, on_progress=on_progress)
-            drives.append((_drive(made), run))
+            drives.append((each, _drive(made), run))
         if not drives:
             raise RoadevalError(f"{given[0]}: no recording was kept; replay it with --keep all")
         many = len(drives) > 1
-        names = [drive.name for drive, _ in drives]
+        names = [drive.name for _, drive, _ in drives]
         if len({*names}) < len(names):
             raise RoadevalError("two drives have the same name; pick from each into its own folder")
-        shares = _shares([len(drive.table("unlabelled")) for drive, _ in drives], count)
+        how = labels, variant, seed
+        shares = _shares([len(drive.table("unlabelled")) for _, drive, _ in drives], count)
         return [
-            _picked(
-                drive, _Wanted(own, Path(folder, *[drive.name] * many), labels, variant, seed, run)
-            )
-            for (drive, run), own in zip(drives, shares, strict=True)
+            _picked(drive, _Wanted(each, own, Path(folder, *[drive.name] * many), *how, run))
+            for (each, drive, run), own in zip(drives, shares, strict=True)
             if own
         ]
 
 
 def _parts(source: Path) -> list[Path]:
-    """Return the recordings that a fleet has kept; of anything else itself."""
+    """Return the recordings that a fleet has kept, or that of a results folder; else itself."""
     if not is_fleet(source):
-        return [source]
+        if not (source / SUMMARY).is_file():
+            return [source]
+        recording = DriveResult(source).viewable
+        if recording is None:
+            raise RoadevalError(f"{source}: its recording is not where it was; name that")
+        return [recording]
     drives = FleetFolder(source).drives
     return [path for name in drives if (path := recording_path(source, name)).exists()]
 
@@ -144,6 +148,8 @@ def _shares(sizes: Sequence[int], count: int) -> list[int]:
 class _Wanted:
     """The options of `pick` for one drive: its share of the frames, and its folder."""
 
+    source: Path
+    """What was named, a log or a recording."""
     count: int
     folder: Path
     labels: str
@@ -169,9 +175,9 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     rows = drive.table("unlabelled")
     names = rows.distinct("variant")
     if not names:
-        raise RoadevalError(f"{drive.path}: every frame has truth, or none was replayed")
+        raise RoadevalError(f"{wanted.source}: every frame has truth, or none was replayed")
     if (name := wanted.variant or names[0]) not in names:
-        raise RoadevalError(f"{drive.path}: no variant {name}; there are {', '.join(names)}")
+        raise RoadevalError(f"{wanted.source}: no variant {name}; there are {', '.join(names)}")
     known, own = _known(drive, rows, name, wanted), rows.of_variant(name)
     scores = known.every_score()
     if (sign := score.sign_of(rows, name)) is not None:  # how much they are in doubt by now
@@ -184,7 +190,7 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     frames = [known.frames[place] for place in {*random, *ranked} - {*taken}]
     if lacking := sorted({*frames} - {*drive.pictured}):
         raise RoadevalError(
-            f"{drive.path}: no pictures of frame {lacking[0]}; replay with --record masks"
+            f"{wanted.source}: no pictures of frame {lacking[0]}; replay with --record masks"
         )
     stage, masks = str(own["stage"][0]), {}
     for frame in frames:
@@ -207,7 +213,7 @@ def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Pic
     if found is None:
         if folder.exists() and any(folder.iterdir()):
             raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
-        return _nothing_yet(drive, rows, variant, wanted.seed)
+        return _nothing_yet(drive, rows, variant, wanted)
     if (found.log, found.camera) != (facts.log_digest, facts.drive.camera):
         raise RoadevalError(f"{folder}: its frames are of another log; name a folder of its own")
     return found
@@ -244,13 +250,13 @@ def _write(
         put(folder / PICK, picks.text().encode())
 
 
-def _nothing_yet(drive: DriveResult, rows: Rows, variant: str, seed: int) -> Picks:
+def _nothing_yet(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Picks:
     """Return picks without a frame: those of a result that can be picked, and their doubt."""
     own, sign = rows.of_variant(variant), score.sign_of(rows, variant)
     stamps = own["stamp_ns"].tolist()
     if len({*stamps}) < len(stamps):
         raise RoadevalError(
-            f"{drive.path}: several frames have one stamp, so no label finds its own"
+            f"{wanted.source}: several frames have one stamp, so no label finds its own"
         )
     doubts = own[sign].tolist() if sign else [np.nan] * len(own)
     method = {"variant": variant, "ranked_by": sign, "identity": drive.properties.get("input")}
@@ -259,7 +265,7 @@ def _nothing_yet(drive: DriveResult, rows: Rows, variant: str, seed: int) -> Pic
         camera=drive.facts.drive.camera,
         log=drive.facts.log_digest,
         method=method,
-        seed=seed,
+        seed=wanted.seed,
         drawn=0,
         frames=own["frame"].tolist(),
         stamps=stamps,
