@@ -17,7 +17,7 @@ from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 
 HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
-QUICK = 'preset = "robust"\n[trees]\ntrees = 15\nhidden = 8\n'
+QUICK = 'preset = "robust"\n[trees]\ntrees = 15\nhidden = 8\n[training]\npixels_per_class = 50\n'
 """Some trees are enough: what is picked and counted is tested here, not how good it is."""
 
 
@@ -25,7 +25,7 @@ QUICK = 'preset = "robust"\n[trees]\ntrees = 15\nhidden = 8\n'
 def begun(tmp_path_factory):
     """A folder with a drive whose truth is hidden, its recording, and picked frames."""
     folder = tmp_path_factory.mktemp("pick")
-    a_rig(folder / "street.mcap", {"front": (0, 60)})
+    a_rig(folder / "street.mcap", {"front": (0, 40)})
     (folder / "quick.toml").write_text(QUICK)
     words = ("--save", "out.rrd", "--reports", "reports", *HIDDEN)
     assert here("replay", "street.mcap", *words, cwd=folder).returncode == 0
@@ -110,7 +110,7 @@ def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(lab
 
 def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
     words = ("--config", "patch.toml", "--record", "none")
-    (work / "patch.toml").write_text(f'{QUICK}[training]\nsource = "patch"\n')
+    (work / "patch.toml").write_text(f'{QUICK}source = "patch"\n')
     label(work / "to_label", truths)
     before, _ = scored(work, *words)
     label(work / "to_label", {stamp: 1 - (t == 1) for stamp, t in truths.items()}, Why.RANKED)

@@ -18,7 +18,12 @@ pytestmark = pytest.mark.skipif(
 
 def run(logs: Path, folder: Path) -> None:
     """Replay a fleet in this process, each drive with the model of the other one's fold."""
-    config = {"training": {"frames": 3}, "frames": {"max_frames": 4}, "fleet": {"folds": 2}}
+    config = {
+        "only": ["unfiltered"],
+        "training": {"frames": 3, "pixels_per_class": 20},
+        "frames": {"max_frames": 4},
+        "fleet": {"folds": 2},
+    }
     roadeval.replay_fleet(logs, folder, roadeval.configure(config), executor=Here())
 
 

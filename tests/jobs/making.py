@@ -13,6 +13,7 @@ from tests.training.making import frame
 
 FRAMES: Final = 26
 NS: Final = 100_000_000
+PIXELS: Final = 50
 
 TABLES: Final = {
     **dict.fromkeys(("start", "end", "every", "max_frames", "scale"), "frames"),
@@ -26,14 +27,17 @@ TABLES: Final = {
 
 
 def settings(**values: Any) -> RunConfig:
-    """A configuration by its keys alone; ``train_frames`` is ``training.frames``."""
-    tables: dict[str, Any] = {}
+    """A configuration by its keys alone; ``train_frames`` is ``training.frames``.
+
+    Few pixels train, which is quicker: how good a method is, is not what small logs show.
+    """
+    tables: dict[str, Any] = {"training": {"pixels_per_class": PIXELS}}
     for key, value in values.items():
         if key in TABLES:
             plain = str(value) if isinstance(value, Path) else value
             tables.setdefault(TABLES[key], {})[key.removeprefix("train_")] = plain
         else:
-            tables[key] = value
+            tables[key] = tables.get(key, {}) | value if key == "training" else value
     return configure(tables)
 
 

@@ -417,11 +417,11 @@ def test_an_output_never_replaces_the_drive(tmp_path):
 
 
 def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_warned_of():
-    config = settings(variants={"v": {"preset": "robust"}})
-    (pixels, most) = config.ignored()
+    robust = {"variants": {"v": {"preset": "robust"}}}
+    (pixels, most) = roadeval.configure(robust).ignored()
     assert "v: preset robust asks for training.pixels_per_class = 1000" in pixels
     assert "training.max_pixels = 50000" in most
-    assert settings(preset="robust", variants={"v": {"preset": "robust"}}).ignored() == ()
+    assert roadeval.configure({"preset": "robust"} | robust).ignored() == ()
 
 
 @pytest.mark.parametrize("table", TABLES)

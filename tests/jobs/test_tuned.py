@@ -20,7 +20,11 @@ SIZE = (48, 64)
 NS = 100_000_000
 TRAINED = 10
 FRAMES = 22
-SMALL = {"preset": "robust", "trees": {"width": 64, "trees": 8, "hidden": 4, "passes": 2}}
+SMALL = {
+    "preset": "robust",
+    "training": {"pixels_per_class": 200},
+    "trees": {"width": 64, "trees": 8, "hidden": 4, "passes": 2},
+}
 
 
 def picture(number):
