@@ -10,7 +10,7 @@ from roadeval.cli import console
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
 from roadeval.report.blocks import Heading
-from roadeval.report.sections.drives import drives_table
+from roadeval.report.sections.drives import by_reason, drives_table
 from roadeval.report.sections.summary import drives_account
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
@@ -57,18 +57,7 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
         if condition.judged and (missing := [*condition.not_judged.values()]):
             more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
             yield f"{missing[0]}{more}"
-    reasons: dict[str, list[str]] = {}
-    names = FleetFolder(outcome.folder).names
-    for drive, text in outcome.problems.items():
-        reasons.setdefault(_reason(drive, text, outcome), []).append(names[drive])
-    for reason, drives in reasons.items():
+    fleet = FleetFolder(outcome.folder)
+    failed = (fleet.drives[drive] for drive in outcome.problems)
+    for reason, drives in by_reason(fleet, failed).items():
         yield f"{first_of(drives, NAMED)}: {reason}"
-
-
-def _reason(drive: str, text: str, outcome: FleetOutcome) -> str:
-    """Return a reason without the name of the drive's file, which begins most of them."""
-    sources = {each.drive: each.source for each in outcome.facts.drives}
-    source = sources.get(drive, "")
-    for name in (source, source.rpartition("/")[2]):
-        text = text.removeprefix(f"{name}: ") if name else text
-    return text

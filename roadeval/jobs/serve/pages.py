@@ -70,7 +70,7 @@ def serving(results: Paths, *, trust_sources: bool = False) -> Iterator[LocalSer
         opened = [own for each in whole for own in (each, *each.cameras.values())]
         site = _Site([_served(each, replayer) for each in opened], viewer)
         stack.callback(viewer.close)
-        stack.callback(replayer.cancel)
+        stack.callback(replayer.close)
         server = LocalServer(site.answer)
         stack.callback(server.server_close)
         yield server
@@ -287,11 +287,9 @@ class _ServedFleet(_Served):
 
     def _more(self, request: Request, viewer: WindowViewer) -> Response:
         match request.parts:
-            case ("worst", rank, "view" | "cancel" as what) if request.acts and rank.isdecimal():
+            case ("worst", rank, "view") if request.acts and rank.isdecimal():
                 frame = self._worst.get(int(rank))
-                if frame is None:
-                    return NOT_FOUND
-                return self._view(frame, viewer) if what == "view" else self._cancel(frame)
+                return self._view(frame, viewer) if frame else NOT_FOUND
             case ("drive", place, *rest) if place.isdecimal() and int(place) < len(
                 self._fleet.drives
             ):
@@ -338,10 +336,6 @@ class _ServedFleet(_Served):
             for left in own_names(self._fleet.recording(drive), hidden=False):
                 left.unlink(missing_ok=True)
             raise
-
-    def _cancel(self, frame: WorstFrame) -> Response:
-        self._replayer.cancel(self._fleet.recording(frame.drive))
-        return Response(b"")
 
 
 def _viewed(viewer: WindowViewer, recording: Path, frame: int) -> Response:

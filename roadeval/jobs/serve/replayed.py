@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
-from threading import Event, Lock, Thread
+from threading import Event, Lock
 from typing import Final
 
 from roadeval.config import OutputSettings, RunConfig, load_config
@@ -21,8 +22,6 @@ from roadeval.results.schema import FAILED
 
 FEWEST: Final = "worst:10"
 """The pictures that are recorded, where the fleet's settings ask for none."""
-PATIENCE_S: Final = 20.0
-"""How long a replay that is cancelled may take to end: it looks after every frame."""
 Replay = Callable[[Callable[[Progress], None]], object]
 """Replays a drive, reports its progress, and ends where that raises."""
 
@@ -95,23 +94,18 @@ def _replayed(
         return made.facts.log_digest
 
 
-# --- In a thread beside the server ----------------------------------------------------------------
-
-
 class CancelledReplayError(RoadevalError):
-    """The replay was cancelled."""
+    """The server ends before the replay does."""
 
 
 @dataclass(slots=True)
-class _Running:
-    """A replay in its thread: how far it is, and why it failed."""
+class _Replay:
+    """A replay in its thread, and how far it is."""
 
-    recording: Path
     name: str
-    stop: Event = field(default_factory=Event)
+    stop: Event
     progress: str = "it begins"
-    failure: str = ""
-    thread: Thread | None = None
+    future: Future[object] | None = None
 
     @property
     def state(self) -> str:
@@ -127,58 +121,37 @@ class _Running:
 
 
 class Replayer:
-    """Replays drives in a thread beside the server, one at a time."""
+    """Replays drives in a thread beside the server, one after the other."""
 
     def __init__(self) -> None:
         self._lock: Final = Lock()
-        self._running: _Running | None = None
+        self._stop: Final = Event()
+        self._thread: Final = ThreadPoolExecutor(1, "replay")
+        self._replays: Final[dict[Path, _Replay]] = {}
 
     def want(self, recording: Path, name: str, replay: Replay) -> str:
         """Have a drive's recording made, or return how far that is; empty once it is there.
 
-        A `RoadevalError` if it failed or was cancelled, or another drive's replay has not ended;
-        who asks again begins again.
+        A `RoadevalError` if it failed; who asks again begins again.
         """
         with self._lock:
-            running = self._running
-            if running and running.thread and running.thread.is_alive():
-                if running.recording != recording:
-                    raise RoadevalError(
-                        f"{running.state} Only one drive is replayed at a time: wait for it, or "
-                        "cancel it."
-                    )
-                return running.state
-            self._running = None
-            if running and running.recording == recording and running.failure:
-                raise RoadevalError(running.failure)
-            if recording.exists():
+            own = self._replays.get(recording)
+            if own is None and recording.exists():
                 return ""
-            self._running = self._begun(recording, name, replay)
-            return self._running.state
+            if own is None or own.future is None:
+                own = self._replays[recording] = _Replay(name, self._stop)
+                own.future = self._thread.submit(replay, own.report)
+            if not own.future.done():
+                return own.state
+            del self._replays[recording]
+            error = own.future.exception()
+            if error and not isinstance(error, RoadevalError):
+                raise RoadevalError(f"{name}: the replay failed: {error!r}") from error
+            if error:
+                raise error
+            return ""
 
-    def _begun(self, recording: Path, name: str, replay: Replay) -> _Running:
-        running = _Running(recording, name)
-
-        def run() -> None:
-            try:
-                replay(running.report)
-            except RoadevalError as error:
-                running.failure = str(error)
-            except Exception as error:
-                running.failure = f"{name}: the replay failed: {error!r}"
-                raise
-
-        running.thread = Thread(target=run, name=f"replay of {name}", daemon=True)
-        running.thread.start()
-        return running
-
-    def cancel(self, recording: Path | None = None) -> None:
-        """End the replay of a recording, or whichever there is; it has ended afterwards."""
-        with self._lock:
-            running = self._running
-            if running is None or recording not in (None, running.recording):
-                return
-            running.stop.set()
-            if running.thread:
-                running.thread.join(PATIENCE_S)
-            self._running = None
+    def close(self) -> None:
+        """End what is replayed, after its next frame."""
+        self._stop.set()
+        self._thread.shutdown(cancel_futures=True)

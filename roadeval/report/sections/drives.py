@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -182,10 +182,7 @@ def missing(findings: FleetFolder) -> Iterator[Block]:
 
 def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
     """Yield a table of reasons, the most frequent first."""
-    by_reason: defaultdict[str, list[str]] = defaultdict(list)
-    for row in rows:
-        by_reason[_reason(row)].append(findings.names[row["drive"]])
-    ranked = sorted(by_reason.items(), key=lambda each: -len(each[1]))
+    ranked = sorted(by_reason(findings, rows).items(), key=lambda each: -len(each[1]))
     yield Table(
         ["drives", "which", "reason"],
         [
@@ -200,11 +197,18 @@ def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
         yield Text(f"{number(more)} more for other reasons: see drives.parquet.", "note")
 
 
-def _reason(row: Row) -> str:
-    """Return why, without the name of the drive's file, which begins most reasons."""
-    reason = row["reason"] or "no reason known"
-    begin, _, rest = reason.partition(": ")
-    return rest if rest and begin.rpartition("/")[2].startswith(row["name"]) else reason
+def by_reason(findings: FleetFolder, rows: Iterable[Row]) -> dict[str, list[str]]:
+    """Return the drives' names by the reason that they failed for, or were not scored.
+
+    Without the name of the drive's file, which begins most reasons.
+    """
+    found: defaultdict[str, list[str]] = defaultdict(list)
+    for row in rows:
+        reason = row["reason"] or "no reason known"
+        begin, _, rest = reason.partition(": ")
+        is_file = rest and begin.rpartition("/")[2].startswith(row["name"])
+        found[rest if is_file else reason].append(findings.names[row["drive"]])
+    return found
 
 
 def _losses(findings: FleetFolder, rows: Sequence[Row]) -> Table:

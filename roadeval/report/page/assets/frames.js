@@ -229,36 +229,18 @@ async function openInViewer(button, address) {
   [button.disabled, button.textContent] = [true, "Opening \u2026"];
   let told = "The server has ended.";
   try {
-    const answer = await whenDone(button, address);
-    told = answer ? (await answer.text()).trim() : "Cancelled.";
+    let answer = await fetch(address, { method: "POST" });
+    while (answer.status === 202) { // The drive is replayed first.
+      button.textContent = (await answer.text()).trim();
+      await new Promise((done) => setTimeout(done, 500));
+      answer = await fetch(address, { method: "POST" });
+    }
+    told = (await answer.text()).trim();
   } catch {
     // It is told below.
   }
   [button.disabled, button.textContent] = [false, words];
   return told;
-}
-
-/** Ask until the server is ready, as after a replay, which may be cancelled: then there is none. */
-async function whenDone(button, address) {
-  const stop = document.createElement("button");
-  [stop.type, stop.className, stop.textContent] = ["button", "cancel", "Cancel"];
-  let cancelled = false;
-  stop.addEventListener("click", async () => {
-    [cancelled, stop.disabled] = [true, true];
-    await fetch(address.replace(/view$/, "cancel"), { method: "POST" });
-  });
-  try {
-    for (;;) {
-      const answer = await fetch(address, { method: "POST" });
-      if (answer.status !== 202) return answer;
-      button.textContent = (await answer.text()).trim();
-      if (!stop.isConnected) button.after(stop);
-      await new Promise((done) => setTimeout(done, 500));
-      if (cancelled) return null;
-    }
-  } finally {
-    stop.remove();
-  }
 }
 
 function hasCondition(row, condition) {
