@@ -155,6 +155,8 @@ class Table(Block):
     """Printed above the table."""
     small: bool = False
     """Whether it is set in small type."""
+    find: str = ""
+    """On a page: what stands before a field that looks for words in a table of many rows."""
 
 
 def markdown(blocks: Iterable[Block]) -> str:
@@ -285,14 +287,6 @@ class Picture(Block):
 
 
 @dataclass(frozen=True, slots=True)
-class PictureRow(Block):
-    """Pictures side by side under a title."""
-
-    title: str
-    pictures: Sequence[Picture]
-
-
-@dataclass(frozen=True, slots=True)
 class Strip(Block):
     """A frame with its pictures."""
 
@@ -301,17 +295,10 @@ class Strip(Block):
     """What is known of it."""
     rates: Table | None
     """Of each variant's final mask; None without truth."""
-    rows: Sequence[PictureRow]
+    rows: Sequence[Sequence[Picture]]
+    """The outcomes, then the layers of each variant."""
     command: str = ""
     """Opens it in the viewer; empty without a recording."""
-
-
-@dataclass(frozen=True, slots=True)
-class LongTable(Block):
-    """A table of many rows, with a field that looks for words in them."""
-
-    table: Table
-    label: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,8 +50,6 @@ PICTURED: Final = 24
 """Frames of a page with pictures, by default."""
 BYTES: Final = 9_900_000
 """Of a page, at most, where the number of frames with pictures is not given."""
-FEWEST: Final = 8
-"""Frames that have pictures even if not every variant's layers have room for it."""
 SHADOW: Final = 1 / 3
 """A frame with much shadow is among this share of the drive's."""
 
@@ -346,30 +344,24 @@ def strips_of(
     count: int | None = None,
     taken: int = 0,
     on_progress: OnProgress = ignore,
-) -> tuple[list[Strip], list[str]]:
-    """Return frames with their pictures, and the variants whose layers had no room.
+) -> list[Strip]:
+    """Return frames with their pictures, in the drive's order: the worst, the best, and others.
 
-    In the drive's order: the worst, the best, and others. ``count`` is how many; by default as many
-    of `PICTURED` as keep the page below `BYTES`, of which ``taken`` are used without them. Where
-    that would be fewer than `FEWEST`, only the first variants have their layers.
+    ``count`` is how many; by default as many of `PICTURED` as keep the page below `BYTES`, of which
+    ``taken`` are used without them.
     """
     if result.recording is None:
-        return [], []
-    left_out: list[str] = []
-    chosen, room = _chosen(result, PICTURED if count is None else count), BYTES - taken
+        return []
+    chosen = _chosen(result, PICTURED if count is None else count)
     picker = FramePicker(result, None, None)
-    if count is None and chosen and FEWEST * bytes_of(picker.strip(chosen[0])) > room:
-        picker = FramePicker(result, None, LAYERS)
-        left_out = [variant.name for variant in result.recording.variants[LAYERS:]]
 
     def each() -> Iterator[Strip]:
         for done, frame in enumerate(chosen, 1):
             yield picker.strip(frame)
             on_progress(Progress(done, len(chosen), "reading"))
 
-    made = each()
-    shown = made if count is not None else fitting(made, room)
-    return sorted(shown, key=lambda each: each.frame), left_out
+    shown = each() if count is not None else fitting(each(), BYTES - taken)
+    return sorted(shown, key=lambda each: each.frame)
 
 
 def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
@@ -383,7 +375,7 @@ def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
 
 def bytes_of(made: Strip) -> int:
     """Return how many bytes of a page a strip takes: pictures as text, with words around each."""
-    cells = (bits for row in made.rows for each in row.pictures for bits in each.wrong.values())
+    cells = (bits for row in made.rows for each in row for bits in each.wrong.values())
     return sum(len(image.content) * 4 // 3 + 400 for image in made.images()) + sum(map(len, cells))
 
 

@@ -103,8 +103,8 @@ def page_of(
         return page_document(findings, None, pictures or PICTURED_OF_FLEET)
     frames = browsed(result.drive)
     taken = len(page(page_document(findings, frames))) if pictures is None else 0
-    strips, left_out = strips_of(result.drive, pictures, taken, on_progress)
-    return page_document(findings, replace(frames, strips=strips, left_out=left_out))
+    strips = strips_of(result.drive, pictures, taken, on_progress)
+    return page_document(findings, replace(frames, strips=strips))
 
 
 SAMPLED: Final = 100

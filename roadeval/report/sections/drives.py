@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -17,7 +18,6 @@ from roadeval.report.blocks import (
     Heading,
     ImageFile,
     ImageGrid,
-    LongTable,
     Table,
     Text,
 )
@@ -108,7 +108,7 @@ def _tags(findings: FleetFolder) -> dict[str, str]:
 def table(findings: FleetFolder) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
-    yield LongTable(drives_table(findings), "Find drives, tags, states:")
+    yield replace(drives_table(findings), find="Find drives, tags, states:")
     yield Text(
         "Rates of the first variant's final mask in percent, differences in percentage points; "
         "light as it was measured, from 0 to 1. A click on a title sorts.",

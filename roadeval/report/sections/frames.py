@@ -23,7 +23,6 @@ from roadeval.report.blocks import (
     ImageGrid,
     KeepTogether,
     Picture,
-    PictureRow,
     Strip,
     Table,
     Text,
@@ -178,8 +177,6 @@ class FrameBrowser(Block):
     """Frames with their pictures, in order; none where they are asked for one by one."""
     masks: Sequence[str] = ()
     """Names of the pictures of final masks, which are compared where there is no truth."""
-    left_out: Sequence[str] = ()
-    """Variants whose layers had no room."""
     titles: Sequence[str] = tuple(SHORT)
     """The rates, or without truth the signs of doubt, of which each variant has a column."""
 
@@ -242,8 +239,6 @@ class FrameBrowser(Block):
             told.append("Percent.")
         if 0 < len(self.strips) < len(self.rows):
             told.append(f"{len(self.strips)} of {of} frames have their pictures on this page.")
-        if self.left_out:
-            told.append(f"To keep it small, the layers of {listing(self.left_out)} are left out.")
         return " ".join(told)
 
 
@@ -271,8 +266,8 @@ def strip(
     )
 
 
-def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
-    yield PictureRow("", [_picture(image, image.title, LARGE_ON_PAGE) for image in frame.images])
+def _rows(frame: NotableFrame, layers: int) -> Iterator[list[Picture]]:
+    yield [_picture(image, image.title, LARGE_ON_PAGE) for image in frame.images]
     for row in frame.layers:
         variant = row[0].title.partition(":")[0] if row else ""
         names = [
@@ -280,11 +275,10 @@ def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
         ]
         # Without truth the last mask is what is looked at.
         last = row[-1] if row and not frame.rates else None
-        pictures = [
+        yield [
             _picture(image, name, LARGE_ON_PAGE if image is last else layers)
             for name, image in zip(names, row, strict=True)
         ]
-        yield PictureRow(variant, pictures)
 
 
 def _picture(image: LayerImage, name: str, width: int) -> Picture:

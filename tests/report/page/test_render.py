@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -19,9 +20,7 @@ from roadeval.report.blocks import (
     ImageGrid,
     KeepTogether,
     LinkList,
-    LongTable,
     Picture,
-    PictureRow,
     Strip,
     Table,
     TableOfContents,
@@ -42,7 +41,7 @@ MARKS = Chart("ERR", ChartKind.MARKS, CHART.series, names=[HOSTILE, "b"], share=
 def every_block(text):
     """One of each kind of block, with a text wherever one has room."""
     table = Table([text, "n"], [[Cell(text, dot="#0072B2"), text], ["", "1"]], caption=text)
-    strip = Strip(7, [text], table, [PictureRow(text, [Picture(text, text, JPEG)])], text)
+    strip = Strip(7, [text], table, [[Picture(text, text, JPEG)]], text)
     row = FrameRow(7, 0, {text: {"ERR": 0.01}}, [text], [text])
     return [
         Heading(text),
@@ -52,7 +51,7 @@ def every_block(text):
         Command(text),
         BulletList(text, [text], "warning"),
         table,
-        LongTable(table, text),
+        replace(table, find=text),
         Figure([CHART, MARKS], text),
         ImageGrid([(text, JPEG)], 4, skip=1, caption=text),
         Details(text, [Text(text)]),
@@ -60,7 +59,7 @@ def every_block(text):
         TwoColumns([Text(text)], [Text(text)]),
         LinkList([(text, "0/")]),
         TableOfContents(),
-        FrameBrowser([row], [text], [CHART], text.format, strips=[strip], left_out=[text]),
+        FrameBrowser([row], [text], [CHART], text.format, strips=[strip]),
     ]
 
 
@@ -92,7 +91,7 @@ def test_every_kind_of_block_is_drawn():
     known = {
         each.__name__ for each in Block.__subclasses__() if each.__module__.startswith("roadeval")
     }
-    parts = {"Document", "Cell", "Strip", "Picture", "PictureRow"}
+    parts = {"Document", "Cell", "Strip", "Picture"}
     assert known - kinds == parts
     assert rendered(*every_block("word"))
 
