@@ -188,36 +188,42 @@ def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
     )
 
 
-def thresholds_table(curves: Totals, totals: Totals) -> Table:
-    """Tabulate areas, MaxF and calibration beside the rates of the mask as it is."""
+def thresholds_table(curves: Totals, totals: Totals, *, brief: bool = False) -> Table:
+    """Tabulate areas, MaxF and calibration beside the rates of the mask as it is.
+
+    A ``brief`` table has no precision and recall.
+    """
     rows: list[list[Cell | str]] = []
     for variant, stages in curves.items():
         for stage, own in stages.items():
             total = totals[variant][stage]
             mask = score.overlap(total)
+            best = [percent(own[name]) for name in ("threshold", "precision", "recall")]
+            now = [percent(mask["F1"]), percent(mask["precision"]), percent(total["pooled_TPR"])]
             rows.append(
                 [
                     variant_cell(variant, [*totals]),
                     stage,
                     *(percent(own[name]) for name in ("AP", "AUC", "ECE")),
                     Cell(percent(own["MaxF"]), bold=True),
-                    *(percent(own[name]) for name in ("threshold", "precision", "recall")),
-                    *(percent(mask[name]) for name in ("F1", "precision")),
-                    percent(total["pooled_TPR"]),
+                    *(best[:1] if brief else best),
+                    *(now[:1] if brief else now),
                 ]
             )
+    both = [] if brief else ["precision", "recall"]
+    best_of, now_of = ["MaxF", "threshold", *both], ["F1", *both]
     return Table(
-        [
-            *("variant", "stage", "AP", "AUC", "ECE", "MaxF", "threshold"),
-            *("precision", "recall", "F1", "precision", "recall"),
-        ],
+        ["variant", "stage", "AP", "AUC", "ECE", *best_of, *now_of],
         rows,
         text_columns=(0, 1),
         groups=[
             *(("", 2), ("over all thresholds", 3)),
-            *(("at the best threshold", 4), ("the mask as it is", 3)),
+            *(("at the best threshold", len(best_of)), ("the mask as it is", len(now_of))),
         ],
-        caption="Percent.",
+        caption="Percent. Of road's probability: areas below curves over all thresholds, error of "
+        "calibration, the best F1 with its threshold, and F1 of the mask as it is."
+        if brief
+        else "Percent.",
         small=True,
     )
 

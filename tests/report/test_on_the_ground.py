@@ -25,6 +25,9 @@ def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
     assert [plain(cell) for cell in first[1:3]] == ["10.0", f"{UNSURE}10.0"]
     assert plain(ranges[1]) == "8.0\N{EN DASH}11.0"
     assert [plain(cell) for cell in second[1:3]] == ["13.0", "11.0"]
+    brief = distance_table(rows, NAMES, brief=True)
+    assert brief.columns == ["ERR, %", "0\N{EN DASH}10 m", "by area"]
+    assert [plain(cell) for cell in brief.rows[0][1:]] == ["10.0", f"{UNSURE}10.0"]
 
 
 def test_an_edge_that_a_wrong_camera_could_explain_is_marked():

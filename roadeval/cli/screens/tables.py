@@ -44,7 +44,7 @@ def show_table(table: Table, out: Console) -> None:
     from rich.table import Table as Grid
 
     if table.caption:
-        out.print(table.caption)
+        out.print(ascii_of(table.caption))
     columns = [_texts(table, place) for place in range(len(table.columns))]
     for number, part in enumerate(_parts(table, columns, out.width)):
         if number:
@@ -54,7 +54,7 @@ def show_table(table: Table, out: Console) -> None:
             if place in table.text_columns:
                 grid.add_column(table.columns[place], overflow="fold")
             else:
-                grid.add_column(table.columns[place], justify="right", no_wrap=True)
+                grid.add_column(ascii_of(table.columns[place]), justify="right", no_wrap=True)
         for line, row in enumerate(table.rows):
             cells = {place: out.render_str(columns[place][line]) for place in part}
             for place, text in cells.items():

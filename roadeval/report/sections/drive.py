@@ -147,7 +147,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     table = Table(
         [
             *("final mask", "flicker, %", "the truth's, %", "beyond it, pp", "pairs"),
-            *("number", "seconds", "longest", "share, %", "recovered", "median recovery"),
+            *("n", "seconds", "longest", "share, %", "recovered", "median recovery"),
         ],
         [
             [

@@ -18,6 +18,8 @@ METRES: Final = "metres: "
 """Begins the sentence on how the camera is known."""
 UNSURE: Final = "\N{ALMOST EQUAL TO}"
 """Before a number that a wrong camera could explain."""
+KITTI: Final = (("MaxF", "F1"), ("AP", ""), ("precision",) * 2, ("recall",) * 2)
+"""What KITTI's benchmark measures, and of a mask without probabilities."""
 Row = dict[str, Any]
 
 
@@ -58,10 +60,11 @@ def _note(rows: Sequence[Row]) -> str:
     return told
 
 
-def distance_table(rows: Sequence[Row], names: Sequence[str]) -> Table:
+def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = False) -> Table:
     """Tabulate ERR by distance and by area of ground, and what KITTI's benchmark measures there.
 
     Below each variant's row stands the range of a camera that stands otherwise, where it is known.
+    A ``brief`` table has ERR alone.
     """
     errors = [row for row in rows if row["measure"] == "ERR"]
     places = list(dict.fromkeys(row["where"] for row in errors))
@@ -81,21 +84,24 @@ def distance_table(rows: Sequence[Row], names: Sequence[str]) -> Table:
             for row, effect in zip(own, effects, strict=True)
         ]
         cells = [f"{m}{percent(row['value'], 1)}" for m, row in zip(marks, own, strict=True)]
-        for most, plain in (("MaxF", "F1"), ("AP", ""), ("precision",) * 2, ("recall",) * 2):
+        for most, plain in () if brief else KITTI:
             row = found.get((variant, most, ABOVE)) or found.get((variant, plain, ABOVE), {})
             cells.append(percent(row.get("value"), 1))
         lines.append([variant_cell(variant, names), *cells])
         if defined(own[0]["low"]):
             ranges = [f"{percent(r['low'], 1)}{DASH}{percent(r['high'], 1)}" for r in own]
-            lines.append(["as the camera stands", *ranges, *[""] * 4])
+            lines.append(["as the camera stands", *ranges, *[""] * (0 if brief else len(KITTI))])
     heads = [charts.in_metres(each) for each in places if each != ABOVE]
+    caption = "Errors by distance, and on the ground seen from above, where each square metre "
     return Table(
-        ["ERR, %", *heads, "by area", "MaxF", "AP", "prec.", "rec."],
+        ["ERR, %", *heads, "by area", *([] if brief else ["MaxF", "AP", "prec.", "rec."])],
         lines,
         breaks=breaks[1:],
-        groups=[("", 1), ("ahead", len(heads)), ("seen from above, %", 5)],
-        caption="Errors by distance, and on the ground seen from above, where each square metre "
-        "counts once; MaxF of a mask without probabilities is its F1.",
+        groups=[("", 1), ("ahead", len(heads)), ("seen from above, %", 1 if brief else 5)],
+        caption=f"{caption}counts once. {UNSURE}: a camera that stands a little otherwise could "
+        f"explain the difference from {first}."
+        if brief
+        else f"{caption}counts once; MaxF of a mask without probabilities is its F1.",
         small=True,
     )
 
