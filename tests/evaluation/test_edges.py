@@ -161,6 +161,12 @@ def in_rim(labels, truth, row, column):
     return any(truth[place] != IGNORE and labels[place] == 0 for place in around)
 
 
+def test_boundary_iou_is_undefined_without_road():
+    truth = pixels("..?.", "....")
+    assert math.isnan(rims_overlap(pixels("..#.", "...."), truth))
+    assert rims_overlap(pixels("#...", "...."), truth) == 0
+
+
 def test_an_edge_is_scikit_images_inner_boundary():
     truth, _ = wavy(3, ignored=False)
     inner = find_boundaries(truth, connectivity=2, mode="inner", background=0)

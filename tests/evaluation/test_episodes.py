@@ -68,5 +68,7 @@ def test_equals_a_search_from_each_first_frame(frames):
     own = episodes(stamps, np.where(bad, 0.5, 0.0), 0.15)
     assert (own["episodes"], own["recovered"]) == (len(times), len(recovered))
     assert own["seconds"] == pytest.approx(sum(times) / SECOND)
+    if known := sum(steps[steps <= gap]):
+        assert own["share"] == pytest.approx(sum(times) / known)
     assert own["longest"] == max(times, default=0) / SECOND
     assert own["recovery"] == (np.median(recovered) / SECOND if recovered else None)

@@ -92,19 +92,6 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
 OF = "street,/camera/image,"
 
 
-def test_lines_by_hand(tmp_path: Path) -> None:
-    write(tmp_path)
-    line = (tmp_path / "frames.csv").read_text().splitlines()[1]
-    rates = "0.7142857142857143,0.2857142857142857,0.75,0.25,0.6666666666666666,0.3333333333333333"
-    assert line == f"{OF}5,500000000,500000007,filtered,post,3,2,1,1,7,{rates}"
-    line = (tmp_path / "oracles.csv").read_text().splitlines()[1]
-    assert line == f"{OF}5,filtered,svm,post,3,2,1,1,7,{rates}"
-    line = (tmp_path / "regions.csv").read_text().splitlines()[1]
-    assert line == f"{OF}5,filtered,post,shadow,3,0,1,0,4"
-    lines = (tmp_path / "probabilities.csv").read_text().splitlines()[1:]
-    assert lines == [f"{OF}filtered,post,0,2,9,6", f"{OF}filtered,post,156,5,7,6"]
-
-
 def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path: Path) -> None:
     write(tmp_path)
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
@@ -163,27 +150,6 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
     assert ResultsFolder(tmp_path).table("oracles").empty
 
 
-def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -> None:
-    write(tmp_path)
-    regions = ResultsFolder(tmp_path).table("regions")
-    assert len(regions) == 3 * 2 * 11
-    assert set(regions["region"]) == {
-        *("shadow", "boundary", "interior", "band_0", "band_1"),
-        *("0-10m", "10-20m", "20-40m", "40-80m", "no_ground", "from_above"),
-    }
-    whole = ResultsFolder(tmp_path).table("frames")
-    bands = regions[regions["region"].str.startswith("band_")]
-    summed = bands.groupby(["frame", "variant"])["FP"].sum().to_dict()
-    assert summed == whole.groupby(["frame", "variant"])["FP"].sum().to_dict()
-
-
-def test_lines_end_alike_everywhere(tmp_path: Path) -> None:
-    for path in write(tmp_path):
-        content = path.read_bytes()
-        assert b"\r" not in content
-        assert content.endswith(b"\n")
-
-
 def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
     board = a_board()
     with ResultsWriter(tmp_path / "new") as writer:
@@ -198,12 +164,15 @@ def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
     assert names(tmp_path / "new") == written
 
 
-def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
+@pytest.mark.parametrize("finished", [False, True])
+def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path, *, finished: bool) -> None:
     write(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     board = a_board()
     with suppress(KeyboardInterrupt), ResultsWriter(tmp_path) as writer:
         writer.append(lines(next(scored(board))))
+        if finished:
+            writer.finish(the_rest(board), RUN_TOML)
         raise KeyboardInterrupt
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -238,17 +207,6 @@ def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: A
     write(tmp_path / "results")
     assert {"n", "a"} < names(tmp_path / "results")
     assert names(tmp_path) == {"results", "notes.txt"}
-
-
-def test_a_run_that_fails_after_its_last_file_leaves_the_earlier_results(tmp_path: Path) -> None:
-    write(tmp_path)
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    board = a_board()
-    with suppress(KeyboardInterrupt), ResultsWriter(tmp_path) as writer:
-        writer.append(lines(next(scored(board))))
-        writer.finish(the_rest(board), RUN_TOML)
-        raise KeyboardInterrupt
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from roadeval.results.sentences import (
     account,
     correction,
     degree,
+    levels,
     notes,
     notes_of,
     sentence,
@@ -110,6 +111,11 @@ def test_what_does_not_stand_after_correction_is_only_probable_and_the_family_is
     assert told.endswith("from 7.1 to 11.0 pp higher (corrected for 5 comparisons).")
     alone = replace(HARM, p_holm=0.001, comparisons=1)
     assert "corrected" not in sentence(alone, "the filter", "ERR", SETTINGS)
+
+
+def test_rates_of_other_frames_than_the_difference_are_not_given():
+    assert levels(HARM, {"ERR": 0.062}, {"ERR": 0.154}) == (0.062, 0.154)
+    assert levels(HARM, {"ERR": 0.062}, {"ERR": 0.2}) is None
 
 
 def test_what_is_negligible_is_a_setting():
