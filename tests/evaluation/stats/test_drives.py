@@ -187,6 +187,17 @@ def test_the_interval_ends_at_ordered_means_of_subsets(count):
     assert sign_flip_interval(of, 0.95) == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.parametrize("confidence", [0.9, 0.95, 0.99])
+def test_the_sign_flip_interval_leaves_out_0_exactly_where_the_p_value_is_small(confidence):
+    rng, apart = np.random.default_rng(6), 0
+    for _ in range(40):
+        of = rng.integers(-4, 8, rng.integers(8, 12)) / 10
+        low, high = sign_flip_interval(of, confidence)
+        assert (low > 0 or high < 0) == (sign_flip_p(of) < 1 - confidence)
+        apart += low > 0
+    assert 0 < apart < 40
+
+
 def test_every_mean_in_the_interval_is_accepted_and_none_outside():
     low, high = sign_flip_interval(NORMAL, 0.95)
     width = high - low

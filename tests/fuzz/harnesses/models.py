@@ -6,8 +6,6 @@ import io
 import zipfile
 from functools import cache
 
-import numpy as np
-
 from roadeval.config import configure
 from roadeval.training import TrainingSettings, fit, save_model
 from roadeval.training.learning import from_file
@@ -38,8 +36,7 @@ def wanted():
 def sound() -> bytes:
     """Return a sound model file."""
     path = scratch() / "sound.model"
-    prior = np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
-    save_model(fit([frame(n) for n in range(3)], wanted(), TrainingSettings(), prior), path)
+    save_model(fit([frame(n) for n in range(3)], wanted(), TrainingSettings()), path)
     return path.read_bytes()
 
 
