@@ -19,35 +19,30 @@ if TYPE_CHECKING:
     from roadeval.logs import LogConfig
     from roadeval.report.pdf.typeset import Paper
 
-Drive = Annotated[
-    str,
-    typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP), or its URL."),
-]
-Result = Annotated[
-    Path,
-    typer.Argument(
-        metavar="RESULT",
-        show_default=False,
-        help="A recording (.rrd), or a results folder.",
-        readable=False,
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print the result on stdout as JSON.")]
-Quiet = Annotated[
-    bool, typer.Option("-q", "--quiet", help="No progress and no table; warnings stay.")
-]
 
+def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
+    """Return an option with its help; whoever opens a file says what is wrong with it."""
+    return typer.Option(*flags.split(), help=text, metavar=metavar, readable=False, **more)
+
+
+def argument(metavar: str, text: str) -> Any:
+    """Return an argument with its help."""
+    return typer.Argument(metavar=metavar, help=text, show_default=False, readable=False)
+
+
+Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
+Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
+Json = Annotated[bool, option("--json", "Print the result on stdout as JSON.")]
+Quiet = Annotated[bool, option("-q --quiet", "No progress and no table; warnings stay.")]
 TrustSources = Annotated[
     bool,
-    typer.Option(
+    option(
         "--trust-sources",
-        help="Of a fleet: read logs, masks, networks and recordings from places that its folder "
-        "names, files and URLs alike. Without it nothing outside the folder is read.",
+        "Of a fleet: read logs, masks, networks and recordings from places that its folder names, "
+        "files and URLs alike. Without it nothing outside the folder is read.",
     ),
 ]
-PaperSize = Annotated[
-    str, typer.Option("--paper", metavar="a4|letter", show_default=False, help="Default: a4.")
-]
+PaperSize = Annotated[str, option("--paper", "Default: a4.", "a4|letter", show_default=False)]
 
 
 def paper_of(size: str) -> Paper:
@@ -79,12 +74,12 @@ def _condition(texts: list[str] | None) -> list[str] | None:
 
 Conditions = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
         "--fail-if",
-        metavar="CONDITION",
+        "As 'post.filtered.ERR > +0.5pp' (change; with 'surely' at the end: its whole interval) or "
+        "'> 20%' (level). Repeatable.",
+        "CONDITION",
         callback=_condition,
-        help="As 'post.filtered.ERR > +0.5pp' (change; with 'surely' at the end: its whole "
-        "interval) or '> 20%' (level). Repeatable.",
     ),
 ]
 
@@ -188,10 +183,7 @@ def _cameras(given: Given) -> dict[str, Any]:
     return {"cameras": [], "topics": {**own, "image": topics[0]}} if topics else {}
 
 
-Camera = Annotated[
-    str | None,
-    typer.Option("--camera", metavar="NAME", help="Of several cameras: this one alone."),
-]
+Camera = Annotated[str | None, option("--camera", "Of several cameras: this one alone.", "NAME")]
 
 
 def of_camera(result: Result_, name: str | None) -> Result_:

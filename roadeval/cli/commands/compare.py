@@ -20,42 +20,32 @@ def _ending(paths: list[Path] | None) -> list[Path] | None:
 
 Results = Annotated[
     list[Path],
-    typer.Argument(
-        metavar="BASE NEW...",
-        show_default=False,
-        help="Recordings, results folders or fleets; of a single one its variants are compared.",
-        readable=False,
+    arguments.argument(
+        "BASE NEW...",
+        "Recordings, results folders or fleets; of a single one its variants are compared.",
     ),
 ]
 Variants = Annotated[
     list[str] | None,
-    typer.Option(
+    arguments.option(
         "--variant",
-        metavar="NAME|BASE'S=NEW'S",
-        help="Only this one; of a single result the first is the base. Of several, a variant of "
-        "the base may be held against another: a=b. Repeatable.",
+        "Only this one; of a single result the first is the base. Of several, a variant of the "
+        "base may be held against another: a=b. Repeatable.",
+        "NAME|BASE'S=NEW'S",
     ),
 ]
 Outputs = Annotated[
     list[Path] | None,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="FILE",
+    arguments.option(
+        "-o --output",
+        "Write it as .pdf, .html, .md or .json, by the ending. Repeatable.",
+        "FILE",
         callback=_ending,
-        help="Write it as .pdf, .html, .md or .json, by the ending. Repeatable.",
-        readable=False,
     ),
 ]
-
 Junit = Annotated[
     Path | None,
-    typer.Option(
-        "--junit",
-        metavar="FILE",
-        help="Write a case for each condition as JUnit's XML, for CI.",
-        readable=False,
-    ),
+    arguments.option("--junit", "Write a case for each condition as JUnit's XML, for CI.", "FILE"),
 ]
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from roadeval.cli import arguments, console
 from roadeval.cli.exit_codes import ExitCode
 
@@ -15,10 +13,7 @@ DEFAULT: Final = Path("recordings", "demo.mcap")
 
 def demo(
     output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.", readable=False
-        ),
+        Path, arguments.option("-o --output", "Where the log lands.", "DRIVE.mcap")
     ] = DEFAULT,
     quiet: arguments.Quiet = False,
 ) -> int:

@@ -5,19 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import Given, takes
 
 Drives = Annotated[
     list[str],
-    typer.Argument(
-        metavar="DRIVE...",
-        show_default=False,
-        help="Logs, rosbag2 folders, folders to search, patterns, URLs, or manifests (.toml, "
-        ".csv).",
+    arguments.argument(
+        "DRIVE...",
+        "Logs, rosbag2 folders, folders to search, patterns, URLs, or manifests (.toml, .csv).",
     ),
 ]
 
@@ -33,18 +29,16 @@ def fleet(
     *,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FOLDER",
-            help="Where all results land; what is done there already is not done again.",
-            readable=False,
+        arguments.option(
+            "-o --output",
+            "Where all results land; what is done there already is not done again.",
+            "FOLDER",
         ),
     ],
     given: Given,
     fail_if: arguments.Conditions = None,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Try drives again that failed before.")
+        bool, arguments.option("--retry-failed", "Try drives again that failed before.")
     ] = False,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,

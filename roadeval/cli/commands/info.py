@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-import typer
-
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
 
@@ -16,7 +14,7 @@ def info(
     *,
     given: Given,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Read the whole log, so that all damage is found.")
+        bool, arguments.option("--verify", "Read the whole log, so that all damage is found.")
     ] = False,
     json: arguments.Json = False,
 ) -> int:

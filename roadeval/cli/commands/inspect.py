@@ -14,42 +14,33 @@ from roadeval.cli.exit_codes import ExitCode
 if TYPE_CHECKING:
     from roadeval.jobs.results.result import Result
 
-Listed = Annotated[bool, typer.Option("--list", help="Print the worst frames with reasons.")]
-Frame = Annotated[int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")]
+Results = Annotated[
+    Path, arguments.argument("RESULT", "A recording (.rrd), a results folder, or a fleet's folder.")
+]
+Listed = Annotated[bool, arguments.option("--list", "Print the worst frames with reasons.")]
+Frame = Annotated[int | None, arguments.option("--frame", "Open at frame N.", "N", min=0)]
 Rank = Annotated[
-    int | None, typer.Option("--worst", metavar="K", min=1, help="Open at the K-th worst frame.")
+    int | None, arguments.option("--worst", "Open at the K-th worst frame.", "K", min=1)
 ]
 Variant = Annotated[
     str | None,
-    typer.Option(
-        "--variant", metavar="NAME", help="Whose failures count. Default: the first variant's."
-    ),
+    arguments.option("--variant", "Whose failures count. Default: the first variant's.", "NAME"),
 ]
 Drive = Annotated[
-    str | None,
-    typer.Option("--drive", metavar="ID", help="Of a fleet: open this drive, at --frame."),
+    str | None, arguments.option("--drive", "Of a fleet: open this drive, at --frame.", "ID")
 ]
 Screenshot = Annotated[
     Path | None,
-    typer.Option(
+    arguments.option(
         "--screenshot",
-        metavar="FILE.png",
-        help="No window: draw it into a file instead. Without a frame, the worst pictured.",
-        readable=False,
+        "No window: draw it into a file instead. Without a frame, the worst pictured.",
+        "FILE.png",
     ),
 ]
 
 
 def inspect(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RESULT",
-            show_default=False,
-            help="A recording (.rrd), a results folder, or a fleet's folder.",
-            readable=False,
-        ),
-    ],
+    recording: Results,
     *,
     listed: Listed = False,
     frame: Frame = None,

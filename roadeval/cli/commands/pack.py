@@ -5,41 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 
 def pack(
-    images: Annotated[
-        Path,
-        typer.Argument(
-            metavar="IMAGES",
-            show_default=False,
-            help="A folder of images, or a video file.",
-            readable=False,
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.", readable=False
-        ),
-    ],
+    images: Annotated[Path, arguments.argument("IMAGES", "A folder of images, or a video file.")],
+    output: Annotated[Path, arguments.option("-o --output", "Where the log lands.", "DRIVE.mcap")],
     *,
     truth: Annotated[
-        Path | None,
-        typer.Option(
-            "--truth", metavar="MASKS", help="A folder of masks, paired by name.", readable=False
-        ),
+        Path | None, arguments.option("--truth", "A folder of masks, paired by name.", "MASKS")
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(
+        arguments.option(
             "--rate",
-            metavar="HZ",
-            help="Images a second. Default: the times in the names, a video's own, or 10.",
+            "Images a second. Default: the times in the names, a video's own, or 10.",
+            "HZ",
         ),
     ] = None,
     quiet: arguments.Quiet = False,

@@ -22,24 +22,22 @@ def report(
     *,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.pdf|FILE.html",
-            callback=_ending,
-            help="A page to browse where it ends in .html. Default: reports/<recording>.pdf, or "
+        arguments.option(
+            "-o --output",
+            "A page to browse where it ends in .html. Default: reports/<recording>.pdf, or "
             "report.pdf in the folder given.",
-            readable=False,
+            "FILE.pdf|FILE.html",
+            callback=_ending,
         ),
     ] = None,
     paper: arguments.PaperSize = "a4",
     pictures: Annotated[
         int | None,
-        typer.Option(
+        arguments.option(
             "--pictures",
-            metavar="N",
+            "Of a page: frames with pictures. Default: as many as keep it below 10 MB.",
+            "N",
             min=0,
-            help="Of a page: frames with pictures. Default: as many as keep it below 10 MB.",
         ),
     ] = None,
     camera: arguments.Camera = None,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
@@ -14,12 +12,7 @@ from roadeval.cli.exit_codes import ExitCode
 def serve(
     results: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="RESULT...",
-            show_default=False,
-            help="Recordings (.rrd), results folders, or fleets' folders.",
-            readable=False,
-        ),
+        arguments.argument("RESULT...", "Recordings (.rrd), results folders, or fleets' folders."),
     ],
     *,
     trust_sources: arguments.TrustSources = False,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
 
@@ -20,18 +18,10 @@ from roadeval.cli.options import Given, takes
 )
 def train(
     paths: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="DRIVE", help="Camera logs (MCAP), mostly with truth.", readable=False
-        ),
+        list[Path], arguments.argument("DRIVE", "Camera logs (MCAP), mostly with truth.")
     ],
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="MODEL", help="Where the model lands.", readable=False
-        ),
-    ],
+    output: Annotated[Path, arguments.option("-o --output", "Where the model lands.", "MODEL")],
     given: Given,
     quiet: arguments.Quiet = False,
 ) -> int:
