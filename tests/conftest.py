@@ -1,5 +1,6 @@
 """What every room's tests share: where they begin, examples without a deadline, and the loops."""
 
+import gc
 import os
 from collections.abc import Iterator
 from contextlib import chdir
@@ -24,6 +25,15 @@ if find_spec("roadeval.kernels._loops") is None:
 
 # On GitHub the comparisons of the tests would stand on the page of the job.
 os.environ.pop("GITHUB_STEP_SUMMARY", None)
+
+
+# What is imported and collected stays to the end: nothing of it is searched for again and again.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
