@@ -29,28 +29,25 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
         what, rule = "without truth, frames to look at", "one a scene; a rank, and no error rate"
     out.print(f"{name}: {what} of {mask} ({rule})")
     out.print()
-    rates = [*found[0].rates]
-    titles = ["frame", *(f"{rate} %" for rate in rates)]
-    cells = [[str(each.frame), *(percent(each.rates[r]) for r in rates)] for each in found]
-    if of_fleet:
-        rows = [
-            [str(each.rank), each.drive, *own, *_light(each)]
-            for each, own in zip(found, cells, strict=True)
+    rates, rig = [*found[0].rates], any(each.camera for each in found)
+    names = short_names([*dict.fromkeys(each.camera for each in found)])
+    whose = ["drive"] if of_fleet else ["camera"] if rig else []
+    more = ["bright %", "shade %", "sun", "kept"] if of_fleet else ["why"] if scored else []
+    rows = [
+        [
+            str(each.rank),
+            *([each.drive if of_fleet else names[each.camera]] if whose else []),
+            str(each.frame),
+            *(percent(each.rates[rate]) for rate in rates),
+            *(_light(each) if of_fleet else [_why(each)] if scored else []),
         ]
-        titles = ["", "drive", *titles, "bright %", "shade %", "sun", "kept"]
-        show_table(Table(titles, rows, text_columns=(0, 1)), out)
-    else:
-        rig = any(each.camera for each in found)
-        names = short_names([*{each.camera: None for each in found}])
-        rows = [
-            [str(e.rank), *([names[e.camera]] if rig else []), *own, *([_why(e)] if scored else [])]
-            for e, own in zip(found, cells, strict=True)
-        ]
-        titles = ["", *(["camera"] if rig else []), *titles, *(["why"] if scored else [])]
-        words = [*([1] if rig else []), *([len(titles) - 1] if scored else [])]
-        show_table(
-            Table(titles, rows, text_columns=words, breaks=range(1, len(rows) * scored)), out
-        )
+        for each in found
+    ]
+    titles = ["", *whose, "frame", *(f"{rate} %" for rate in rates), *more]
+    words = [p for p, title in enumerate(titles) if title in ("drive", "camera", "why")]
+    words = [0, *words] if of_fleet else words
+    breaks = range(1, len(rows)) if more == ["why"] else ()
+    show_table(Table(titles, rows, text_columns=words, breaks=breaks), out)
     if of_fleet and not all(each.recording for each in found):
         out.print()
         out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")
