@@ -73,11 +73,12 @@ def estimate(
 
     The drawn frames' mean is moved by how far their mean score is from that of all (a regression
     estimator [1]_, section 7); its variance is that of the residuals, each divided by one minus its
-    leverage as the jackknife does. The draw is stratified along the drive, so its chance lies in
-    how neighbours among the drawn frames differ ([2]_, section 8.2, v2). The more of all frames are
-    drawn, the less evenly their gaps lie: of the variance of a simple random sample as large a
-    share is added. With fewer than `REGRESSION_FROM` labels it is the plain mean. The interval is
-    Student's of the logarithm: error rates are skewed to the right.
+    leverage as the jackknife does. The draw is stratified along the drive, so the variance is taken
+    from the differences between neighbours among the drawn frames ([2]_, section 8.2, v2). The more
+    of all frames are drawn, the less even are their gaps; so the variance of a simple random sample
+    is added, times the share that is drawn. With fewer than `REGRESSION_FROM` labels the estimate
+    is the plain mean. The interval is Student's of the logarithm: error rates are skewed to the
+    right.
 
     Parameters
     ----------
