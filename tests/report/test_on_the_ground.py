@@ -51,3 +51,5 @@ def test_nothing_is_marked_where_no_other_camera_was_counted():
     rows = [row("filtered", *measure, 0.1, math.nan) for measure in measures]
     edges, free = edges_tables(rows, NAMES)
     assert plain(edges.rows[0][2]) == plain(free.rows[0][1]) == "+0.10"
+    errors = [row(name, "ERR", "0-10m", 0.1, math.nan) for name in NAMES]
+    assert [plain(line[1]) for line in distance_table(errors, NAMES).rows] == ["10.0", "10.0"]

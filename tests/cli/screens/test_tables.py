@@ -55,3 +55,11 @@ def test_numbers_are_ascii_alone():
         ["a", "-2.00", "to", "-1.00", "*"],
         ["b", "-"],
     ]
+
+
+def test_heads_and_captions_are_ascii_as_numbers_are():
+    out = Console(file=io.StringIO(), width=60)
+    titles = ["mask", f"0{DASH}10 m"]
+    show_table(Table(titles, [["a", "1.0"]], caption=f"0{DASH}10 m ahead"), out)
+    assert "0-10 m" in out.file.getvalue()
+    assert DASH not in out.file.getvalue()

@@ -99,7 +99,12 @@ def transforms(tree: list[Parts]) -> dict[str, Any]:
     }
 
 
-def ros2(path: Path, infos: dict[str, dict[str, Any]], tree: list[Parts] = TREE) -> Path:
+def ros2(
+    path: Path,
+    infos: dict[str, dict[str, Any]],
+    tree: list[Parts] = TREE,
+    clouds: tuple[str, ...] = (),
+) -> Path:
     """A log of ROS 2 with one camera on /front/image/compressed."""
     with path.open("wb") as file:
         writer = Ros2Writer(file)
@@ -112,6 +117,9 @@ def ros2(path: Path, infos: dict[str, dict[str, Any]], tree: list[Parts] = TREE)
         add("/tf_static", "tf2_msgs/msg/TFMessage", transforms(tree))
         for topic, message in infos.items():
             add(topic, "sensor_msgs/msg/CameraInfo", message)
+        for topic in clouds:
+            points = writer.register_msgdef("sensor_msgs/msg/PointCloud2", "uint8[] data\n")
+            writer.write_message(topic, points, {"data": b""}, log_time=5 * 10**9 + 7)
         picture = {"header": header("cam"), "format": "jpeg", "data": image()}
         add("/front/image/compressed", "sensor_msgs/msg/CompressedImage", picture)
         writer.finish()
