@@ -28,6 +28,7 @@ def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
     brief = distance_table(rows, NAMES, brief=True)
     assert brief.columns == ["ERR, %", "0\N{EN DASH}10 m", "by area"]
     assert [plain(cell) for cell in brief.rows[0][1:]] == ["10.0", f"{UNSURE}10.0"]
+    assert f"{UNSURE}: a camera that stands" in brief.caption
 
 
 def test_an_edge_that_a_wrong_camera_could_explain_is_marked():
@@ -52,4 +53,6 @@ def test_nothing_is_marked_where_no_other_camera_was_counted():
     edges, free = edges_tables(rows, NAMES)
     assert plain(edges.rows[0][2]) == plain(free.rows[0][1]) == "+0.10"
     errors = [row(name, "ERR", "0-10m", 0.1, math.nan) for name in NAMES]
-    assert [plain(line[1]) for line in distance_table(errors, NAMES).rows] == ["10.0", "10.0"]
+    table = distance_table(errors, NAMES, brief=True)
+    assert [plain(line[1]) for line in table.rows] == ["10.0", "10.0"]
+    assert UNSURE not in table.caption

@@ -44,7 +44,8 @@ class Outcome:
     log: str
     """Where the log lies."""
     config: Path
-    """What repeats its replay: the recording, or the configuration of a log replayed here."""
+    """The file for ``--config`` that repeats its replay: the recording, or ``run.toml`` beside the
+    picks of a log that was replayed here."""
 
     @property
     def added(self) -> list[Picked]:
@@ -149,14 +150,14 @@ class _Wanted:
     """The options of `pick` for one drive: its share of the frames, and its folder."""
 
     source: Path
-    """What was named, a log or a recording."""
+    """The log or the recording that was named."""
     count: int
     folder: Path
     labels: str
     variant: str | None
     seed: int
     run: str | None
-    """What repeats the replay of a log that was replayed here, as TOML."""
+    """The configuration as TOML, of a log that was replayed here; None of a recording."""
 
 
 def _drive(source: Path) -> DriveResult:

@@ -19,7 +19,7 @@ METRES: Final = "metres: "
 UNSURE: Final = "\N{ALMOST EQUAL TO}"
 """Before a number that a wrong camera could explain."""
 KITTI: Final = (("MaxF", "F1"), ("AP", ""), ("precision",) * 2, ("recall",) * 2)
-"""What KITTI's benchmark measures, and of a mask without probabilities."""
+"""Measures of KITTI's benchmark, each with its counterpart of a mask without probabilities."""
 Row = dict[str, Any]
 
 
@@ -92,16 +92,22 @@ def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = F
             ranges = [f"{percent(r['low'], 1)}{DASH}{percent(r['high'], 1)}" for r in own]
             lines.append(["as the camera stands", *ranges, *[""] * (0 if brief else len(KITTI))])
     heads = [charts.in_metres(each) for each in places if each != ABOVE]
-    caption = "Errors by distance, and on the ground seen from above, where each square metre "
+    caption = (
+        "Errors by distance, and on the ground seen from above, where each square metre counts "
+    )
+    if not brief:
+        caption += "once; MaxF of a mask without probabilities is its F1."
+    elif posed:
+        caption += f"once. {UNSURE}: a camera that stands a little otherwise could explain the "
+        caption += f"difference from {first}."
+    else:
+        caption += "once."
     return Table(
         ["ERR, %", *heads, "by area", *([] if brief else ["MaxF", "AP", "prec.", "rec."])],
         lines,
         breaks=breaks[1:],
         groups=[("", 1), ("ahead", len(heads)), ("seen from above, %", 1 if brief else 5)],
-        caption=f"{caption}counts once. {UNSURE}: a camera that stands a little otherwise could "
-        f"explain the difference from {first}."
-        if brief
-        else f"{caption}counts once; MaxF of a mask without probabilities is its F1.",
+        caption=caption,
         small=True,
     )
 
