@@ -71,8 +71,10 @@ def listening(process):
         for task in Path(f"/proc/{each}/task").iterdir():
             with suppress(FileNotFoundError):  # a thread that has ended
                 processes += map(int, (task / "children").read_text().split())
-        links = [str(each.readlink()) for each in Path(f"/proc/{each}/fd").iterdir()]
-        sockets |= {link[8:-1] for link in links if link.startswith("socket:[")}
+        for descriptor in Path(f"/proc/{each}/fd").iterdir():
+            with suppress(FileNotFoundError):  # a file that was closed meanwhile
+                link = str(descriptor.readlink())
+                sockets |= {link[8:-1]} if link.startswith("socket:[") else set()
     rows = [
         row.split()
         for family in ("tcp", "tcp6")
