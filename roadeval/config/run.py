@@ -60,7 +60,6 @@ from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
-from roadeval.runtime.discovery import Code
 from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import public_url, visible, visible_lines
 from roadeval.training.settings import TrainingSettings
@@ -212,8 +211,8 @@ class RunConfig(LogConfig):
         """Return the pipeline of every variant, by name."""
         return {variant.name: variant.pipeline for variant in self.variants()}
 
-    def others_code(self) -> dict[str, Code]:
-        """Return the code of stages that are not roadeval's own, by their names in a chain."""
+    def others_code(self) -> dict[str, str]:
+        """Return the digests of stages that are not roadeval's own, by their names in a chain."""
         return {
             name: stage.code
             for pipeline in self.pipelines().values()

@@ -46,7 +46,6 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
-from roadeval.runtime.discovery import Code
 
 __all__ = [
     "Opinion",
@@ -205,8 +204,9 @@ class Stage:
     about: Callable[[Any], Mapping[str, Any]] | None = None
     """``about(settings)`` returns what results say of the stage beside its settings, as plain data
     by name."""
-    code: Code | None = None
-    """Of a stage from outside the package; roadeval's own are known by its version."""
+    code: str | None = None
+    """SHA-256 of the file that defines a stage from outside the package, empty without a file;
+    roadeval's own are known by its version."""
 
     def specs(self, settings: Any) -> tuple[LayerSpec, ...]:
         """Return the layers that it will hand out with these settings, in order."""

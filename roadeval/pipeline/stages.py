@@ -7,18 +7,15 @@ Code of somebody else runs only where its name stands in a ``chain``: as an entr
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import inspect
-import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +24,8 @@ from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
-from roadeval.runtime.discovery import by_name, code_of, found_in
+from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import visible
 
 GROUP: Final = "roadeval.stages"
@@ -65,15 +63,13 @@ def _somebodys(name: str) -> Stage:
     try:
         found = _imported(name)
         default = name.partition(":")[2].rpartition(".")[2] if ":" in name else name
-        defining = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
-        named = sys.modules.get(name.partition(":")[0])
-        modules = [module for module in (defining, named) if module is not None]
+        module = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
         if callable(found) and not isinstance(found, type):
             found = stage_of_function(default, found)
         if not isinstance(found, Stage):
             raise TypeError(f"it is {type(found).__name__}, and neither a Stage nor a function")
         _check(found)
-        return _with_origin(guarded(found), name, modules)
+        return _with_origin(guarded(found), name, getattr(module, "__file__", None))
     except UnknownStageError:
         raise
     except Exception as error:  # whatever somebody's module raises
@@ -81,24 +77,17 @@ def _somebodys(name: str) -> Stage:
         raise UnknownStageError(f"stage {name!r} cannot be used: {said}") from error
 
 
-def _with_origin(stage: Stage, name: str, modules: Sequence[ModuleType]) -> Stage:
-    """Return a stage whose results say where its code comes from."""
-    code = code_of(module.__name__ for module in modules)
-    file = getattr(modules[0], "__file__", None) if modules else None
-    if not code.digest or file is None:
-        return stage
-    origin = {
-        "stage": name,
-        "file": Path(file).name,
-        "sha256": hashlib.sha256(Path(file).read_bytes()).hexdigest(),
-        "code": {"digest": code.digest, "files": len(code.files), "packages": code.packages},
-    }
+def _with_origin(stage: Stage, name: str, file: str | None) -> Stage:
+    """Return a stage whose results say which file defines it."""
+    if file is None:
+        return replace(stage, code="")
+    origin = {"stage": name, "file": Path(file).name, "sha256": sha256_of(Path(file))}
     own = stage.about
 
     def about(settings: Any) -> Mapping[str, Any]:
         return {**origin, **(own(settings) if own else {})}
 
-    return replace(stage, about=about, code=code)
+    return replace(stage, about=about, code=origin["sha256"])
 
 
 def _imported(name: str) -> Any:

@@ -108,7 +108,7 @@ def test_code_networks_masks_and_truth_that_are_others_are_named():
     def facts(digest):
         return facts_of(
             methods={
-                "grey": {"road": {"stage": "greyroad:road", "code": {"digest": 2 * digest}}},
+                "grey": {"road": {"stage": "greyroad:road", "sha256": digest}},
                 "odd": {"road": "text"},
             },
             settings={"net1": {"chain": ["net", "post"], "net": {"sha256": digest}}},

@@ -493,7 +493,7 @@ def contents(facts: Facts) -> dict[str, str]:
     for variant, stages in facts.methods.items():
         for about in filter(lambda each: isinstance(each, Mapping), stages.values()):
             name = f"code of {variant} ({about.get('stage')})"
-            found[name] = _digest(about, "code", "digest")
+            found[name] = _digest(about, "sha256")
     for variant in facts.settings:
         found[f"network {variant}"] = _digest(facts.settings, variant, "net", "sha256")
     for name in facts.masks:

@@ -42,7 +42,6 @@ from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter, recording_path
 from roadeval.results.over_drives import check_conditions
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.discovery import code_of
 from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
 from roadeval.version import VERSION
 
@@ -199,12 +198,6 @@ class FleetRun:
     def replay_all(self, executor: Executor | None) -> None:
         """Replay every drive that is not done."""
         self.show("looking")
-        for name, code in self.config.others_code().items():
-            if code_of(code.modules).digest != code.digest:  # workers would import another one
-                raise FleetError(
-                    f"stage {name!r}: its code has changed since this program imported it; start "
-                    "the program again"
-                )
         configs = {entry.id: self._of(entry) for entry in self.entries}
         if self.config.fleet.folds is None:
             digest, model = "", self.config.training.model

@@ -312,13 +312,11 @@ def computing() -> dict[str, str]:
 def software(config: RunConfig) -> dict[str, str]:
     """Return the versions of all that computes: roadeval, Python, packages, and others' stages.
 
-    Of a stage that is not roadeval's own it is the digest of its code, see
-    `roadeval.runtime.discovery.code_of`. The processor, and how packages were compiled,
-    are not included.
+    Of a stage that is not roadeval's own it is the digest of its file. The processor, and how
+    packages were compiled, are not included.
     """
     python = ".".join(platform.python_version_tuple()[:2])
-    own = {name: code.digest for name, code in config.others_code().items()}
-    return {"roadeval": VERSION, "python": python, **computing(), **own}
+    return {"roadeval": VERSION, "python": python, **computing(), **config.others_code()}
 
 
 def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
