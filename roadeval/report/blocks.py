@@ -11,12 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
-from roadeval.report.chart import Chart, HeatMap, legend
+from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import drawn, span_of_frames
 from roadeval.runtime.text import as_markdown
 
-CELLS: Final = 40, 30
-"""Columns and rows in which a page knows where a picture's errors are."""
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
 
@@ -53,11 +51,7 @@ class Block:
 
     def images(self) -> Iterator[ImageFile]:
         """Yield the image files in the block and in those it holds."""
-        for part in self.parts():
-            if isinstance(part, ImageFile):
-                yield part
-            elif isinstance(part, HeatMap):
-                yield ImageFile(part.picture())
+        yield from (part for part in self.parts() if isinstance(part, ImageFile))
 
 
 def _fields(value: Any) -> dict[str, Any]:
@@ -68,8 +62,6 @@ def _as_json(value: Any) -> Any:
     match value:
         case ImageFile():
             return value.name
-        case bytes():
-            return ImageFile(value).name
         case Block():
             return value.as_json()
         case list() | tuple():
@@ -82,7 +74,7 @@ def _parts(value: Any) -> Iterator[Any]:
     if isinstance(value, list | tuple):
         for item in value:
             yield from _parts(item)
-    elif isinstance(value, ImageFile | Chart | HeatMap):
+    elif isinstance(value, ImageFile | Chart):
         yield value
     elif isinstance(value, Block):
         yield value
@@ -192,7 +184,7 @@ def plain(cell: Cell | str) -> str:
 class Figure(Block):
     """Charts beside each other below one legend, with a caption."""
 
-    charts: Sequence[Chart | HeatMap]
+    charts: Sequence[Chart]
     caption: str
 
     def as_json(self) -> dict[str, Any]:
@@ -282,8 +274,6 @@ class Picture(Block):
     title: str
     """What it shows, in a few words."""
     image: ImageFile
-    wrong: Mapping[str, str] = field(default_factory=dict)
-    """Of errors by outcome, ``FP`` and ``FN``: the cells of `CELLS` with any, as bits in base64."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
 
 POINTS: Final = 1500
@@ -87,11 +84,10 @@ def looks_of_results(masks: Mapping[str, tuple[str, str]]) -> dict[str, Look]:
 
 
 class ChartKind(StrEnum):
-    """How numbers are drawn: lines from left to right, marks in rows, or a map."""
+    """How numbers are drawn: lines from left to right, or marks in rows."""
 
     LINES = "lines"
     MARKS = "marks"
-    MAP = "map"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +104,6 @@ class Series:
     low: Sequence[float] = ()
     high: Sequence[float] = ()
     """Ends of an interval around each, or none at all."""
-    frames: Sequence[Sequence[int]] = ()
-    """The frames behind each, the most telling first; or none at all."""
 
     def points(self) -> Iterator[tuple[float, float]]:
         """Yield the points that are defined."""
@@ -180,54 +174,7 @@ class Chart:
             yield Key("share of the pixels", "share")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HeatMap:
-    """How often something is so in each part of the image."""
-
-    title: str
-    values: npt.NDArray[np.float64]
-    """``(rows, columns)`` in percent; NaN where it is not known."""
-    top: float
-    """The value of the darkest shade."""
-    colour: colours.Colour
-    """Half-way from white to the darkest shade."""
-    variant: str = ""
-    """Whose it is."""
-
-    kind = ChartKind.MAP
-    unit = "% of the frames"
-    of_frames = False
-
-    def legend(self) -> Iterator[Key]:
-        """Yield nothing: the shades have a scale of their own."""
-        yield from ()
-
-    @property
-    def most(self) -> float:
-        """The greatest value that is known."""
-        return float(np.nan_to_num(self.values).max())
-
-    def shades(self, count: int) -> npt.NDArray[np.uint8]:
-        """Return ``(count, 3)`` RGB: from white at zero to the darkest."""
-        ends = np.array([(255, 255, 255), self.colour, colours.MOST_ERRORS], float)
-        places = np.linspace(0, 2, count)
-        mixed = np.stack([np.interp(places, [0, 1, 2], each) for each in ends.T], axis=1)
-        shades: npt.NDArray[np.uint8] = np.rint(mixed).astype(np.uint8)
-        return shades
-
-    def picture(self) -> bytes:
-        """Return a PNG file of a pixel a cell."""
-        import cv2
-
-        known = np.nan_to_num(np.clip(self.values / self.top, 0, 1))
-        cells = self.shades(256)[np.rint(known * 255).astype(int)]
-        cells[np.isnan(self.values)] = colours.NEVER_LABELLED
-        done, content = cv2.imencode(".png", np.ascontiguousarray(cells[..., ::-1]))
-        assert done
-        return bytes(content)
-
-
-def legend(charts: Sequence[Chart | HeatMap]) -> list[Key]:
+def legend(charts: Sequence[Chart]) -> list[Key]:
     """Return what several charts show, each once."""
     return list(dict.fromkeys(key for chart in charts for key in chart.legend()))
 
@@ -249,7 +196,6 @@ def thinned(series: Series, most: int = POINTS) -> Series:
         y=[_mean(series.y[place : place + size]) for place in places],
         low=(),
         high=(),
-        frames=(),
     )
 
 

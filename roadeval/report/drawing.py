@@ -13,14 +13,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-
-from roadeval.report.chart import Chart, ChartKind, HeatMap, Look, Series
+from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
 """Up to this many points of a line each has a mark."""
-SHADES: Final = 32
-"""Steps of the scale below a heat map."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -67,10 +63,10 @@ def _ticked(span: Span) -> list[Tick]:
     ]
 
 
-def span_of_frames(charts: Iterable[Chart | HeatMap]) -> Span:
+def span_of_frames(charts: Iterable[Chart]) -> Span:
     """Return the range that charts along the drive share."""
-    along = [chart for chart in charts if isinstance(chart, Chart) and chart.of_frames]
-    numbers = [x for chart in along for each in chart.series for x in each.x]
+    along = (each for chart in charts if chart.of_frames for each in chart.series)
+    numbers = [x for each in along for x in each.x]
     if not numbers:
         return Span(0, 1)
     low, high = min(numbers), max(numbers)
@@ -113,8 +109,6 @@ class Mark:
     """Ends of the interval, within the chart."""
     cut: str = ""
     """``left``, ``right`` or ``both``, where the interval reaches beyond the chart."""
-    frames: Sequence[int] = ()
-    """The frames behind it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,29 +148,8 @@ class Drawing:
     """Of marks."""
 
 
-@dataclass(frozen=True, slots=True)
-class MapDrawing:
-    """A heat map as it is drawn."""
-
-    kind: str
-    title: str
-    size: tuple[int, int]
-    """Cells across and down."""
-    picture: bytes
-    """A PNG file of a pixel a cell."""
-    shades: Sequence[str]
-    """The colours of the scale, as ``#RRGGBB``."""
-    top: str
-    """What the last of them means."""
-
-
-def drawn(chart: Chart | HeatMap, frames: Span | None = None) -> Drawing | MapDrawing:
+def drawn(chart: Chart, frames: Span | None = None) -> Drawing:
     """Return a chart as it is drawn; one along the drive over the range of frames given."""
-    if isinstance(chart, HeatMap):
-        rows, columns = chart.values.shape
-        shades = [f"#{bytes(shade).hex()}" for shade in chart.shades(SHADES)]
-        top = f"{chart.top:.3g} %"
-        return MapDrawing(chart.kind, chart.title, (columns, rows), chart.picture(), shades, top)
     y = Span(*chart.y_range) if chart.y_range else _values_span(chart)
     numbers, is_rows = _ticked(y), chart.kind is ChartKind.MARKS
     x, x_ticks = (y, numbers) if is_rows else _positions(chart, frames)
@@ -255,33 +228,17 @@ def _mark(chart: Chart, series: Series, place: int, values: Span) -> Mark | None
         return None
     middle, text = values.percent(value), f"{series.name}: {value:.2f} {chart.unit}"
     low, high = (ends[at] if ends else math.nan for ends in (series.low, series.high))
-    frames = series.frames[at] if series.frames else ()
     if not (math.isfinite(low) and math.isfinite(high)):
-        return Mark(series.name, series.look, middle, text, frames=frames)
+        return Mark(series.name, series.look, middle, text)
     text += f" ({low:.2f} to {high:.2f})"
     beyond = low < values.low, high > values.high
     cut = {(True, False): "left", (False, True): "right", (True, True): "both"}.get(beyond, "")
     left, right = (min(max(values.percent(end), 0.0), 100.0) for end in (low, high))
-    return Mark(series.name, series.look, middle, text, left, right, cut, frames)
+    return Mark(series.name, series.look, middle, text, left, right, cut)
 
 
-def values(chart: Chart | HeatMap, drawing: Drawing | MapDrawing) -> dict[str, Any]:
-    """Return what a page's script needs to show values: as JSON has it, None where undefined.
-
-    Of a heat map row by row in runs: how many cells, and the value in tenths, -1 where unknown.
-    """
-    if isinstance(chart, HeatMap):
-        tenths = np.rint(10 * np.nan_to_num(chart.values, nan=-0.1)).astype(int).ravel()
-        starts = np.flatnonzero(np.diff(tenths, prepend=-2))
-        runs = np.stack([np.diff(starts, append=len(tenths)), tenths[starts]], axis=1)
-        size = [*chart.values.shape[::-1]]
-        return {
-            "title": chart.title,
-            "unit": chart.unit,
-            "size": size,
-            "runs": runs.ravel().tolist(),
-        }
-    assert isinstance(drawing, Drawing)
+def values(chart: Chart, drawing: Drawing) -> dict[str, Any]:
+    """Return what a page's script needs to show values: as JSON has it, None where undefined."""
     level = chart.level
     ends = ("value", "low", "high")
     return {
@@ -299,7 +256,6 @@ def values(chart: Chart | HeatMap, drawing: Drawing | MapDrawing) -> dict[str, A
                 for name in ("y", "low", "high")
                 if (own := getattr(each, name))
             }
-            | ({"frames": [*map(list, each.frames)]} if each.frames else {})
             for each in chart.series
         ],
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -12,12 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Rows
-from roadeval.data.result import Cells
 from roadeval.evaluation import score
 from roadeval.evaluation.metres import band_name
-from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.stats import mean_distribution
-from roadeval.report.charts.standard import BEHIND, WRONG, Interval
+from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
 from roadeval.results.rows import as_arrays, window_rows
@@ -188,11 +186,6 @@ class Findings:
         return self.table("metres")
 
     @cached_property
-    def behind(self) -> Mapping[tuple[str, str, str], Sequence[int]]:
-        """The frames behind the rates of stages, and behind the errors in regions."""
-        return dict(_behind(self.table("frames"), score.finals(self.table("regions"))))
-
-    @cached_property
     def by_distance(self) -> Mapping[tuple[str, str], Interval]:
         """Mean ERR with its interval, by band of distance and variant."""
         rows, settings = score.finals(self.table("regions")), self.facts.evaluation
@@ -208,21 +201,3 @@ class Findings:
                         low, high = mean_distribution(errors).interval(settings.confidence)
                     found[band, variant] = float(errors.mean()), low, high
         return found
-
-
-def _behind(rows: Rows, regions: Rows) -> Iterator[tuple[tuple[str, str, str], list[int]]]:
-    def most(frames: Cells, values: Cells) -> list[int]:
-        ranked = np.argsort(-np.nan_to_num(values), kind="stable")[:BEHIND]
-        found: list[int] = frames[ranked[values[ranked] > 0]].tolist()
-        return found
-
-    for variant, stage, places in rows.masks():
-        own = rows.take(places)
-        for rate, metric in SHORT.items():
-            values = 1 - own[rate] if metric.higher_is_better else own[rate]
-            yield (variant, stage, rate), most(own["frame"], values)
-    for variant in regions.distinct("variant"):
-        own = regions.of_variant(variant)
-        for region in own.distinct("region"):
-            there = own.take(own["region"] == region)
-            yield (variant, region, WRONG), most(there["frame"], there["FP"] + there["FN"])

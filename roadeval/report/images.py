@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import TRUTH, LayerKind, LayerSpec, Mask, Rgb, Truth, mask_spec
+from roadeval.data import TRUTH, LayerKind, LayerSpec, Mask, Rgb, Truth, colours, mask_spec
+from roadeval.data.arrays import Floats
 from roadeval.report.blocks import ImageFile
 
 ROAD: Final = mask_spec("road", "road")
@@ -144,6 +145,26 @@ def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
         tinted = cv2.LUT(image, np.rint(mixed).astype(np.uint8)[None])
         cv2.copyTo(tinted, (labels == label).view(np.uint8), overlaid)
     return overlaid
+
+
+def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
+    """Draw ``(rows, columns)`` shares in shades from white at 0 to the darkest at ``top``.
+
+    ``colour`` is half-way between; NaN is grey.
+    """
+    import cv2
+
+    known = np.nan_to_num(shares / (top or 1.0))[..., None]
+    ends = [np.array(each, float) for each in ((255, 255, 255), colour, colours.MOST_ERRORS)]
+    light, dark = np.minimum(2 * known, 1), np.maximum(2 * known - 1, 0)
+    cells = ends[0] + light * (ends[1] - ends[0]) + dark * (ends[2] - ends[1])
+    cells[np.isnan(shares)] = colours.NEVER_LABELLED
+    scale = max(WIDTH // shares.shape[1], 1)
+    picture = np.rint(cells).astype(np.uint8).repeat(scale, axis=0).repeat(scale, axis=1)
+    picture[[0, -1]] = picture[:, [0, -1]] = colours.NEVER_LABELLED
+    done, content = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    assert done
+    return ImageFile(bytes(content))
 
 
 def faded(image: Rgb) -> Rgb:

@@ -188,42 +188,26 @@ def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
     )
 
 
-def thresholds_table(curves: Totals, totals: Totals, *, brief: bool = False) -> Table:
-    """Tabulate areas, MaxF and calibration beside the rates of the mask as it is.
-
-    A ``brief`` table has no precision and recall.
-    """
-    rows: list[list[Cell | str]] = []
-    for variant, stages in curves.items():
-        for stage, own in stages.items():
-            total = totals[variant][stage]
-            mask = score.overlap(total)
-            best = [percent(own[name]) for name in ("threshold", "precision", "recall")]
-            now = [percent(mask["F1"]), percent(mask["precision"]), percent(total["pooled_TPR"])]
-            rows.append(
-                [
-                    variant_cell(variant, [*totals]),
-                    stage,
-                    *(percent(own[name]) for name in ("AP", "AUC", "ECE")),
-                    Cell(percent(own["MaxF"]), bold=True),
-                    *(best[:1] if brief else best),
-                    *(now[:1] if brief else now),
-                ]
-            )
-    both = [] if brief else ["precision", "recall"]
-    best_of, now_of = ["MaxF", "threshold", *both], ["F1", *both]
+def thresholds_table(curves: Totals, totals: Totals) -> Table:
+    """Tabulate AP and MaxF over all thresholds beside F1 of the mask as it is."""
+    rows: list[list[Cell | str]] = [
+        [
+            variant_cell(variant, [*totals]),
+            stage,
+            percent(own["AP"]),
+            Cell(percent(own["MaxF"]), bold=True),
+            percent(own["threshold"]),
+            percent(score.overlap(totals[variant][stage])["F1"]),
+        ]
+        for variant, stages in curves.items()
+        for stage, own in stages.items()
+    ]
     return Table(
-        ["variant", "stage", "AP", "AUC", "ECE", *best_of, *now_of],
+        ["variant", "stage", "AP", "MaxF", "threshold", "F1 as it is"],
         rows,
         text_columns=(0, 1),
-        groups=[
-            *(("", 2), ("over all thresholds", 3)),
-            *(("at the best threshold", len(best_of)), ("the mask as it is", len(now_of))),
-        ],
-        caption="Percent. Of road's probability: areas below curves over all thresholds, error of "
-        "calibration, the best F1 with its threshold, and F1 of the mask as it is."
-        if brief
-        else "Percent.",
+        caption="Percent. Of road's probability: average precision over all thresholds, the best "
+        "F1 with its threshold, and F1 of the mask as it is.",
         small=True,
     )
 

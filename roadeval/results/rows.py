@@ -126,8 +126,7 @@ def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
     for name, counts in board.curves.counts.items():
         other, road = at_levels(counts)
         levels = (other + road).nonzero()[0]
-        worst = board.curves.worst(name)
-        columns = (each[levels].tolist() for each in (road, other, worst))
+        columns = (each[levels].tolist() for each in (road, other))
         rows = zip(levels.tolist(), *columns, strict=True)
         probabilities += [(*name, *row) for row in rows]
     return {

@@ -250,7 +250,6 @@ _OF_SUMS: Final = (
             Column("level", Kind.COUNT, "0 to 255, equally wide, from improbable to certain"),
             Column("road", Kind.COUNT, "labelled road pixels of the drive at this level"),
             Column("other", Kind.COUNT, "labelled non-road pixels"),
-            Column("worst_frame", Kind.COUNT, "most wrong if this level were the threshold"),
         ),
     ),
     TableSchema(

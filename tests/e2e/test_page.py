@@ -7,7 +7,6 @@ import shutil
 import pandas as pd
 import pytest
 
-from roadeval import Recording
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 from roadeval.report.page.render import write_page
@@ -302,94 +301,6 @@ def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(dr
     assert tab.locator(".frames tbody tr:not([hidden])").count() == everything
 
 
-def offered(tab):
-    """The frames that are offered behind a number, and which of them have a thumbnail."""
-    links = tab.locator("dialog .behind a")
-    links.first.wait_for()
-    numbers = [int(text.split()[-1]) for text in links.all_inner_texts()]
-    return numbers, [each.locator("img").count() for each in links.all()]
-
-
-def highest(rows, count=12):
-    """The numbers of the frames with the highest ``value``, of equal ones the first."""
-    ranked = rows[rows["value"] > 0].sort_values("value", ascending=False, kind="stable")
-    return ranked["frame"].tolist()[:count]
-
-
-def test_behind_a_region_are_the_frames_with_most_wrong_pixels_there(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    row = tab.locator(".rows").first.locator(".row", has_text="in light")
-    mark = row.locator("circle").last
-    mark.scroll_into_view_if_needed()
-    box = mark.bounding_box()
-    tab.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    numbers, thumbnails = offered(tab)
-    name = mark.get_attribute("data-told").partition(":")[0]
-    rows = pd.read_csv(demo.reports / "regions.csv")
-    rows = rows[(rows["region"] == "lit") & (rows["variant"] == name) & (rows["stage"] == "post")]
-    assert numbers == highest(rows.assign(value=rows["FP"] + rows["FN"]))
-    held = {int(each.get_attribute("data-frame")) for each in tab.locator(".strip").all()}
-    assert thumbnails == [number in held for number in numbers]
-    tab.locator("dialog a").nth(1).click()
-    tab.locator("dialog").wait_for(state="hidden")
-    assert frame(tab) == numbers[1]
-    assert tab.url.endswith(f"#frame-{numbers[1]}")
-
-
-def test_behind_a_stage_are_the_frames_with_its_highest_rate(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    area = tab.locator("#which-stage-broke-it .area").first
-    area.focus()
-    tab.keyboard.press("ArrowRight")
-    tab.keyboard.press("Enter")
-    title = tab.locator("dialog h3").inner_text()
-    mask = re.match(r"(\w+), (\w+): (.*) %", title)
-    rows = pd.read_csv(demo.reports / "frames.csv")
-    rows = rows[(rows["variant"] == mask[1]) & (rows["stage"] == mask[2])]
-    rates = (rows["FP"] + rows["FN"]) / rows[["TP", "TN", "FP", "FN"]].sum(axis=1)
-    assert float(mask[3]) == pytest.approx(100 * rates.mean(), abs=0.01)
-    numbers, _ = offered(tab)
-    assert numbers == highest(rows.assign(value=rates))
-
-
-def test_behind_a_point_of_the_paper_s_figure_are_the_frames_of_its_window(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    tab.locator("summary", has_text="figures 2, 3a and 3b").click()
-    area = tab.locator("#over-the-drive .area").first
-    area.scroll_into_view_if_needed()
-    box = area.bounding_box()
-    tab.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.2 * box["height"])
-    numbers, _ = offered(tab)
-    title = tab.locator("dialog h3").inner_text()
-    assert f"frames {numbers[0]} to {numbers[-1]}: " in title
-    windows = pd.read_csv(demo.reports / "windows.csv")
-    spans = set(zip(windows["first_frame"], windows["last_frame"], strict=True))
-    assert (numbers[0], numbers[-1]) in spans
-    assert numbers == list(range(numbers[0], numbers[-1] + 1))
-
-
-def test_behind_a_place_of_a_map_are_the_pictured_frames_that_are_wrong_there(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    shown_map = tab.locator(".panel", has=tab.locator(".map")).filter(has_text="FN of unfiltered")
-    area = shown_map.locator(".area")
-    area.scroll_into_view_if_needed()
-    box = area.bounding_box()
-    place = (0.5 + 0.5 / 40, 0.7 + 0.5 / 30)
-    tab.mouse.click(box["x"] + place[0] * box["width"], box["y"] + place[1] * box["height"])
-    numbers, thumbnails = offered(tab)
-    assert all(thumbnails)
-    recording = Recording(demo.recording)
-    wrong = []
-    for each in tab.locator(".strip").all():
-        number = int(each.get_attribute("data-frame"))
-        mask, truth = recording.layer("unfiltered", "post", number), recording.truth(number)
-        high, wide = truth.shape
-        rows, columns = slice(21 * high // 30, 22 * high // 30), slice(wide // 2, 21 * wide // 40)
-        if ((mask == 0) & (truth == 1))[rows, columns].any():
-            wrong.append(number)
-    assert numbers == wrong != []
-
-
 def test_two_variants_are_chosen_for_the_whole_page(drive, watched):
     tab = watched(drive.as_uri()).tab
     one, other = tab.locator(".choice select").all()
@@ -401,35 +312,11 @@ def test_two_variants_are_chosen_for_the_whole_page(drive, watched):
     }
     assert not [each for each in tab.locator("g[data-of=filtered]").all() if each.is_visible()]
     assert shown(tab, "#summary tbody th") == ["unfiltered", "blind"]
-    maps = shown(tab, ".panel:has(.map) .axis")
-    assert maps
-    assert all("of unfiltered" in title for title in maps)
     assert tab.locator("select.left").input_value() == "unfiltered: errors"
     tab.locator(".rows").first.locator(".row").nth(2).hover()
     assert "\nfiltered" not in tab.locator(".tip:visible").inner_text()
     one.select_option("")
     assert shown(tab, "#summary tbody th") == ["filtered", "unfiltered", "blind"]
-
-
-def test_a_map_tells_the_same_place_of_every_mask(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    area = tab.locator(".map .area").first
-    area.scroll_into_view_if_needed()
-    box = area.bounding_box()
-    tab.mouse.move(box["x"] + box["width"] * 0.7001, box["y"] + box["height"] * 0.8001)
-    tip = tab.locator(".tip:visible")
-    assert tip.locator(".head").inner_text() == "70 % from the left, 80 % from the top"
-    cells = pd.read_csv(demo.reports / "heat.csv").query("left == 448 and top == 384")
-    shares = 100 * cells.set_index("variant")[["FP", "FN"]].div(cells["labelled"].iloc[0])
-    told = dict(line.split("\n") for line in tip.locator("p:not(.head)").all_inner_texts())
-    assert told == {
-        f"{outcome} of {variant}": f"{share:.1f} % of the frames"
-        for variant, row in shares.iterrows()
-        for outcome, share in row.items()
-    }
-    area.focus()
-    tab.keyboard.press("Shift+ArrowRight")
-    assert tip.locator(".head").inner_text() == "77 % from the left, 80 % from the top"
 
 
 def test_rows_of_marks_are_told_by_pointer_and_keyboard(drive, watched):
@@ -458,7 +345,7 @@ def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
 
 def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path, watched):
     curve = Series("a", Look("#0072B2"), [0.0, 40.0, 90.0], [100.0, 95.0, 60.0])
-    mask = Series("a: the mask", Look("#0072B2"), [40.0], [93.0], frames=[[3]])
+    mask = Series("a: the mask", Look("#0072B2"), [40.0], [93.0])
     chart = Chart("precision", ChartKind.LINES, [curve, mask], across="recall", x_range=(0, 101))
     page = write_page(tmp_path / "page.html", a_document(Figure([chart], "")))
     tab = watched(page.as_uri()).tab
@@ -468,14 +355,9 @@ def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path,
         tab.keyboard.press("ArrowRight")
         said.append([*filter(None, tab.locator(".tip:visible").inner_text().split("\n"))])
     assert said == [
-        ["recall 40.00 %", "a", "95.00 %", "a: the mask", "93.00 %", "click: the frames behind it"],
-        ["recall 90.00 %", "a", "60.00 %", "adds up all frames, so it leads to none"],
+        ["recall 40.00 %", "a", "95.00 %", "a: the mask", "93.00 %"],
+        ["recall 90.00 %", "a", "60.00 %"],
     ]
-    box = tab.locator(".area").bounding_box()
-    cursor = "getComputedStyle(document.querySelector('.area')).cursor"
-    for recall, shape in ((40, "pointer"), (90, "auto")):
-        tab.mouse.move(box["x"] + recall / 101 * box["width"], box["y"] + 20)
-        assert tab.evaluate(cursor) == shape
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (390, "dark")])

@@ -58,53 +58,6 @@ def test_every_frame_has_its_pictures_when_it_is_asked_for(address, demo, watche
     assert violations(seen.tab) == []
 
 
-def test_the_frames_behind_a_number_are_fetched_with_their_thumbnails(address, watched):
-    seen = watched(f"{address}0/")
-    mark = seen.tab.locator("#where-the-errors-are circle[data-frames]").last
-    mark.scroll_into_view_if_needed()
-    box = mark.bounding_box()
-    seen.tab.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    links = seen.tab.locator("dialog .behind a")
-    wait_until(seen.tab, "document.querySelectorAll('dialog .behind img').length === 12")
-    numbers = [int(text.split()[-1]) for text in links.all_inner_texts()]
-    assert numbers == [*map(int, mark.get_attribute("data-frames").split())]
-    links.last.click()
-    seen.tab.locator("dialog").wait_for(state="hidden")
-    assert frame(seen.tab) == numbers[-1]
-    assert seen.complaints == []
-
-
-def test_behind_a_place_of_a_map_are_the_worst_of_all_frames_that_are_wrong_there(
-    address, demo, watched
-):
-    seen = watched(f"{address}0/")
-    shown_map = seen.tab.locator(".panel", has=seen.tab.locator(".map"))
-    area = shown_map.filter(has_text="FN of unfiltered").locator(".area")
-    area.scroll_into_view_if_needed()
-    box = area.bounding_box()
-    place = (0.5 + 0.5 / 40, 0.7 + 0.5 / 30)
-    seen.tab.mouse.click(box["x"] + place[0] * box["width"], box["y"] + place[1] * box["height"])
-    wait_until(seen.tab, "document.querySelectorAll('dialog .behind img').length === 12")
-    recording, wrong = roadeval.Recording(demo.recording), {}
-    for number in recording.frame_numbers[demo.summary["frames"]["trained_on"] :]:
-        mask, truth = recording.layer("unfiltered", "post", number), recording.truth(number)
-        high, wide = truth.shape
-        rows, columns = slice(21 * high // 30, 22 * high // 30), slice(wide // 2, 21 * wide // 40)
-        missed, labelled = (mask == 0) & (truth == 1), truth != 255
-        if missed[rows, columns].any():
-            wrong[number] = ((mask != truth) & labelled).sum() / labelled.sum()
-    links = seen.tab.locator("dialog .behind a").all_inner_texts()
-    ranked = sorted(wrong, key=lambda number: -wrong[number])
-    assert [int(text.split()[-1]) for text in links] == ranked[:12]
-    evaluated = demo.summary["frames"]["evaluated"]
-    assert seen.tab.locator("dialog h3").inner_text() == (
-        f"FN of unfiltered here, {len(wrong)} of {evaluated} frames with pictures: the 12 with "
-        "the highest ERR"
-    )
-    assert status(f"{address}0/wrong/1200") == status(f"{address}0/wrong/x") == 404
-    assert seen.complaints == []
-
-
 def test_the_address_of_a_frame_leads_to_the_page_that_shows_it(address, watched):
     tab = watched(f"{address}0/frame/40").tab
     tab.wait_for_url(f"{address}0/#frame-40")

@@ -228,7 +228,6 @@ def test_each_variant_has_its_own_curve_and_sizes_are_without_sign():
     for left in (2.0, 2.5, 3.5):
         sums.add(dict.fromkeys(("sure", "lost"), measured(road(left, 3), truth)))
     curves.add(
-        0,
         {
             ("sure", "post"): SURVEY.histogram(codes, truth),
             ("lost", "post"): SURVEY.histogram(inverse, truth),

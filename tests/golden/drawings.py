@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
 from roadeval.report import blocks
-from roadeval.report.chart import Chart, HeatMap
+from roadeval.report.chart import Chart
 from roadeval.report.figures import Picture
 
 if TYPE_CHECKING:
@@ -24,13 +24,8 @@ def charted(figure: blocks.Figure) -> str:
     return "\n".join([f"figure: {figure.caption}", *map(_charted, figure.charts)])
 
 
-def _charted(chart: Chart | HeatMap) -> str:
+def _charted(chart: Chart) -> str:
     told = f"  {chart.kind} {chart.title!r} in {chart.unit}"
-    if isinstance(chart, HeatMap):
-        known = chart.values[~np.isnan(chart.values)]
-        shades = " ".join(to_hex(shade / 255) for shade in chart.shades(3))
-        size = f"{chart.values.shape}, mean {known.mean():.5g}, {len(known)} known"
-        return f"{told}: {size}, 0 to {chart.top:.4g} as {shades}"
     lines = [f"{told}{', from zero' if chart.from_zero else ''}"]
     lines += [f"    names {' | '.join(chart.names)}"] if chart.names else []
     lines += [f"    share {_numbers(chart.share)}"] if chart.share else []

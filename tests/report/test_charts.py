@@ -66,14 +66,6 @@ def test_a_rate_that_is_better_higher_need_not_begin_at_zero(monkeypatch):
     assert [chart.from_zero for chart in made] == [True, False]
 
 
-def test_equal_shades_are_equal_shares_in_every_map():
-    maps = {name: np.full((2, 1, 1), share) for name, share in (("a", 0.1), ("b", 0.4))}
-    made = [*charts.heat(maps)]
-    assert [each.title for each in made] == ["FP of a", "FN of a", "FP of b", "FN of b"]
-    assert [each.top for each in made] == pytest.approx([40] * 4)
-    assert (made[0].most, made[0].colour, made[1].colour) == (10, colours.FP, colours.FN)
-
-
 # --- Differences ----------------------------------------------------------------------------------
 
 

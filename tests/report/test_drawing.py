@@ -2,12 +2,9 @@
 
 import math
 
-import cv2
-import numpy as np
 import pytest
 
-from roadeval.data.colours import MOST_ERRORS, NEVER_LABELLED, VERMILLION
-from roadeval.report.chart import Chart, ChartKind, HeatMap, Level, Look, Series, thinned
+from roadeval.report.chart import Chart, ChartKind, Level, Look, Series, thinned
 from roadeval.report.drawing import Span, drawn, span_of_frames, ticks, values
 
 
@@ -114,22 +111,3 @@ def test_an_interval_beyond_the_chart_ends_in_an_arrow_at_its_edge(low, high, cu
 
 
 # --- Heat maps ------------------------------------------------------------------------------------
-
-
-def heat(shares):
-    return HeatMap("FP of a", np.array(shares), 20.0, VERMILLION)
-
-
-def test_cells_are_runs_of_tenths_and_what_is_not_known_is_minus_one():
-    found = heat([[0.0, 0.0, 12.34], [np.nan, 0.04, 20.0]])
-    told = values(found, drawn(found))
-    assert told["size"] == [3, 2]
-    assert told["runs"] == [2, 0, 1, 123, 1, -1, 1, 0, 1, 200]
-
-
-def test_the_picture_goes_from_white_to_the_darkest_shade():
-    content = drawn(heat([[0.0, 20.0], [np.nan, 10.0]])).picture
-    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
-    white, dark, unknown, middle = (tuple(each.tolist()) for each in picture.reshape(-1, 3))
-    assert (white, dark, unknown) == ((255, 255, 255), MOST_ERRORS, NEVER_LABELLED)
-    assert np.allclose(middle, VERMILLION, atol=2)

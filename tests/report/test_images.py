@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from roadeval.data import ERRORS, LayerKind, LayerSpec
-from roadeval.report.images import DARKEN, LayerImage, jpeg, painted, shrink
+from roadeval.data.colours import MOST_ERRORS, NEVER_LABELLED, VERMILLION
+from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, painted, shrink
 
 GREY = np.full((2, 4, 3), 100, np.uint8)
 
@@ -39,3 +40,13 @@ def test_a_picture_is_brought_down_but_never_up(width, wanted):
 
 def test_a_very_wide_image_keeps_a_row():
     assert shrink(np.zeros((1, 1000, 3), np.uint8), 10).shape == (1, 10, 3)
+
+
+def test_a_heat_map_goes_from_white_to_the_darkest_shade():
+    made = heat_map(np.array([[0.0, 0.2], [np.nan, 0.1]]), 0.2, VERMILLION)
+    picture = cv2.imdecode(np.frombuffer(made.content, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+    side = len(picture) // 2
+    inner = picture[side // 2 :: side, side // 2 :: side].reshape(-1, 3)
+    white, dark, unknown, middle = map(tuple, inner.tolist())
+    assert (white, dark, unknown) == ((255, 255, 255), MOST_ERRORS, NEVER_LABELLED)
+    assert np.allclose(middle, VERMILLION, atol=2)

@@ -85,7 +85,7 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
         "disagreements": "drive,camera,frame,from_variant,to_variant,repaired,spoiled,N",
         "changes": "drive,camera,from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
         "heat": "drive,camera,variant,top,left,side,labelled,FP,FN",
-        "probabilities": "drive,camera,variant,stage,level,road,other,worst_frame",
+        "probabilities": "drive,camera,variant,stage,level,road,other",
     }
 
 

@@ -19,8 +19,8 @@ def test_a_level_with_as_many_pixels_of_road_as_of_the_rest_has_a_row():
     counts = np.zeros((2, 1 << 16), np.int64)
     counts[:, 300] = 4
     board = Scoreboard(EvaluationSettings(), ["net"], None)
-    board.curves.add(7, {("net", "post"): counts})
-    assert sum_rows(board)["probabilities"] == [("net", "post", 1, 4, 4, 7)]
+    board.curves.add({("net", "post"): counts})
+    assert sum_rows(board)["probabilities"] == [("net", "post", 1, 4, 4)]
 
 
 @pytest.mark.parametrize(("losses", "code"), [([], 0), (["2 frames"], 3)])

@@ -59,7 +59,7 @@ def _scores(facts: Facts, metres: Sequence[Measured]) -> Iterator[Block]:
     if facts.seeds:
         yield seeds_table(facts.seeds, [*facts.totals])
     if facts.curves:
-        yield thresholds_table(facts.curves, facts.totals, brief=True)
+        yield thresholds_table(facts.curves, facts.totals)
     if metres:
         yield distance_table([asdict(each) for each in metres], [*facts.finals], brief=True)
 

@@ -58,14 +58,11 @@ from roadeval.evaluation.score.scoreboard import (
     evidence,
 )
 from roadeval.evaluation.score.thresholds import (
-    BINS,
     LEVELS,
     Curves,
     HeatMap,
     Thresholds,
     at_levels,
-    calibration,
-    calibration_error,
     changes,
 )
 from roadeval.evaluation.score.unlabelled import SIGNS, Unlabelled, chosen, doubts_of, sign_of

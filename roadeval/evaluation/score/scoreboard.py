@@ -228,7 +228,7 @@ class Scoreboard:
                 spent[0] += stage.seconds
                 spent[1] += 1
         if not result.tallies:
-            self._training.add(result.frame.number, result.histograms)
+            self._training.add(result.histograms)
             return doubts
         for name, health in result.health.items():
             self._health[name][health] += 1
@@ -243,9 +243,9 @@ class Scoreboard:
             self.heat[name].add(layer.array.astype(np.uint8, copy=False))
         for step, change in result.changes.items():
             self.changes[step] += change
-        self.curves.add(result.frame.number, result.histograms)
+        self.curves.add(result.histograms)
         self._metres.add(result.metres)
-        self._above.add(result.frame.number, result.above)
+        self._above.add(result.above)
         self._frames.append(result.frame.number)
         self._stamps.append(result.frame.stamp_ns)
         return doubts

@@ -40,8 +40,6 @@ from roadeval.data.arrays import FN, FP, IGNORED, Bits, Floats, Sums
 from roadeval.evaluation.score.counts import Name, flat
 from roadeval.kernels import KERNELS
 
-BINS: Final = 15
-"""Bins of the calibration, equally wide, as many as in [1]_ of `calibration`."""
 LEVELS: Final = 256
 """Levels of the table: each holds as many codes as it."""
 
@@ -84,11 +82,6 @@ class Thresholds:
         return self.tp / (self.road or math.nan)
 
     @property
-    def fpr(self) -> Floats:
-        """``FP / (FP + TN)``; NaN without non-road."""
-        return self.fp / (self.other or math.nan)
-
-    @property
     def average_precision(self) -> float:
         """AP, ``sum (R_k - R_(k-1)) P_k`` over falling thresholds; NaN without road.
 
@@ -97,16 +90,6 @@ class Thresholds:
         """
         steps = np.diff(self.recall, prepend=0.0)
         return float((steps * self.precision).sum()) if self.road else math.nan
-
-    @property
-    def auc(self) -> float:
-        """The area under the ROC by the trapezoid rule; NaN without road or non-road.
-
-        It is the chance that of a road and a non-road pixel the road has the higher probability,
-        where equal ones count half.
-        """
-        x, y = (np.concatenate([[0.0], each]) for each in (self.fpr, self.recall))
-        return float(np.trapezoid(y, x)) if self.road and self.other else math.nan
 
     def max_f(self) -> dict[str, float | None]:
         """Return MaxF, the greatest ``F = 2 TP / (2 TP + FP + FN)`` over thresholds, F1 in [1]_.
@@ -123,38 +106,6 @@ class Thresholds:
         return dict(zip(names, map(float, at), strict=True))
 
 
-def calibration(counts: Sums, bins: int = BINS) -> list[dict[str, float]]:
-    """Return the bins of the reliability diagram that hold any pixel, from low to high.
-
-    Of each its ``pixels``, their mean ``probability``, and the share of them that is ``road``. Bin
-    ``b`` of ``B`` holds probabilities in ``(b / B, (b + 1) / B]``, and the first one 0, too. In
-    [1]_ bins are of the confidence in whichever class is called; here, with two classes, of the
-    probability of road, as in scikit-learn's ``calibration_curve``. ``counts`` are ``(2, 65536)``:
-    non-road and road.
-
-    References
-    ----------
-    .. [1] C. Guo, G. Pleiss, Y. Sun, K. Weinberger, On Calibration of Modern Neural Networks,
-       ICML 2017.
-    """
-    codes = np.arange(CODES)
-    places = np.maximum(codes * bins - 1, 0) // (CODES - 1)
-    pixels, road = (np.bincount(places, each, bins) for each in (counts.sum(axis=0), counts[1]))
-    sums = np.bincount(places, counts.sum(axis=0) * codes, bins)
-    return [
-        {"pixels": int(n), "probability": total / n / (CODES - 1), "road": own / n}
-        for n, total, own in zip(pixels.tolist(), sums.tolist(), road.tolist(), strict=True)
-        if n
-    ]
-
-
-def calibration_error(bins: list[dict[str, float]]) -> float:
-    """Compute ECE: ``sum n_b / N |road_b - probability_b|`` over bins; NaN without a pixel."""
-    total = sum(each["pixels"] for each in bins)
-    gaps = sum(each["pixels"] * abs(each["road"] - each["probability"]) for each in bins)
-    return gaps / total if total else math.nan
-
-
 class Curves:
     """The labelled pixels of a drive by how probable road is, for each variant and stage."""
 
@@ -162,11 +113,6 @@ class Curves:
         self.counts: Final[dict[Name, Sums]] = {}
         """``(2, 65536)`` int64 each: non-road and road."""
         self._frames: Final[Counter[Name]] = Counter()
-        self._worst: Final[dict[Name, tuple[Sums, Sums]]] = {}
-
-    def worst(self, name: Name) -> Sums:
-        """Return the frame with most wrong pixels if each level were the threshold, ``(256,)``."""
-        return self._worst[name][1]
 
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
         """Return ERR of all pixels at the threshold that errs least on other frames.
@@ -182,34 +128,24 @@ class Curves:
                 found.setdefault(variant, {})[stage] = at
         return found
 
-    def add(self, frame: int, histograms: Mapping[Name, Histogram]) -> None:
-        """Add the histograms of the frame of this number."""
+    def add(self, histograms: Mapping[Name, Histogram]) -> None:
+        """Add the histograms of a frame."""
         for name, counts in histograms.items():
             self._frames[name] += 1
-            if name not in self.counts:
-                self.counts[name] = np.zeros(counts.shape, np.int64)
-                self._worst[name] = np.full(LEVELS, -1), np.full(LEVELS, -1)
-            self.counts[name] += counts
-            levels, (most, worst) = at_levels(counts.astype(np.int64)), self._worst[name]
-            wrong = np.append(levels[0].sum(), wrong_above(levels)[:-1])
-            more = wrong > most
-            most[more], worst[more] = wrong[more], frame
+            self.counts[name] = self.counts.get(name, 0) + counts.astype(np.int64)
 
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return by variant and stage what is quoted of curves, fit for JSON.
 
-        ``AP``, ``AUC`` and ``ECE``; what `Thresholds.max_f` finds; the ``bins`` of `calibration`.
+        The ``frames``, ``AP``, and what `Thresholds.max_f` finds.
         """
         found: dict[str, dict[str, dict[str, Any]]] = {}
         for (variant, stage), counts in self.counts.items():
-            thresholds, bins = Thresholds.of(counts), calibration(counts)
+            thresholds = Thresholds.of(counts)
             found.setdefault(variant, {})[stage] = {
                 "frames": self._frames[variant, stage],
                 "AP": thresholds.average_precision,
-                "AUC": thresholds.auc,
                 **thresholds.max_f(),
-                "ECE": calibration_error(bins),
-                "bins": bins,
             }
         return found
 

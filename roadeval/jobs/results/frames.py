@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -33,7 +32,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, faded
-from roadeval.report.sections.frames import SMALL, FrameBrowser, FrameRow, strip, wrong_cells
+from roadeval.report.sections.frames import SMALL, FrameBrowser, FrameRow, strip
 from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
@@ -169,27 +168,6 @@ class FramePicker:
                 seen = None if each.array is None else plan.picture(each.array, IGNORE)
                 title = f"from above: {each.title.replace(': ', ', ')}"
                 yield LayerImage(title, plan.picture(each.image), each.spec, seen)
-
-    def wrong(self, lock: Lock) -> dict[tuple[str, str], tuple[list[int], npt.NDArray[np.uint8]]]:
-        """Return where all frames with pictures have errors, by variant and outcome.
-
-        Frame numbers, those with the highest ERR of the variant first, and a row of bits for each,
-        see `roadeval.report.sections.frames.wrong_cells`. ``lock`` is held while one is read.
-        """
-        found = {}
-        for variant in self._variants:
-            ranked = score.worst(self._result.rows, variant, len(self._scored), 0)["frame"]
-            frames, cells = [], []
-            for frame in ranked[np.isin(ranked, self._result.pictured)].tolist():
-                with lock:
-                    errors = self._result.layer(variant, ERRORS.name, frame)
-                if errors is not None:
-                    frames.append(frame)
-                    cells.append(wrong_cells(errors))
-            for outcome in cells[0] if cells else ():
-                rows = np.array([each[outcome] for each in cells])
-                found[variant, outcome] = frames, rows
-        return found
 
     def _pictured(self, frame: int) -> NotableFrame:
         """Return a frame whose pictures are there, with all of them; without truth, too."""
@@ -375,8 +353,7 @@ def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
 
 def bytes_of(made: Strip) -> int:
     """Return how many bytes of a page a strip takes: pictures as text, with words around each."""
-    cells = (bits for row in made.rows for each in row for bits in each.wrong.values())
-    return sum(len(image.content) * 4 // 3 + 400 for image in made.images()) + sum(map(len, cells))
+    return sum(len(image.content) * 4 // 3 + 400 for image in made.images())
 
 
 def _chosen(result: DriveResult, count: int) -> list[int]:

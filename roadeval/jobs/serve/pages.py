@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -14,10 +12,7 @@ from http import HTTPStatus
 from itertools import combinations
 from pathlib import Path
 from threading import Lock
-from typing import Any, Final
-
-import numpy as np
-import numpy.typing as npt
+from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.progress import OnProgress
@@ -28,8 +23,7 @@ from roadeval.jobs.results.report import PICTURED_OF_FLEET, findings_of
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.jobs.serve.replayed import CancelledReplayError, Replayer, recording_of
 from roadeval.recording.viewer import WindowViewer
-from roadeval.report.blocks import CELLS, Cell, Document, Heading, LinkList, Strip, Table
-from roadeval.report.charts.standard import BEHIND
+from roadeval.report.blocks import Cell, Document, Heading, LinkList, Strip, Table
 from roadeval.report.document import page_document
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page, part
 from roadeval.report.sections.frames import LARGE
@@ -43,7 +37,6 @@ STRIPS: Final = 40
 """Frames whose pictures are kept in memory."""
 _CODE: Final = {STYLE: "text/css; charset=utf-8", SCRIPT: "text/javascript; charset=utf-8"}
 _MEDIA: Final = {"jpg": "image/jpeg", "png": "image/png", "svg": "image/svg+xml"}
-JSON: Final = "application/json"
 _HOME: Final = Place("", "", "{}")
 
 
@@ -222,27 +215,7 @@ class _ServedDrive(_Served):
         match request.parts:
             case ("frame", number, *rest) if number.isdecimal() and int(number) in self._frames:
                 return self._frame(int(number), tuple(rest), viewer, acts=request.acts)
-            case ("wrong", cell) if not request.acts and cell.isdecimal():
-                return self._wrong_at(int(cell))
         return NOT_FOUND
-
-    @cached_property
-    def _wrong(self) -> Mapping[tuple[str, str], tuple[list[int], npt.NDArray[np.uint8]]]:
-        return self._picker.wrong(self._lock)
-
-    def _wrong_at(self, cell: int) -> Response:
-        """Return the frames that are wrong in a cell of the image, by variant and outcome.
-
-        The worst of them, at most as many as a page shows, and how many there are.
-        """
-        if cell >= math.prod(CELLS):
-            return NOT_FOUND
-        found: dict[str, dict[str, Any]] = {}
-        for (variant, outcome), (frames, rows) in self._wrong.items():
-            wrong = np.flatnonzero(rows[:, cell >> 3] & (128 >> (cell & 7)))
-            shown = [frames[place] for place in wrong[:BEHIND]]
-            found.setdefault(variant, {})[outcome] = {"frames": shown, "count": len(wrong)}
-        return Response(json.dumps(found).encode(), JSON)
 
     @cached_property
     def _picker(self) -> FramePicker:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
-from roadeval.data import BASELINE, Rows, colours
-from roadeval.data.arrays import Floats, Sums
+from roadeval.data import BASELINE, Rows
 from roadeval.data.result import Cells
 from roadeval.data.words import DASH, in_percent
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import METRICS, SHORT
-from roadeval.evaluation.score import LEVELS, Thresholds, merged
+from roadeval.evaluation.score import Thresholds, merged
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import (
@@ -26,7 +23,6 @@ from roadeval.report.chart import (
     WORSE,
     Chart,
     ChartKind,
-    HeatMap,
     Level,
     Look,
     Series,
@@ -38,17 +34,6 @@ from roadeval.runtime.discovery import found_in
 if TYPE_CHECKING:
     from roadeval.evaluation.comparison import Change
     from roadeval.results.facts import Totals
-
-
-Behind = Mapping[tuple[str, str, str], Sequence[int]]
-"""The frames behind a number, by the variant, the stage or region, and the rate."""
-UNKNOWN: Final[Behind] = MappingProxyType({})
-BEHIND: Final = 12
-"""Frames behind a number, at most."""
-WRONG: Final = "wrong"
-"""Pixels of a region that are, in `Behind`."""
-LEAST_SHARE: Final = 1.0
-"""Percent of the frames to which a heat map's shades reach at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,19 +75,7 @@ def over_windows(
     if not len(windows):
         return []
     final = score.finals(windows)
-    made = _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
-    ends = zip(final["first_frame"].tolist(), final["last_frame"].tolist(), strict=True)
-    behind = {
-        (first + last) / 2: range(first, last + 1, -(-(last + 1 - first) // BEHIND))
-        for first, last in ends
-    }
-    return [
-        replace(
-            chart,
-            series=[replace(s, frames=[behind.get(x, ()) for x in s.x]) for s in chart.series],
-        )
-        for chart in made
-    ]
+    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
 
 
 def over_frames(
@@ -149,21 +122,15 @@ def coverage(shares: Mapping[str, Mapping[int, float]]) -> Chart:
     )
 
 
-def stages(totals: Totals, behind: Behind = UNKNOWN) -> list[Chart]:
-    """Return a chart a rate: each stage's mask, a line a variant.
-
-    ``behind`` has the frames with the highest rate, by variant, stage and rate.
-    """
+def stages(totals: Totals) -> list[Chart]:
+    """Return a chart a rate: each stage's mask, a line a variant."""
     names = merged(own for variant, own in totals.items() if variant != BASELINE)
     return [
         Chart(
             f"{rate}: {metric.in_words}",
             ChartKind.LINES,
             [
-                _with_frames(
-                    _of_stages(variant, look, totals[variant], names, rate),
-                    [behind.get((variant, stage, rate), ()) for stage in totals[variant]],
-                )
+                _of_stages(variant, look, totals[variant], names, rate)
                 for variant, look in looks([*totals]).items()
             ],
             names=names,
@@ -184,11 +151,6 @@ def _of_stages(
     return series(variant, look, [names.index(stage) for stage in own], values)
 
 
-def _with_frames(each: Series, frames: Sequence[Sequence[int]]) -> Series:
-    """Return a series with the frames behind its numbers; of one for all, behind each."""
-    return replace(each, frames=[*frames] * (len(each.x) // len(frames)) if any(frames) else ())
-
-
 _OF_REGIONS: Final = {"ERR": "ERR within the region", "errors": "Share of the wrong pixels"}
 
 
@@ -196,13 +158,11 @@ def regions(
     found: Mapping[tuple[str, str], Mapping[str, float]],
     variants: Sequence[str],
     titles: Mapping[str, str],
-    behind: Behind = UNKNOWN,
 ) -> list[Chart]:
     """Return the error rate in each region, and its share of the errors beside that of pixels.
 
     ``found`` is as `roadeval.evaluation.score.by_region` returns it. Drawn are the ``variants`` and
-    the regions of ``titles``, from top to bottom; ``behind`` has the frames with most wrong pixels,
-    by variant, region and ``wrong``.
+    the regions of ``titles``, from top to bottom.
     """
 
     def column(name: str, variant: str) -> list[float]:
@@ -213,10 +173,7 @@ def regions(
             title,
             ChartKind.MARKS,
             [
-                _with_frames(
-                    series(variant, look, range(len(titles)), column(name, variant)),
-                    [behind.get((variant, region, WRONG), ()) for region in titles],
-                )
+                series(variant, look, range(len(titles)), column(name, variant))
                 for variant, look in looks(variants).items()
             ],
             names=[*titles.values()],
@@ -260,21 +217,6 @@ def by_distance(found: Mapping[tuple[str, str], Interval], variants: Sequence[st
         ],
         names=[name for band in bands for name in (in_metres(band), *[""] * (step - 1))],
     )
-
-
-def heat(maps: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[HeatMap]:
-    """Yield where each variant has false positives and negatives; equal shades are equal shares.
-
-    ``maps`` are those of `roadeval.report.findings.Findings.heatmaps`.
-    """
-    tops = [
-        max(LEAST_SHARE, 100 * max(float(np.nan_to_num(own[place]).max()) for own in maps.values()))
-        for place in (0, 1)
-    ]
-    for variant, own in maps.items():
-        outcomes = ("FP", "FN"), own, tops, (colours.FP, colours.FN)
-        for outcome, shares, top, colour in zip(*outcomes, strict=True):
-            yield HeatMap(f"{outcome} of {variant}", 100 * shares, top, colour, variant)
 
 
 def series(name: str, look: Look, x: Any, y: Any) -> Series:
@@ -433,105 +375,28 @@ STEP: Final = 10
 """Percent by which they are widened."""
 MOST: Final = 101.0
 """Percent at which axes end, so that a line along the edge is seen."""
-CURVES_CAPTION: Final = (
-    "Precision over recall, ROC, and reliability: the share of road among pixels of about the same "
-    "probability, beside the diagonal on which it is what the probability says. A curve belongs to "
-    "a variant that says how probable road is; a mark is a mask at its own threshold. Axes begin "
-    "where the masks lie."
-)
-
-Masks = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 
-def curves(levels: Rows, quoted: Masks, totals: Masks, behind: Behind = UNKNOWN) -> list[Chart]:
-    """Return precision over recall, the ROC, and reliability; none without a probability.
+def precision_over_recall(levels: Rows, totals: Totals) -> Chart:
+    """Return a curve for each variant that says how probable road is, and a mark for each mask.
 
-    A mask has frames behind it, those with its highest ERR; a point of a curve has the frame that
-    would be most wrong at its threshold.
-
-    ``levels`` are as in ``probabilities.csv``, ``quoted`` and ``totals`` as ``curves`` and
-    ``totals`` in ``summary.json``; ``behind`` has the frames with the highest rate, by variant,
-    stage and rate.
+    ``levels`` are as in ``probabilities.csv``, ``totals`` as in ``summary.json``. Axes begin where
+    the masks lie.
     """
-    if not len(levels):
-        return []
-    drawn = looks([*(name for name in totals if name != BASELINE), BASELINE])
-    recall, roc = [], []
-    found = _thresholds(levels)
-    for name, (each, worst) in found.items():
-        own = worst[each.codes]
-        recall.append(_curve(name, drawn[name], each.recall, each.precision, own))
-        # From the threshold that nothing reaches.
-        xs, ys = (np.concatenate([[0.0], rates]) for rates in (each.fpr, each.recall))
-        roc.append(_curve(name, drawn[name], xs, ys, np.append(own[:1], own)))
-    finals = {name: [*totals[name]][-1] for name in drawn if name in totals}
-    masks = {name: _mask(totals[name][stage]) for name, stage in finals.items()}
-    for name, (fpr, tpr, precision) in masks.items():
-        title, frames = f"{name}: the mask", behind.get((name, finals[name], score.TESTED), ())
-        recall.append(_mark(title, drawn[name], tpr, precision, frames))
-        roc.append(_mark(title, drawn[name], fpr, tpr, frames))
-    bins = []
-    for name, stages in quoted.items():
-        for curve in stages.values():
-            said, share = (np.array([each[key] for each in curve["bins"]]) for key in _AXES)
-            at = np.minimum(said * LEVELS, LEVELS - 1).astype(int)
-            bins.append(_curve(name, drawn[name], said, share, found[name][1][at]))
-    ideal = Series("as probabilities say", Look(FAINT, "dotted"), [0.0, 100.0], [0.0, 100.0])
-    fprs, tprs, precisions = zip(*masks.values(), strict=True)
-    # What is recall below the first chart is so beside the second, too.
-    across, up = (_below(tprs), MOST), (_below(precisions), MOST)
-    most = math.ceil(max([*filter(math.isfinite, fprs), STEP]) / STEP) * float(STEP)
-    lines, whole = ChartKind.LINES, (-1.0, MOST)
-    return [
-        Chart("precision", lines, recall, across="recall", x_range=across, y_range=up),
-        Chart("TPR", lines, roc, across="FPR", x_range=(-0.01 * most, most), y_range=across),
-        Chart(
-            *("share of road", lines, [*bins, ideal]),
-            across="probability",
-            x_range=whole,
-            y_range=whole,
-        ),
-    ]
-
-
-_AXES: Final = ("probability", "road")
-
-
-def _thresholds(levels: Rows) -> dict[str, tuple[Thresholds, Sums]]:
-    """Return the thresholds of each variant that says how probable road is.
-
-    With each comes the frame that is most wrong at each level, ``(256,)``.
-    """
-    made = {}
-    for variant, _, places in levels.masks():
+    drawn, curves = looks([*totals]), []
+    for name, _, places in levels.masks():
         rows = levels.take(places)
-        counts = np.zeros((2, LEVELS), np.int64)
-        counts[:, rows["level"]] = rows["other"], rows["road"]
-        # A level that does not occur is the threshold that the next one is.
-        at = np.searchsorted(rows["level"], np.arange(LEVELS)).clip(max=len(rows) - 1)
-        made[variant] = Thresholds.of(counts), rows["worst_frame"][at]
-    return made
-
-
-def _mask(total: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Return FPR, TPR and precision of a mask, in percent."""
-    precision = score.overlap(total)["precision"]
-    return in_percent(total["pooled_FPR"]), in_percent(total["pooled_TPR"]), in_percent(precision)
-
-
-def _below(values: Sequence[float]) -> float:
-    known = [value for value in values if math.isfinite(value)]
-    return float(min(math.floor(min([*known, LEAST_AXIS]) / STEP) * STEP, LEAST_AXIS))
-
-
-def _curve(name: str, look: Look, x: Floats, y: Floats, worst: Sums) -> Series:
-    across, up = (100 * np.asarray(each, float) for each in (x, y))
-    known = np.isfinite(across)
-    frames = [[frame] for frame in worst[known].tolist()]
-    return Series(name, look, across[known].tolist(), up[known].tolist(), frames=frames)
-
-
-def _mark(name: str, look: Look, x: float, y: float, frames: Sequence[int]) -> Series:
-    there = math.isfinite(x) and math.isfinite(y)
-    own = [frames] * there if frames else ()
-    return Series(name, look, [x] * there, [y] * there, frames=own)
+        found = Thresholds.of(np.stack([rows["other"], rows["road"]]))
+        if found.road:
+            curves.append(series(name, drawn[name], 100 * found.recall, 100 * found.precision))
+    masks = {}
+    for name, stages in totals.items():
+        *_, total = stages.values()
+        at = in_percent(total["pooled_TPR"]), in_percent(score.overlap(total)["precision"])
+        if all(map(math.isfinite, at)):
+            masks[name] = at
+    marks = [series(f"{name}: the mask", drawn[name], [x], [y]) for name, (x, y) in masks.items()]
+    least = [min([LEAST_AXIS, *values]) for values in zip(*masks.values(), strict=True)]
+    across, up = ((each // STEP * STEP, MOST) for each in least or [LEAST_AXIS] * 2)
+    drawings, lines = [*curves, *marks], ChartKind.LINES
+    return Chart("precision", lines, drawings, across="recall", x_range=across, y_range=up)

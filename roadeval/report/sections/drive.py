@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
 from roadeval.data.words import DASH, defined, number, percent, points
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import BINS, FILTER, Effect, merged
+from roadeval.evaluation.score import FILTER, Effect, merged
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -21,15 +24,9 @@ from roadeval.report.blocks import (
     Text,
 )
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import (
-    CURVES_CAPTION,
-    coverage,
-    curves,
-    difference,
-    figures_over_drive,
-)
+from roadeval.report.charts.standard import coverage, difference, figures_over_drive
 from roadeval.report.findings import Findings
-from roadeval.report.images import ExampleFrame, LayerImage, jpeg, pictures_of
+from roadeval.report.images import ExampleFrame, LayerImage, heat_map, jpeg, pictures_of
 from roadeval.report.tables import differences_table, stages_table, thresholds_table, variant_cell
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import CLAIMED, correction
@@ -189,10 +186,7 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     # What counts cells of ground has no share of the pixels.
     names = titles([name for name in found if name != ABOVE], findings.height)
     yield Figure(
-        charts.regions(
-            *(findings.regions, [*findings.finals], names),
-            findings.behind if isinstance(findings, Findings) else charts.UNKNOWN,
-        ),
+        charts.regions(findings.regions, [*findings.finals], names),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
@@ -207,11 +201,7 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
             "all frames together. The steeper a curve falls, the closer to the edge errors lie.",
         )
     if findings.heatmaps:
-        yield Figure(
-            [*charts.heat(findings.heatmaps)],
-            "Where the final masks go wrong, over all evaluated frames. FP: non-road called "
-            "road; FN: road missed. Percent of the frames that label the pixel; grey: none does.",
-        )
+        yield _heat_maps(findings.heatmaps)
 
 
 def _regions_note(findings: Findings | FleetFolder, names: Mapping[str, str]) -> str:
@@ -229,7 +219,7 @@ def stages(findings: Findings) -> Iterator[Block]:
     """Yield what each stage did to the mask, and which part of the error is whose."""
     yield Heading("Which stage broke it")
     yield Figure(
-        charts.stages(findings.totals, findings.behind),
+        charts.stages(findings.totals),
         f"Rates of each stage's mask, means over the frames; {BASELINE}, which has no stages, for "
         "scale.",
     )
@@ -338,27 +328,48 @@ def _compensation(findings: Findings) -> Iterator[Text]:
             )
 
 
+def _heat_maps(maps: Mapping[str, npt.NDArray[np.float64]]) -> ImageGrid:
+    """Return where each variant has false positives and negatives; equal shades are equal shares.
+
+    ``maps`` are those of `roadeval.report.findings.Findings.heatmaps`.
+    """
+    most = [max(float(np.nanmax(own[place])) for own in maps.values()) for place in (0, 1)]
+    pictures = [
+        (f"{outcome} of {name}", heat_map(shares, top, colour))
+        for name, own in maps.items()
+        for outcome, shares, top, colour in zip(
+            ("FP", "FN"), own, most, (colours.FP, colours.FN), strict=True
+        )
+    ]
+    return ImageGrid(
+        pictures,
+        4,
+        caption="Where the final masks go wrong, over all evaluated frames. FP: non-road called "
+        f"road, the darkest on {percent(most[0], 1)} % of the frames that label the place; FN: "
+        f"road missed, the darkest on {percent(most[1], 1)} %; grey: no frame labels it.",
+    )
+
+
 def thresholds(findings: Findings) -> Iterator[Block]:
     """Yield the curves and what is quoted of them; nothing without a probability."""
-    quoted = findings.facts.curves
-    charts = curves(findings.levels, quoted, findings.totals, findings.behind)
-    if not quoted or not charts:
+    quoted, levels = findings.facts.curves, findings.levels
+    if not quoted or not len(levels):
         return
     yield Heading("Over thresholds")
+    chart = Figure(
+        [charts.precision_over_recall(levels, findings.totals)],
+        "Precision over recall: a curve belongs to a variant that says how probable road is; a "
+        "mark is a mask at its own threshold. Axes begin where the masks lie.",
+    )
     meanings = Text(
         "All labelled pixels of the evaluated frames together. F is the harmonic mean of precision "
         "and recall; MaxF the greatest over all thresholds, and a threshold that was chosen on the "
         "drive that it is judged on flatters. AP: the mean precision over the steps of recall, "
-        "without interpolation. AUC: the area under the ROC, the chance that a road pixel has a "
-        "higher probability than another one. ECE: how far the share of road in each of "
-        f"{BINS} equal bins of the probability is from the mean probability there, on average over "
-        "the pixels; 0 if probabilities are what they say.",
+        "without interpolation.",
         "note",
     )
     table = thresholds_table(quoted, findings.totals)
-    yield Details(
-        "Curves, areas and calibration", [Figure(charts, CURVES_CAPTION), table, meanings]
-    )
+    yield Details("Precision, recall and MaxF", [chart, table, meanings])
 
 
 def masks(findings: Findings) -> Iterator[Block]:

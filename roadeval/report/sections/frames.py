@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
-from roadeval.data import BASELINE, ERRORS
-from roadeval.data.arrays import FN, FP
+from roadeval.data import BASELINE
 from roadeval.data.words import defined, in_percent, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import SIGNS
 from roadeval.report.blocks import (
-    CELLS,
     Block,
     Command,
     Heading,
@@ -283,20 +277,4 @@ def _rows(frame: NotableFrame, layers: int) -> Iterator[list[Picture]]:
 
 def _picture(image: LayerImage, name: str, width: int) -> Picture:
     title = image.spec.title if image.spec else image.title
-    cells = wrong_cells(image.array) if image.array is not None and image.spec is ERRORS else {}
-    wrong = {name: base64.b64encode(bits.tobytes()).decode() for name, bits in cells.items()}
-    return Picture(name, title, jpeg(image, width), wrong)
-
-
-def wrong_cells(errors: npt.NDArray[Any]) -> dict[str, npt.NDArray[np.uint8]]:
-    """Return the cells of `CELLS` with errors of a mask, by outcome, a bit each.
-
-    ``errors`` is ``(H, W)`` uint8, see `roadeval.data.ERRORS`.
-    """
-    import cv2
-
-    found = {}
-    for name, outcome in (("FP", FP), ("FN", FN)):
-        shares = cv2.resize(np.float32(errors == outcome), CELLS, interpolation=cv2.INTER_AREA)
-        found[name] = np.packbits(shares > 0)
-    return found
+    return Picture(name, title, jpeg(image, width))

@@ -59,29 +59,21 @@ def test_no_column_for_shorter_windows_where_there_are_none():
 
 # --- Over thresholds ------------------------------------------------------------------------------
 
-BINS = [
-    {"pixels": 10, "probability": 0.1, "road": 0.2},
-    {"pixels": 5, "probability": 0.9, "road": 0.7},
-]
 QUOTED = {
     "frames": 8,
     "AP": 0.91,
-    "AUC": 0.92,
     "MaxF": 0.93,
     "threshold": 0.4,
     "precision": 0.95,
     "recall": 0.96,
-    "ECE": 0.07,
-    "bins": BINS,
 }
-LEVELS = [("filtered", "post", 20, 2, 8, 31), ("filtered", "post", 230, 4, 1, 17)]
+LEVELS = [("filtered", "post", 20, 2, 8), ("filtered", "post", 230, 4, 1)]
 
-COLUMNS = ["variant", "stage", "level", "road", "other", "worst_frame"]
+COLUMNS = ["variant", "stage", "level", "road", "other"]
 
 
-def findings(behind=None, **quoted):
+def findings(**quoted):
     return some_findings(
-        behind=behind or {},
         levels=rows_of(pd.DataFrame(LEVELS, columns=COLUMNS)),
         curves={"filtered": {"post": QUOTED | quoted}},
     )
@@ -90,17 +82,13 @@ def findings(behind=None, **quoted):
 def test_what_is_quoted_stands_beside_the_mask_as_it_is():
     (table,) = (block for block in opened(thresholds(findings())) if isinstance(block, Table))
     assert plain_rows(table) == [
-        [
-            *("filtered", "post", "91.00", "92.00", "7.00", "93.00", "40.00", "95.00"),
-            *("96.00", "75.00", "66.67", "83.00"),
-        ]
+        ["filtered", "post", "91.00", "93.00", "40.00", "75.00"],
     ]
-    assert sum(columns for _, columns in table.groups) == len(table.columns)
 
 
 def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
     (figure,) = (block for block in opened(thresholds(findings())) if isinstance(block, Figure))
-    recall, roc, reliability = figure.charts
+    (recall,) = figure.charts
     curve, mask, *_ = recall.series
     # Of 6 road and 9 other pixels, 4 and 1 are of the higher level.
     assert curve.x == pytest.approx([100 * 4 / 6, 100])
@@ -110,44 +98,14 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
         [83.0],
         [pytest.approx(100 * 6 / 9)],
     )
-    assert roc.series[0].x == pytest.approx([0, 100 / 9, 100])
-    assert (roc.series[1].x, roc.series[1].y) == ([25.0], [83.0])
-    assert recall.x_range == roc.y_range
-    assert [*reliability.series[0].points()] == [(10, 20), (90, 70)]
-
-
-def test_behind_a_mask_are_its_worst_frames_and_behind_a_threshold_the_worst_one():
-    found = findings({("filtered", "post", "ERR"): [7, 3]})
-    (figure,) = (block for block in opened(thresholds(found)) if isinstance(block, Figure))
-    recall, roc, reliability = figure.charts
-    for chart in (recall, roc):
-        behind = {each.name: each.frames for each in chart.series}
-        assert behind.pop("filtered: the mask") == [[7, 3]]
-        assert behind.pop("filtered") == [[17]] * (chart is roc) + [[17], [31]]
-        assert not any(behind.values())
-    # Of a share, that at the threshold of its probability: 0.1 and 0.9 are above the lower level.
-    bins, ideal = reliability.series
-    assert (bins.frames, ideal.frames) == ([[17], [17]], ())
-
-
-def test_the_axes_begin_and_end_where_the_masks_lie():
-    (figure,) = (block for block in opened(thresholds(findings())) if isinstance(block, Figure))
-    recall, roc, reliability = figure.charts
-    # Half of the room at least; the FPR of the mask is 25 %.
+    # Half of the room at least.
     assert (recall.x_range, recall.y_range) == ((50, 101), (50, 101))
-    assert roc.x_range == pytest.approx((-0.3, 30))
-    assert reliability.x_range == reliability.y_range == (-1, 101)
-    assert numbers(reliability.series[-1]) == [(0, 0), (100, 100)]
-
-
-def numbers(series):
-    return [*zip(series.x, series.y, strict=True)]
 
 
 def test_what_is_undefined_is_a_dash():
-    undefined = dict.fromkeys(("AP", "AUC", "MaxF", "threshold", "precision", "recall"))
+    undefined = dict.fromkeys(("AP", "MaxF", "threshold"))
     (table,) = (b for b in opened(thresholds(findings(**undefined))) if isinstance(b, Table))
-    assert plain_rows(table)[0].count(DASH) == 6
+    assert plain_rows(table)[0].count(DASH) == 3
 
 
 def test_without_a_probability_there_is_no_section():

@@ -31,10 +31,10 @@ function roundNumbers(low, high, count) {
   return found;
 }
 
-/** The first line of what is told at the pointer, or the last. */
-function tipHead(text, className = "head") {
+/** The first line of what is told at the pointer. */
+function tipHead(text) {
   const head = document.createElement("p");
-  head.className = className;
+  head.className = "head";
   head.textContent = text;
   return head;
 }
@@ -96,7 +96,6 @@ class ChartView {
     area.addEventListener("pointerleave", () => pointAt(this, null));
     area.addEventListener("blur", () => pointAt(this, null));
     area.addEventListener("keydown", (event) => this.key(event, onFrame));
-    if (!this.values.frames) area.addEventListener("click", (event) => this.showBehind(event));
     if (!this.values.frames) return;
     area.addEventListener("pointerdown", (event) => {
       if (event.button === 0) begin = this.at(event);
@@ -106,7 +105,7 @@ class ChartView {
       const far = begin !== null && Math.abs(end - begin) > (this.high - this.low) / 60;
       this.select(null);
       if (far) zoom(Math.min(begin, end), Math.max(begin, end));
-      else if (begin !== null && !this.showBehind(event)) onFrame(Math.round(this.snapped(end)));
+      else if (begin !== null) onFrame(Math.round(this.snapped(end)));
       begin = null;
     });
     area.addEventListener("pointercancel", () => {
@@ -122,9 +121,7 @@ class ChartView {
     if (step) {
       const next = Math.min(Math.max(place + step, 0), numbers.length - 1);
       pointAt(this, numbers[next]);
-    } else if (event.key === "Enter") {
-      if (!this.showBehind(null) && this.values.frames) onFrame(Math.round(numbers[place]));
-    }
+    } else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
     else if (event.key === "Escape" && this.values.frames) zoom(...range.whole);
     else return;
     event.preventDefault();
@@ -177,21 +174,6 @@ class ChartView {
     return far && !this.values.frames ? -1 : place;
   }
 
-  /** Show the frames behind the value that is nearest to the pointer; false where none are known. */
-  showBehind(event) {
-    if (event) this.pointed = this.snapped(this.at(event));
-    const box = this.area.getBoundingClientRect();
-    const [low, high] = this.values.y;
-    const height = event ? high - ((event.clientY - box.top) / box.height) * (high - low) : high;
-    const known = this.series().map((each) => ({ each, place: this.placeIn(each) })).filter(({ each, place }) => each.frames && place >= 0 && each.y[place] !== null);
-    known.sort((a, b) => Math.abs(a.each.y[a.place] - height) - Math.abs(b.each.y[b.place] - height));
-    if (!known.length) return false;
-    const { each, place } = known[0];
-    const [first, last] = [each.frames[place][0], each.frames[place].at(-1)];
-    const where = this.values.frames ? `frames ${first} to ${last}` : this.where();
-    return showFrames(`${each.name}, ${where}: ${withEnds(each.y[place], null, null, this.values.unit)}`, each.name, each.frames[place]);
-  }
-
   series() {
     return this.values.series.filter((each) => isShown(each.name));
   }
@@ -204,10 +186,6 @@ class ChartView {
       const left = value === null && series.length > 1 && (unit === "pp" || !this.values.frames);
       return left ? null : tipLine(each.name, withEnds(value, each.low?.[place], each.high?.[place], unit), each.colour);
     });
-    const leads = series.some((each) => each.frames && this.placeIn(each) >= 0);
-    if (!this.values.frames) this.area.classList.toggle("leads", leads);
-    if (leads) lines.push(tipHead("click: the frames behind it", "hint"));
-    else if (this.values.across) lines.push(tipHead("adds up all frames, so it leads to none", "hint"));
     if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
     this.tip.replaceChildren(tipHead(this.where()), ...lines.filter(Boolean));
     this.tip.hidden = false;

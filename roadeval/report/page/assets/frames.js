@@ -60,9 +60,9 @@ class Browser {
   }
 
   /** Frames that can be looked at, in the drive's order: all, or of the filtered ones, if any is. */
-  pictured(whole = false) {
+  pictured() {
     const all = this.rows.filter((row) => row.classList.contains("pictured"));
-    const shown = whole ? all : all.filter((row) => !row.hidden);
+    const shown = all.filter((row) => !row.hidden);
     return (shown.length ? shown : all).map((row) => Number(row.dataset.frame)).sort((a, b) => a - b);
   }
 
@@ -117,38 +117,6 @@ class Browser {
       this.absent.append(" ", button);
     }
     if (command) this.absent.append(" In the viewer: ", words);
-  }
-
-  /** The frames, of those with pictures here, that are wrong in a cell of an image. */
-  wrongAt(variant, outcome, cell) {
-    const isWrong = (strip) => {
-      const tile = [...strip.querySelectorAll(".tile")].find((each) => each.dataset.name === `${variant}: errors`);
-      const cells = tile?.dataset[outcome.toLowerCase()];
-      return cells && atob(cells).charCodeAt(cell >> 3) & (128 >> (cell & 7));
-    };
-    const frames = [...this.held].filter(([, strip]) => isWrong(strip)).map(([frame]) => frame);
-    return { frames, count: frames.length };
-  }
-
-  /** A link to a frame, with a picture as soon as there is one. */
-  thumbnail(frame, variant) {
-    const link = document.createElement("a");
-    link.href = `#frame-${frame}`;
-    link.textContent = `frame ${frame}`;
-    link.addEventListener("click", (event) => {
-      event.preventDefault();
-      dialog.close();
-      this.show(frame, { scroll: true });
-    });
-    const draw = () => {
-      const tiles = [...(this.held.get(frame)?.querySelectorAll(".tile") ?? [])];
-      const own = (each) => `${variant}: `.startsWith(each.dataset.name.replace(/errors$/, ""));
-      const tile = tiles.find(own) ?? tiles[0];
-      if (tile) link.prepend(tile.querySelector("img").cloneNode());
-    };
-    if (this.live && !this.held.has(frame) && this.byFrame.get(frame).classList.contains("pictured")) this.fetch(frame).then(draw);
-    else draw();
-    return link;
   }
 
   /** Ask the server for a frame's pictures. */

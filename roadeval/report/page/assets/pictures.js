@@ -35,19 +35,6 @@ function enlargePicture(image) {
   enlarge([large, words]);
 }
 
-/** Show frames as thumbnails of a variant's errors that lead to them; those without as numbers. */
-function showFrames(title, variant, frames) {
-  if (!browser) return false;
-  const known = frames.filter((each) => browser.byFrame.has(each));
-  const [head, grid] = [document.createElement("h3"), document.createElement("div")];
-  head.textContent = title;
-  grid.className = "grid behind";
-  if (known.length) grid.append(...known.map((each) => browser.thumbnail(each, variant)));
-  else grid.append("None of the frames on this page.");
-  enlarge([head, grid]);
-  return true;
-}
-
 /** Two pictures of a frame over each other: left of the slider one, right of it the other. */
 class Stage {
   constructor(element, left, right) {
