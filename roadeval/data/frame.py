@@ -74,13 +74,11 @@ class Frame:
 class Role(StrEnum):
     """The use of a frame in a run. Only `EVALUATED` frames are ever counted.
 
-    A `COPY` is a re-encoded image of a training frame of a model file; a `PICKED` one was labelled
-    because it was in doubt, so that it says nothing of the others.
+    A `PICKED` one was labelled because it was in doubt, so that it says nothing of the others.
     """
 
     EVALUATED = "evaluated"
     TRAINING = "training"
-    COPY = "copy"
     GAP = "gap"
     UNLABELLED = "unlabelled"
     PICKED = "picked"

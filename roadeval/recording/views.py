@@ -360,7 +360,6 @@ _STATES: Final[Mapping[str, Colour]] = {
     Health.FAILED: colours.VERMILLION,
     Role.EVALUATED: colours.SKY_BLUE,
     Role.TRAINING: colours.PURPLE,
-    Role.COPY: colours.YELLOW,
     Role.GAP: colours.DARK_GREY,
     Role.UNLABELLED: colours.GREY,
     Role.PICKED: colours.ORANGE,

@@ -26,7 +26,7 @@ from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import Output, StageError, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
-from roadeval.training.schedule import Likeness, Schedule, fingerprint
+from roadeval.training.schedule import Schedule
 from roadeval.training.settings import TrainingSettings
 
 COLLAPSED: Final = 0.001
@@ -83,7 +83,6 @@ def fit(
         pixels,
         BlindPrior.of_truths(labelled).road if labelled else None,
         tuple(found),
-        np.stack([fingerprint(frame.image) for frame in frames]),
     )
 
 
@@ -242,8 +241,7 @@ def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Sch
     model = kept_model(path, tuple(dict.fromkeys(stages)))
     for name, pipeline in pipelines.items():
         model.require(name, pipeline, path)
-    known = None if model.fingerprints is None else Likeness(model.fingerprints)
-    return model, Schedule(model.digests, likeness=known)
+    return model, Schedule(model.digests)
 
 
 Frames = Callable[..., Iterable[LoggedFrame]]
@@ -296,33 +294,21 @@ def from_log(
         chosen = ranked or _spread_out(candidates, frames, settings, on_frame, by_truth=by_truth)
     else:
         chosen = ranked or _from_the_first(candidates, settings, on_frame, by_truth=by_truth)
-    held, count = chosen.held, len(chosen.held.frames)
-    warnings = []
-    if held.is_full:
-        warnings.append(f"trained on {count} of {settings.frames} frames: {held.full()}")
-    if chosen.undecodable:
-        warnings.append(
-            f"trained on {count} frames: {chosen.undecodable} more of those at equal distances "
-            "cannot be decoded"
-        )
-    warnings += _repeated(held.frames)
+    held, warnings = chosen.frames, []
     if labelled and not by_truth:
         what = "no frame that is read has road truth"
         what = what if picks is None else "no frame that was picked by rank is labelled"
         warnings.append(f"{what}: {BY_PATCH}")
     schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first, picks=picks)
     if base is None:
-        schedule = replace(schedule, sizes=frozenset(len(f.payload) for f in held.frames))
+        schedule = replace(schedule, sizes=frozenset(len(f.payload) for f in held))
     else:
         how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
         warnings.append(
-            f"the model of other drives ({settings.model}) was adapted to this drive with {count} "
-            f"of its own {how}: the rates are not those on a drive that it has not seen"
+            f"the model of other drives ({settings.model}) was adapted to this drive with "
+            f"{len(held)} of its own {how}: the rates are not those on a drive that it has not seen"
         )
-        # Frames that it has learnt from may be of any size, and re-encoded.
-        known = None if base.fingerprints is None else Likeness(base.fingerprints)
-        schedule = replace(schedule, likeness=known)
-    models = _with_each_seed(held.frames, pipelines, settings, warnings, base)
+    models = _with_each_seed(held, pipelines, settings, warnings, base)
     return models, replace(schedule, digests=models[0].digests)
 
 
@@ -376,20 +362,8 @@ def from_drives(
         )
     guessed = bare and settings.source == "auto"
     guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
-    repeated = [each for path, own in frames.items() for each in _repeated(own, f"{path.name}: ")]
     every = [frame for own in frames.values() for frame in own]
-    return fit(every, pipelines, settings, [*warnings, *repeated, *guess])
-
-
-def _repeated(frames: Sequence[Frame], drive: str = "") -> list[str]:
-    """Return a warning if some training frames of a drive are the same image."""
-    repeated = len(frames) - len({frame.digest() for frame in frames})
-    if not repeated:
-        return []
-    return [
-        f"{drive}{repeated} of the {len(frames)} training frames repeat another one: the model "
-        "learnt from fewer than was asked for"
-    ]
+    return fit(every, pipelines, settings, [*warnings, *guess])
 
 
 def spread(
@@ -412,41 +386,33 @@ class HeldFrames:
 
     def __init__(self) -> None:
         self.frames: list[Frame] = []
-        self.is_full = False
         self._bytes = 0
 
-    def add(self, frame: Frame) -> bool:
-        """Hold a frame if there is room for it; return whether there was."""
+    def add(self, frame: Frame) -> None:
+        """Hold a frame; a `TrainingError` if there is no room for it."""
         masks = [frame.truth, frame.shadow_truth, *frame.external.values()]
         # Two filters in a row leave two more images of each frame while a variant is fitted.
         size = 3 * frame.image.nbytes + sum(mask.nbytes for mask in masks if mask is not None)
         size += sum(each.nbytes for each in frame.probabilities.values())
-        size += len(frame.payload)
-        self.is_full = self._bytes + size > GREATEST_MEMORY
-        if not self.is_full:
-            self._bytes += size
-            self.frames.append(frame)
-        return not self.is_full
-
-    def full(self) -> str:
-        """Return why no more frames can be held."""
-        return (
-            f"training holds its frames decoded, and more than {len(self.frames)} of them would "
-            f"take over {GREATEST_MEMORY >> 20} MiB"
-        )
+        self._bytes += size + len(frame.payload)
+        if self._bytes > GREATEST_MEMORY:
+            raise TrainingError(
+                f"training holds its frames decoded, and more than {len(self.frames)} of them "
+                f"would take over {GREATEST_MEMORY >> 20} MiB: lower `training.frames`, or reduce "
+                "them with `frames.scale`"
+            )
+        self.frames.append(frame)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chosen:
     """The frames that train, and what that means for the others."""
 
-    held: HeldFrames
-    gap: frozenset[int]
+    frames: Sequence[Frame]
+    gap: frozenset[int] = frozenset()
     """Numbers of the frames beside them that are not evaluated."""
-    first: int | None
+    first: int | None = None
     """Number of the first frame to evaluate; None if there is none."""
-    undecodable: int = 0
-    """How many of the frames chosen do not train, for they cannot be decoded."""
 
 
 def _candidates(frames: Frames, *, labelled: bool) -> tuple[Iterator[LoggedFrame], bool]:
@@ -464,10 +430,9 @@ def _of_picks(frames: Frames, picks: Picks, on_frame: Callable[[int], None]) -> 
     for _, frame in decoded(e for e in frames() if e.labelled and e.stamp_ns in ranked):
         if frame.truth is None or picks.is_proposal(frame.stamp_ns, frame.truth):
             continue
-        if not held.add(frame):
-            break
+        held.add(frame)
         on_frame(len(held.frames))
-    return Chosen(held, frozenset(), None) if held.frames else None
+    return Chosen(held.frames) if held.frames else None
 
 
 def _from_the_first(
@@ -480,13 +445,13 @@ def _from_the_first(
     """Choose the first ``settings.frames`` frames; the gap lies after them.
 
     Only as many candidates are taken as are needed, in order. ``by_truth`` says that a frame must
-    be left to evaluate. A `TrainingError` if none is left, or not one frame can be held in memory.
+    be left to evaluate. A `TrainingError` if none is left.
     """
     gap = settings.gap or 0
-    held, rest = _hold(candidates, settings.frames, on_frame)
-    following = [readable.number for readable in islice(rest, gap + 1)]
-    if by_truth and held.frames and len(following) <= gap:
-        raise _none_left(len(held.frames), gap, len(held.frames) + len(following))
+    held = _hold(candidates, settings.frames, on_frame)
+    following = [readable.number for readable in islice(candidates, gap + 1)]
+    if by_truth and held and len(following) <= gap:
+        raise _none_left(len(held), gap, len(held) + len(following))
     first = following[gap] if len(following) > gap else None
     return Chosen(held, frozenset(following[:gap]), first)
 
@@ -507,8 +472,8 @@ def _spread_out(
     """
     every = [each.number for each in candidates]
     asked = frozenset(evenly(every, settings.frames))
-    held, _ = _hold((e for e in frames(asked) if e.number in asked), settings.frames, on_frame)
-    trained = {frame.number for frame in held.frames}
+    held = _hold((e for e in frames(asked) if e.number in asked), settings.frames, on_frame)
+    trained = {frame.number for frame in held}
     places = [place for place, number in enumerate(every) if number in trained]
     gap = settings.gap
     if gap is None:
@@ -518,8 +483,7 @@ def _spread_out(
     if by_truth and trained and not left:
         raise _none_left(len(trained), len(near & {*range(len(every))}), len(every))
     beside = frozenset(number for place, number in enumerate(every) if place in near)
-    lost = 0 if held.is_full else len(asked) - len(trained)
-    return Chosen(held, beside, left[0] if left else None, lost)
+    return Chosen(held, beside, left[0] if left else None)
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -551,21 +515,18 @@ def decoded(
 
 def _hold(
     candidates: Iterator[LoggedFrame], count: int, on_frame: Callable[[int], None]
-) -> tuple[HeldFrames, Iterator[LoggedFrame]]:
-    """Decode the first ``count`` frames, or as many as can be held; return the others too."""
+) -> list[Frame]:
+    """Decode the first ``count`` frames."""
     held, lost = HeldFrames(), list[str]()
-    for readable, frame in decoded(candidates, lost):
-        if not held.add(frame):
-            if not held.frames:
-                raise TrainingError(f"{held.full()}; reduce the frames with `frames.scale`")
-            return held, chain([readable], candidates)
+    for _, frame in decoded(candidates, lost):
+        held.add(frame)
         on_frame(len(held.frames))
         if len(held.frames) == count:
             break
     if lost and not held.frames:
         none = f"none of the {len(lost)} frames to train on can be decoded"
         raise TrainingError(f"{none}; the first: {lost[0]}")
-    return held, candidates
+    return held.frames
 
 
 def _none_left(trained: int, gap: int, total: int) -> TrainingError:

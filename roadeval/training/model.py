@@ -23,18 +23,17 @@ from roadeval.pipeline.stage import Stage, check_arrays, check_range
 from roadeval.pipeline.stages import STAGES
 from roadeval.results.facts import another_format
 from roadeval.runtime.files import check_input, put
-from roadeval.training.schedule import SIDE
 from roadeval.version import VERSION as ROADEVAL
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 9
+VERSION: Final = 10
 """Version of the file, the only one that is read; raised when a stage's parameters change."""
 WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
 """The version of roadeval by that of the file, where the file does not say it."""
 GREATEST_SIZE: Final = 1 << 29
 """Bytes that a model's arrays may take; those of `roadeval train` take a few million."""
-OWN: Final = ("prior", "fingerprints")
-"""The arrays that belong to no variant."""
+PRIOR: Final = "prior"
+"""The array that belongs to no variant."""
 
 
 class ModelError(RoadevalError):
@@ -62,15 +61,10 @@ class Model:
     """
     warnings: tuple[str, ...] = ()
     """What a user should know before believing a result."""
-    fingerprints: npt.NDArray[np.float16] | None = None
-    """``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
-    `roadeval.training.schedule`; None where nothing was learnt at all."""
     losses: tuple[str, ...] = ()
     """What was lost of the drives when it was trained; not kept in a file."""
 
     def __post_init__(self) -> None:
-        if self.fingerprints is not None:
-            check_arrays(self, np.float16, fingerprints=("n", SIDE * SIDE))
         if self.prior is not None:
             check_arrays(self, np.float32, prior=("H", "W"))
             check_range("prior", self.prior, 0, 1)
@@ -124,8 +118,8 @@ def save_model(model: Model, path: Path) -> None:
         for stage, parameters in stages.items():
             own = arrays_of(parameters)
             arrays |= {f"{variant}/{stage}/{name}": array for name, array in own.items()}
-    shared = {name: getattr(model, name) for name in OWN}
-    arrays |= {name: array for name, array in shared.items() if array is not None}
+    if model.prior is not None:
+        arrays[PRIOR] = model.prior
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -231,9 +225,7 @@ def _model(
     given: dict[str, Any] = {name: content.get(name) for name in names}
     header = _Header(**given)
     parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
-    if "fingerprints" not in arrays:
-        raise ValueError("fingerprints are missing")
-    for name in arrays.keys() - {*OWN}:
+    for name in arrays.keys() - {PRIOR}:
         variant, _, rest = name.partition("/")
         stage, _, entry = rest.partition("/")
         if variant not in parts:
@@ -246,8 +238,7 @@ def _model(
         }
         for variant, stages in parts.items()
     }
-    prior, prints = (arrays.get(name) for name in OWN)
-    return Model(parameters, **vars(header), prior=prior, fingerprints=prints)
+    return Model(parameters, **vars(header), prior=arrays.get(PRIOR))
 
 
 def _parameters(where: str, stage: Stage | None, arrays: Mapping[str, npt.NDArray[Any]]) -> Any:

@@ -29,7 +29,7 @@ class TrainingSettings:
     insists."""
     frames: Annotated[int, Interval(ge=0, le=1000), Flag("--train-frames", "N")] = 10
     """Labelled frames to train on, which are never evaluated. All frames count for ``patch``. They
-    are held decoded, which bounds the number of large ones below the one allowed here."""
+    are held decoded."""
     placement: Annotated[Literal["first", "spread"], Flag("--train-on", "WHERE")] = "first"
     """The ``first`` labelled frames, or some ``spread`` along the drive. Those at equal distances
     show all its light and places: the result then says how the method fares on a drive that was

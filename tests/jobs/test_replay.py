@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -112,36 +111,6 @@ def of_five(tmp_path_factory):
     log = write_log(folder / "five.mcap", numbers=[0, 5, 10, 15, 21])
     roadeval.train([log], folder / "m.model", settings(train_frames=5))
     return folder / "m.model"
-
-
-def test_training_frames_that_were_encoded_anew_are_left_out_counted_and_told(of_five, tmp_path):
-    log = write_log(tmp_path / "again.mcap", tail=b"another byte")
-    outcome = run(log, tmp_path, model=of_five, record="none")
-    frames = outcome.summary["frames"]
-    assert (frames["trained_on"], frames["evaluated"]) == (0, 20)
-    assert frames["skipped"] == {"copies of training frames": 5, "unlabelled": 1}
-    assert not {0, 5, 10, 15, 21} & {*frames_of(tmp_path).frame}
-    told, journey = outcome.warnings
-    assert told.endswith("because they show the model's training pictures, encoded anew: 5")
-    assert journey.startswith("5 of the model's 5 training frames show places of this drive: it")
-
-
-def test_the_same_journey_at_another_rate_is_warned_of(of_five, tmp_path):
-    log = write_log(tmp_path / "between.mcap", numbers=[1, 6, 11])
-    outcome = run(log, tmp_path, model=of_five, record="none")
-    assert outcome.summary["frames"]["evaluated"] == 3
-    (told,) = outcome.warnings
-    assert "training frames show places of this drive: it looks like the same journey" in told
-
-
-def test_a_model_without_fingerprints_is_told_of(of_five, tmp_path, monkeypatch):
-    known = replace(roadeval.load_model(of_five), fingerprints=None)
-    monkeypatch.setattr(learning, "kept_model", lambda path, stages: known)
-    log = write_log(tmp_path / "again.mcap", tail=b"another byte", numbers=range(4))
-    outcome = run(log, tmp_path, model=of_five, record="none")
-    assert outcome.summary["frames"]["evaluated"] == 4
-    (told,) = outcome.warnings
-    assert "made by an earlier version, which kept no fingerprints" in told
 
 
 def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatch):

@@ -442,7 +442,7 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
     drawn: dict[Path, Sequence[Frame]] = {}
     passed: dict[str, str] = {}
     for entry, own in task.candidates:
-        if len(drawn) == TRAINING_DRIVES or held.is_full:
+        if len(drawn) == TRAINING_DRIVES:
             break
         try:
             frames = list(_frames_of(entry, own, held))
@@ -459,7 +459,7 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
 
 
 def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[Frame]:
-    """Decode the training frames of a drive, and hold them as long as there is room."""
+    """Decode the training frames of a drive, and hold them."""
     with logs.open_log(readable(entry.source), own.for_training()) as log:
         selection = log.select()
         if selection.truth is None:
@@ -468,8 +468,7 @@ def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[
         for frame in learning.spread(begin, own.training.frames, labelled=True):
             if frame.truth is None:
                 return
-            if not held.add(frame):
-                return
+            held.add(frame)
             yield frame
 
 

@@ -123,8 +123,6 @@ class Run:
     board: Scoreboard
     camera: str = ""
     """What the camera is called in a rig; elsewhere its topic is its name."""
-    beside: set[int] = field(default_factory=set)
-    """The training frames of a model file that show a place of this drive, so far."""
     failures: Failures = field(default_factory=Failures)
     """The frames on which a stage failed, so far."""
 
@@ -147,7 +145,6 @@ class Run:
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
         """Add a frame, in the camera's order; return it with the lines that take that order."""
         doubts = self.board.add(done.result)
-        self.beside.update(done.beside)
         if done.result.role in TRIED:
             self.failures.first = None
         lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
@@ -379,14 +376,12 @@ class ProcessedFrame:
     """A scored frame without its layers, its lines of the tables, and its encoded form.
 
     ``position`` counts the frames that were read, from 1, those included that cannot be decoded.
-    ``beside`` are the training frames of a model file that show the same place.
     """
 
     position: int
     result: FrameResult
     lines: Mapping[str, str]
     encoded: Any
-    beside: frozenset[int]
 
 
 def process(
@@ -443,10 +438,10 @@ def _process(
         frame = replace(logged.decode(), camera=run.key.camera)
     except logs.FrameError:
         return run, None  # the log's accounting has it, with the reason
-    use = run.schedule.use(frame)
-    if use.role is Role.UNLABELLED and frame.truth is not None:
+    role = run.schedule.role(frame)
+    if role is Role.UNLABELLED and frame.truth is not None:
         frame = replace(frame, truth=None)  # it is a proposal as it was made
-    known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
+    known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of_frame(frame)
     variants = []
@@ -459,16 +454,16 @@ def _process(
             continue
         except StageError as error:
             where = "".join(traceback.format_exception(error))
-            return run, Failure(frame.number, use.role, name, str(error), where)
+            return run, Failure(frame.number, role, name, str(error), where)
         variants.append(found)
     variants += [
         external_variant(name, mask, frame.probabilities.get(name))
         for name, mask in frame.external.items()
         if name not in run.chains
     ]
-    result = run.board.score(frame, use.role, tuple(variants))
+    result = run.board.score(frame, role, tuple(variants))
     result = replace(result, notes=notes_of(result.tallies))
     own = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
-    return run, ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)
+    return run, ProcessedFrame(position, result.without_layers(), own, encoded)

@@ -43,8 +43,6 @@ from roadeval.version import VERSION
 
 LOOKED_AT: Final = 10
 """Frames without truth that are named as worth a look."""
-JOURNEY: Final = 3
-"""With so many training frames that show places of a drive it is taken for the same journey."""
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 """Signs that a frame has by itself, without the one before."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
@@ -394,32 +392,15 @@ def _masks(run: Run) -> dict[str, Any]:
 
 
 def _near_training(run: Run) -> Iterator[str]:
-    """Warn where frames that trained a model file, or their neighbours, lie in this drive."""
+    """Warn where frames that trained a model file lie in this drive."""
     roles, trained = Counter(run.board.roles()), len(run.model.digests)
-    own, copies = roles[Role.TRAINING], roles[Role.COPY]
-    settings = run.config.training
+    own, settings = roles[Role.TRAINING], run.config.training
     if settings.model is None or settings.adapt or not roles[Role.EVALUATED]:
         return
-    if run.model.fingerprints is None:
-        yield (
-            "the model was made by an earlier version, which kept no fingerprints: training frames "
-            "that were encoded anew are not recognised; train it again"
-        )
-    if copies:
-        yield (
-            "frames that are left out because they show the model's training pictures, encoded "
-            f"anew: {copies}"
-        )
     if own:
         yield (
             f"{own} of the model's {trained} training frames lie in this drive; their neighbours "
             f"are evaluated and {FLATTERED}"
-        )
-    elif copies or len(run.beside) >= min(JOURNEY, trained):
-        yield (
-            f"{len(run.beside)} of the model's {trained} training frames show places of this "
-            "drive: it looks like the same journey, at another rate or encoded anew; frames beside "
-            f"them are evaluated and {FLATTERED}"
         )
 
 
@@ -442,7 +423,6 @@ def _accounting(run: Run) -> FrameAccount:
         "undecodable": len(seen.undecodable),
         "failed in a stage": len(run.failures),
         "trained on": roles[Role.TRAINING],
-        "copies of training frames": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
         "picked": roles[Role.PICKED],

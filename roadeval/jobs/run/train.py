@@ -87,10 +87,7 @@ def _draw(
 
         labelled = own.training.source != "patch"
         for frame in learning.spread(begin, own.training.frames, labelled=labelled):
-            if not held.add(frame):
-                raise TrainingError(
-                    f"{held.full()}; lower `training.frames`, or reduce them with `frames.scale`"
-                )
+            held.add(frame)
             frames.append(frame)
             show()
         account = streams[-1].accounting
