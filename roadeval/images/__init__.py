@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     )
     from roadeval.images.formats import (
         MAX_PIXELS,
-        DamagedImageError,
         ImageError,
         ImageFormat,
         Limits,

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.images.formats import DamagedImageError, ImageError, ImageFormat, Limits, format_of
+from roadeval.images.formats import ImageError, ImageFormat, Limits, format_of
 
 Array = npt.NDArray[Any]
 File = bytes | memoryview
@@ -42,8 +42,7 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
     """Decode an image file to ``(H, W, 3)`` uint8 RGB.
 
     16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels, and
-    opacity is left out. A `DamagedImageError` if it is damaged, unless the limits allow that and
-    something can be decoded. An `ImageError` if it is of no known format, or too large.
+    opacity is left out. An `ImageError` if it is damaged, of no known format, or too large.
     """
     format_ = _known_format(data)
     if format_.plugin is None:
@@ -146,9 +145,9 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     if bytes(data).count(_SCAN) > MOST_SCANS and _scans(bytes(data)) > MOST_SCANS:
         raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
     try:
-        pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=not limits.keep_damaged)
+        pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=True)
     except ValueError as error:
-        raise DamagedImageError(f"a damaged JPEG ({error})") from error
+        raise ImageError(f"a damaged JPEG ({error})") from error
     return pixels
 
 
@@ -177,8 +176,7 @@ def _loaded(data: File, format_: ImageFormat, limits: Limits) -> Any:
     with _damage_in(format_):
         with _opened(data, format_) as image:
             limits.check(*image.size)
-            if not limits.keep_damaged:
-                image.verify()
+            image.verify()
         with _opened(data, format_) as image:
             image.load()
             return image
@@ -209,14 +207,14 @@ def _silence_pillow() -> None:
 
 @contextmanager
 def _damage_in(format_: ImageFormat) -> Iterator[None]:
-    """Turn whatever Pillow raises on a damaged file into a `DamagedImageError`."""
+    """Turn whatever Pillow raises on a damaged file into an `ImageError`."""
     try:
         yield
     except (ImageError, MemoryError):
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DamagedImageError(f"a damaged {format_.name} ({reason})") from error
+        raise ImageError(f"a damaged {format_.name} ({reason})") from error
 
 
 def _samples(image: Any) -> Array:

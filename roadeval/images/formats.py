@@ -10,24 +10,18 @@ MAX_PIXELS: Final = 1 << 25
 
 
 class ImageError(ValueError):
-    """An image that cannot be read, or is not read because it is too large.
+    """An image that is damaged, of an unknown format, or too large to be read.
 
     Its message completes "frame 7: ...".
     """
 
 
-class DamagedImageError(ImageError):
-    """An image file that is damaged; `Limits.keep_damaged` reads what is left of it."""
-
-
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How large an image may be, and whether it may be damaged."""
+    """How large an image may be."""
 
     max_pixels: int = MAX_PIXELS
     """Most pixels. An image's own head says how many it has, so none is decoded that has more."""
-    keep_damaged: bool = False
-    """Whether to decode a damaged file as far as it goes."""
 
     def check(self, width: int, height: int) -> None:
         """Refuse a size; an `ImageError` if it is empty or too large."""

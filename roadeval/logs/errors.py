@@ -19,14 +19,3 @@ class BadRecord(Exception):  # noqa: N818  (never leaves this room)
 
 class BadMessage(Exception):  # noqa: N818  (never leaves this room)
     """A message that cannot be decoded."""
-
-
-class DamagedMessage(BadMessage):
-    """A message whose picture is damaged, and may be decoded in part all the same.
-
-    ``damage`` is what is wrong with it.
-    """
-
-    def __init__(self, damage: str) -> None:
-        super().__init__(f"{damage}; `frames.keep_corrupt` uses what is left of it")
-        self.damage = damage

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Final, TypeVar
 
 import numpy as np
@@ -15,15 +13,15 @@ import numpy.typing as npt
 
 from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.geometry.ground import Ground, ground_of
-from roadeval.images import Limits, format_of
-from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError, LogError
+from roadeval.images import format_of
+from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
 from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
 from roadeval.logs.topics.calibration import calibration_of
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
-from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, oddities
+from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.meaning import Labels
 from roadeval.logs.truth.pairing import Camera, Clock, Partners
 from roadeval.logs.truth.source import (
@@ -137,7 +135,6 @@ def settle(
     readers: Mapping[str, TopicReader],
     config: LogConfig,
     *,
-    several: bool = False,
     of_rig: bool = False,
 ) -> Selection:
     """Settle what to replay of a log's own topics; ``of_rig`` is that of `choose_truth`.
@@ -152,7 +149,7 @@ def settle(
         truth = Choice(None, "")
     else:
         truth = choose_truth(topics, image, asked.truth, config.labels, of_rig=of_rig)
-    choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow, config.labels)}
+    choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow)}
     for name, topic in asked.masks.items():
         choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
     # What would be scored against itself is refused.
@@ -162,14 +159,13 @@ def settle(
         if choices[name].topic == truth.topic:
             raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
     camera = Camera.of(readers[image.name], image, asked)
-    masks_only = LabelSettings(tolerance=config.labels.tolerance)
     labels = {}
     for name, (chosen, reason) in choices.items():
         if chosen is not None:
             check_size(chosen.name, chosen.size, camera)
-            own = MaskSettings(labels=config.labels if name == TRUTH else masks_only)
+            own = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
             reader = readers[chosen.name]
-            labels[name] = in_log(reader, own, camera, reason, several=several)
+            labels[name] = in_log(reader, own, camera, reason)
     no_truth = "" if truth.topic else truth.why
     known, unknown = calibration_of(image, topics, readers)
     ground = ground_of(known, config.ground, image.size)
@@ -185,7 +181,6 @@ def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
     raise nothing_of(reader, topic.problem)
 
 
-T = TypeVar("T")
 Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
 
 
@@ -193,7 +188,7 @@ Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
 class Accounting:
     """Counts of frames and of truth, which grow while frames are read.
 
-    The dictionaries are by frame number, and any thread may add to them.
+    Any thread may add to ``undecodable``, which is by frame number.
     """
 
     in_log: int = 0
@@ -208,29 +203,11 @@ class Accounting:
     """Of these, those that have a mask of another method, by its name."""
     undecodable: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that could not be decoded, and why."""
-    damaged: dict[int, str] = field(default_factory=dict)
-    """Those that are damaged and were decoded all the same, and what is wrong."""
-    sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """Width and height of those that are not of the topic's size."""
-    fringes: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
-    """By frame number and label source: pixels ignored because their value is too far from every
-    known one, and pixels in all. Only of images that have any."""
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """The frames that could not be decoded, or only in part: a sentence each."""
-        frames = sorted((self.undecodable | self.damaged).items())
-        return tuple(f"frame {number}: {reason}" for number, reason in frames)
-
-    def ignored(self) -> Iterator[str]:
-        """Yield a sentence for each label source of which some pixels are ignored: how many."""
-        for source in dict.fromkeys(source for _, source in sorted(self.fringes)):
-            found = [counts for (_, own), counts in self.fringes.items() if own == source]
-            pixels, size = map(sum, zip(*found, strict=True))
-            yield (
-                f"{source}: {100 * pixels / size:.2g} % of the pixels of {len(found)} label images "
-                "are ignored, being farther than `labels.tolerance` from every known value"
-            )
+        """The frames that could not be decoded: a sentence each."""
+        return tuple(f"frame {number}: {why}" for number, why in sorted(self.undecodable.items()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -271,10 +248,7 @@ class LoggedFrame:
         picture = self.picture
         if isinstance(picture, FrameError):
             raise picture
-        image, is_whole = self._pixels(lambda limits: to_rgb(picture, limits))
-        size = image.shape[1], image.shape[0]
-        if size != (self.selection.image.size or size):
-            self.accounting.sizes[self.number] = size
+        image = to_rgb(picture, self.selection.camera.images.limits)
         labels = {name: self._label(label, image) for name, label in self.labels.items()}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
         is_file = isinstance(picture, CompressedPicture)
@@ -285,7 +259,7 @@ class LoggedFrame:
             self.log_time_ns,
             image,
             picture.data,
-            format_.media_type if is_whole and format_ else None,
+            format_.media_type if format_ else None,
             None if truth is None else truth.truth,
             None if shadow is None else shadow.truth,
             # A mask has no third value.
@@ -297,28 +271,12 @@ class LoggedFrame:
             },
         )
 
-    def _pixels(self, decode: Callable[[Limits], T], place: str = "") -> tuple[T, bool]:
-        """Decode, if the limits allow that even what is damaged; return whether it was whole."""
-        limits = self.selection.camera.images.limits
-        try:
-            return decode(replace(limits, keep_damaged=False)), True
-        except DamagedMessage as error:
-            if not limits.keep_damaged:
-                raise
-            found = decode(limits)
-            where = f"{place}: " if place else ""
-            self.accounting.damaged[self.number] = f"{where}{error.damage}, used all the same"
-            return found, False
-
     def _label(self, label: Label, image: Rgb) -> Labels:
         """Decode a label, and bring it to the size of the image."""
         try:
-            found, _ = self._pixels(label.read, label.place)
+            found = label.read(self.selection.camera.images.limits)
         except BadMessage as error:
             raise FrameError(f"{label.place}: {error}") from error
-        if found.fringe:
-            where = self.number, label.source.pictures.name
-            self.accounting.fringes[where] = found.fringe, found.truth.size
         height, width = image.shape[:2]
         high, wide = found.truth.shape
         if (high, wide) == (height, width):
@@ -355,7 +313,6 @@ class FrameStream:
             name: (source, source.partners(begin)) for name, source in selection.labels.items()
         }
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
-        self._stamps = array("q")
         self._iterator = map(self._frame, numbers)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
@@ -372,15 +329,6 @@ class FrameStream:
         """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
         return self._selection.camera.images.log_times[np.asarray(self._numbers, np.intp)]
 
-    @cached_property
-    def oddities(self) -> tuple[str, ...]:
-        """What a user should know of the frames that were read; complete after the last decode."""
-        numbers = self._numbers[: len(self._stamps)]
-        stamps, sizes = np.array(self._stamps, np.int64), self.accounting.sizes
-        camera = self._selection.camera
-        found = oddities(camera.images, camera.topic.size, numbers, stamps, sizes)
-        return (*found, *self.accounting.ignored())
-
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
             name: source.label(position)
@@ -395,9 +343,9 @@ class FrameStream:
         camera = self._selection.camera
         log_time = int(camera.images.log_times[number])
         stamp = camera.images.stamp(number) if camera.clock is Clock.STAMP else UNREADABLE
-        self._stamps.append(log_time if stamp == UNREADABLE else stamp)
+        stamp = log_time if stamp == UNREADABLE else stamp
         return LoggedFrame(
-            number, self._stamps[-1], log_time, picture, labels, self._selection, self.accounting
+            number, stamp, log_time, picture, labels, self._selection, self.accounting
         )
 
 

@@ -21,7 +21,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import choose_truth, named
-from roadeval.logs.topics.reader import TopicInfo, describe_topic, survey, topic_readers
+from roadeval.logs.topics.reader import TopicInfo, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.pairing import frames_of, with_keys
 from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
@@ -91,7 +91,7 @@ class Log:
         is_file = path.is_file() or (bool(opened) and [*opened] == [path])
         self.name = visible(path.stem if is_file else path.resolve().name)
         self.config = config
-        self._limits = Limits(config.frames.max_pixels, config.frames.keep_corrupt)
+        self._limits = Limits(config.frames.max_pixels)
         self._lost_files = damage
         self._beside: list[Log] = []
         self._of_rig = False
@@ -103,7 +103,6 @@ class Log:
                 file,
                 lambda *channel: kind_of(*channel) is not TopicKind.OTHER,
                 message_stamp,
-                keep_corrupt=config.frames.keep_corrupt,
                 opened=opened.get(file),
             )
         ]
@@ -196,20 +195,18 @@ class Log:
         found = [each.hexdigest() for each in sums.values()]
         return found[0] if len(found) == 1 else hashlib.sha256("".join(found).encode()).hexdigest()
 
-    def select(self, *, several: bool = False) -> Selection:
+    def select(self) -> Selection:
         """Settle what to replay: what is asked for, and the rest where the log leaves no doubt.
 
-        Another log that holds masks stays open as long as this one. ``several`` says that the
-        labels are given for several logs at once, see `understand`. A `LogError` if a topic is
+        Another log that holds masks stays open as long as this one. A `LogError` if a topic is
         missing or the choice is not plain, a label value does not occur or cannot be understood, a
         label image has another size, or no mask belongs to a frame.
         """
         try:
-            own = self.topics, self._readers, self.config
-            found = settle(*own, several=several, of_rig=self._of_rig)
+            found = settle(self.topics, self._readers, self.config, of_rig=self._of_rig)
             if (place := self.config.truth).path:
                 settings = MaskSettings(**vars(place), labels=self.config.labels)
-                truth = self._beside_log(settings, found, several=several)
+                truth = self._beside_log(settings, found)
                 found = replace(found, labels={TRUTH: truth, **found.labels})
             beside = {
                 name: self._masks(name, own, found) for name, own in self.config.masks.items()
@@ -235,16 +232,14 @@ class Log:
             raise LogError(f"`masks` {name}: {reason}") from error
         return masks
 
-    def _beside_log(
-        self, settings: MaskSettings, found: Selection, *, several: bool = False
-    ) -> LabelSource:
+    def _beside_log(self, settings: MaskSettings, found: Selection) -> LabelSource:
         """Settle labels of a folder, of an annotation tool's file, or of another log."""
         log, topic = log_and_topic(settings.path)
         camera = found.camera
         if log is None:
             origin = labels_in(Path(settings.path), camera.topic.size)
             labels = with_keys(origin, settings.path, settings, self._limits)
-            return beside_log(labels, settings, camera, lambda: labels.digest, several=several)
+            return beside_log(labels, settings, camera, lambda: labels.digest)
         other = open_log(log, LogConfig(frames=self.config.frames))
         self._beside.append(other)
         if topic is None:
@@ -255,7 +250,7 @@ class Log:
         reader = other._readers[named(other.topics, topic, "topic").name]
         same = other.path.resolve() == self.path.resolve()
         name = "" if same else other.name
-        return beside_log(reader, settings, camera, lambda: other.digest, name, several=several)
+        return beside_log(reader, settings, camera, lambda: other.digest, name)
 
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with what is asked of one camera of several."""
@@ -330,9 +325,6 @@ class LogDescription:
     """What a replay would pick and why, a sentence each."""
     problem: str
     """Why a replay could not pick, or empty."""
-    oddities: tuple[str, ...]
-    """Several sizes and repetitions of the images that a replay would pick, a sentence each; of a
-    log that was read whole."""
     damage: tuple[str, ...]
     losses: tuple[str, ...]
     """The damage of the files, and the losses by it, a sentence each."""
@@ -363,14 +355,11 @@ def describe(
     """
     with open_log(path, config) as log:
         picks: tuple[str, ...] = ()
-        oddities: tuple[str, ...] = ()
         problem = ""
         verified = verify or log.size <= SMALL
         try:
             selection = log.select()
-            picks, images = selection.reasons, selection.camera.images
-            odd = survey(images, selection.image.size) if verified else ()
-            oddities = tuple(f"{images.name}: {each}" for each in odd)
+            picks = selection.reasons
         except LogError as error:
             problem = str(error)
         sha256 = log.verify(on_bytes) if verified else None
@@ -382,7 +371,6 @@ def describe(
             topics=log.topics,
             picks=picks,
             problem=problem,
-            oddities=oddities,
             damage=tuple(map(str, log.damage)),
             losses=log.losses,
             digest=log.digest,

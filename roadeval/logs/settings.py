@@ -133,11 +133,6 @@ class LabelSettings:
     """Truth colours that are road, red, green and blue."""
     ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
     """Truth colours that are counted nowhere."""
-    tolerance: Annotated[int | None, Interval(ge=1, le=127), Flag("--label-tolerance", "N")] = None
-    """For masks compressed as JPEG: ignore values farther than this from the known ones. A value at
-    most so far from one that means road (255 by default), from 0 or from one to ignore means the
-    same; the others lie at edges, and their share is reported. Without it such masks are refused.
-    """
 
     @property
     def values(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -156,8 +151,6 @@ class LabelSettings:
             raise ValueError(
                 "`labels.ignore_colors` needs `labels.road_colors`: name the colours that mean road"
             )
-        if self.tolerance is not None and (self.road_colors or 0 in self.road):
-            raise ValueError("`labels.tolerance` is for masks of values, in which 0 is non-road")
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
 
@@ -168,8 +161,8 @@ class LabelPlace:
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
     """A folder of label images, files of an annotation tool (COCO, CVAT, LabelMe, YOLO, Label
-    Studio, OpenLABEL), or LOG.mcap:/topic. Images may be NPY files; there is one a frame. In the
-    path ``{drive}`` is the name of the drive's file, without its ending."""
+    Studio), or LOG.mcap:/topic. Images may be NPY files; there is one a frame. In the path
+    ``{drive}`` is the name of the drive's file, without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
     """How labels and frames belong together: by ``number``, the last one in the name of a label's
     file; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
@@ -225,8 +218,6 @@ class FrameSettings:
     scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0
     """Reduce frames and truth to this share of their width and height first. It is quicker and
     coarser, and gives other results."""
-    keep_corrupt: Annotated[bool, Flag("--keep-corrupt", group="Input")] = False
-    """Use damaged data: messages whose checksum is wrong, and images of which a part is lost."""
     max_pixels: Annotated[int, Interval(ge=1, le=1 << 30), Flag("--max-pixels", "N", "Input")] = (
         MAX_PIXELS
     )

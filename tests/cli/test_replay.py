@@ -45,7 +45,7 @@ def test_every_option_arrives(asked, tmp_path):
         f"--config {settings} --variant narrow={settings} --train-frames 5 "
         "--train-gap 2 --image-topic /image --truth-topic /truth --shadow-topic /shadow "
         "--road-label 3 --road-label 4 --ignore-label 11 --mask-topic net=/net "
-        "--sync-tolerance 2.5 --resize-truth --keep-corrupt -S 1.5 -E 2013-05-01T12:00:00Z "
+        "--sync-tolerance 2.5 --resize-truth -S 1.5 -E 2013-05-01T12:00:00Z "
         "--every 2 --max-frames 7 --record none --jobs 1"
     )
     assert main(words.split()) == 0
@@ -69,7 +69,6 @@ def test_every_option_arrives(asked, tmp_path):
                 "end": "2013-05-01T12:00:00Z",
                 "every": 2,
                 "max_frames": 7,
-                "keep_corrupt": True,
             },
             "output": {"save": "out.rrd", "reports": "out", "mcap": "o.mcap", "record": "none"},
             "run": {"jobs": 1},
@@ -224,7 +223,7 @@ def test_every_preset_is_named_in_the_help():
 # --- Which options a command takes ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["frames.keep_corrupt_", "label"])
+@pytest.mark.parametrize("name", ["frames.max_pixels_", "label"])
 def test_a_setting_that_no_option_sets_is_an_error(name):
     with pytest.raises(ValueError, match=f"no option sets {name}$"):
         takes("preset", name)

@@ -17,7 +17,7 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 from mcap.writer import CompressionType, IndexType
 
-from roadeval.logs import FrameError, FrameSettings, LabelSettings, LogConfig, LogError, open_log
+from roadeval.logs import FrameError, LabelSettings, LogConfig, LogError, open_log
 from tests.fixtures import broken, drives
 from tests.fixtures.flavours import file_of, png, protobuf
 from tests.fixtures.writing import Logged, Topic, Written
@@ -134,12 +134,11 @@ def records(data: bytes) -> Iterator[tuple[int, int, int]]:
         at = end
 
 
-def read(path: Path, labels: LabelSettings = UNSAID, *, keep_corrupt: bool = False) -> Reading:
+def read(path: Path, labels: LabelSettings = UNSAID) -> Reading:
     """Read a log as a replay does."""
     frames, told, without_truth = [], [], ""
     try:
-        asked = LogConfig(labels=labels, frames=FrameSettings(keep_corrupt=keep_corrupt))
-        with open_log(path, asked) as log:
+        with open_log(path, LogConfig(labels=labels)) as log:
             log.verify()
             selection = log.select()
             stream = log.frames(selection)
@@ -152,7 +151,7 @@ def read(path: Path, labels: LabelSettings = UNSAID, *, keep_corrupt: bool = Fal
                 truth = None if frame.truth is None else frame.truth.tobytes()
                 image = frame.image.tobytes()
                 frames.append((frame.log_time_ns, Seen(frame.stamp_ns, image, truth)))
-            told += [*log.losses, *stream.oddities]
+            told += log.losses
             without_truth = selection.no_truth
     except LogError as error:
         told.append(str(error))

@@ -17,9 +17,9 @@ PIXELS: Final = 50
 
 TABLES: Final = {
     **dict.fromkeys(("start", "end", "every", "max_frames", "scale"), "frames"),
-    **dict.fromkeys(("keep_corrupt", "max_pixels"), "frames"),
+    "max_pixels": "frames",
     **dict.fromkeys(("masks", "resize_truth", "sync_tolerance_ms", "image", "truth"), "topics"),
-    **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors", "tolerance"), "labels"),
+    **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors"), "labels"),
     **dict.fromkeys(("model", "gap", "train_frames", "source", "seed", "seeds"), "training"),
     "record": "output",
     "jobs": "run",

@@ -2,14 +2,11 @@
 
 import re
 
-import cv2
 import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.logs import LogWriter
-from tests.jobs.making import NS, settings, write_log
-from tests.training.making import frame
+from tests.jobs.making import settings, write_log
 
 CODES = {"road": [3], "ignore": []}
 
@@ -32,16 +29,6 @@ def test_a_drive_may_have_labels_of_its_own(drives, tmp_path):
     assert model.warnings == ()
     # Road and non-road are the same pixels in both, so either drive alone gives the same prior.
     assert (model.prior == train(drives[:1], tmp_path).prior).all()
-
-
-def test_labels_for_all_leave_a_mask_as_it_is_and_this_is_told(drives, tmp_path):
-    own = train(drives, tmp_path, drives=[{"path": "ids.mcap", "labels": CODES}])
-    model = train(drives, tmp_path, road=[3])
-    assert (model.prior == own.prior).all()
-    assert model.warnings == (
-        "mask: none of the given labels occurs in /truth/road, which was read as a mask of 0 255: "
-        "road is 255",
-    )
 
 
 def test_labels_for_one_drive_alone_are_not_guessed_at(drives, tmp_path):
@@ -105,30 +92,6 @@ def test_a_drive_of_which_no_training_frame_can_be_decoded_is_refused(tmp_path):
     broken = write_log(tmp_path / "broken.mcap", broken=0)
     with pytest.raises(RoadevalError, match=r"broken.mcap: no training frame .*: frame 0: 8 bytes"):
         train([broken], tmp_path, max_frames=1)
-
-
-def test_labels_that_are_ignored_are_told(tmp_path):
-    path = tmp_path / "blurred.mcap"
-    with LogWriter(path) as log:
-        for number in range(4):
-            made, stamp = frame(number), (number + 1) * NS
-            for topic, image in (("/camera", made.image), ("/truth/road", made.truth * 255)):
-                _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 10])
-                log.image(topic, stamp, data.tobytes(), "jpeg")
-    (told,) = train([path], tmp_path, tolerance=4).warnings
-    assert re.match(r"blurred: /truth/road: .* % of the pixels of 3 label images are ignored", told)
-
-
-def test_images_of_several_sizes_are_told(tmp_path):
-    path = tmp_path / "mixed.mcap"
-    with LogWriter(path) as log:
-        for number in range(4):
-            made, stamp, size = frame(number), (number + 1) * NS, 1 + number // 2
-            for topic, image in (("/camera", made.image), ("/truth/road", made.truth * 255)):
-                _, data = cv2.imencode(".png", image[::size, ::size])
-                log.image(topic, stamp, data.tobytes(), "png")
-    (told,) = train([path], tmp_path).warnings
-    assert told.startswith("mixed: not all of the ")
 
 
 def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path):

@@ -1,4 +1,4 @@
-"""Images that are damaged, too large or otherwise not to be trusted: left out or kept, and told."""
+"""Images that are damaged, too large or otherwise not to be trusted: left out, and told."""
 
 from pathlib import Path
 from typing import Any
@@ -49,18 +49,7 @@ def test_a_damaged_image_is_left_out_and_named(tmp_path: Path) -> None:
     (first, second, third), stream = read(path)
     np.testing.assert_array_equal(first.image, third.image)
     assert second.startswith("frame 1: a damaged JPEG (Corrupt JPEG data")
-    assert second.endswith("`frames.keep_corrupt` uses what is left of it")
     assert [*stream.accounting.undecodable] == [1]
-    assert not stream.accounting.damaged
-
-
-def test_a_damaged_image_can_be_kept_and_is_told_all_the_same(tmp_path: Path) -> None:
-    path = ros2_log(tmp_path / "a.mcap", camera(JPEG, BROKEN))
-    (first, second), stream = read(path, keep_corrupt=True)
-    assert (first.media_type, second.media_type) == ("image/jpeg", None)
-    assert second.image.shape == first.image.shape
-    assert not stream.accounting.undecodable
-    assert stream.accounting.damaged[1].endswith(", used all the same")
 
 
 def test_damaged_truth_costs_its_frame_and_names_its_topic(tmp_path: Path) -> None:
@@ -72,11 +61,10 @@ def test_damaged_truth_costs_its_frame_and_names_its_topic(tmp_path: Path) -> No
     assert second.startswith("frame 1: /road_mask: a damaged PNG")
 
 
-def test_a_log_of_damaged_images_is_refused_with_the_way_to_use_it(tmp_path: Path) -> None:
+def test_a_log_of_damaged_images_is_refused(tmp_path: Path) -> None:
     path = ros2_log(tmp_path / "a.mcap", camera(BROKEN, BROKEN))
-    with pytest.raises(LogError, match=r"nothing of /camera .*: a damaged JPEG .*keep_corrupt"):
+    with pytest.raises(LogError, match=r"nothing of /camera .*: a damaged JPEG"):
         read(path)
-    assert len(read(path, keep_corrupt=True)[0]) == 2
 
 
 def test_an_image_that_claims_to_be_too_large_is_left_out(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
 
 
-@takes("truth", "topics", "cameras", "ground", "labels", "frames.keep_corrupt", "frames.max_pixels")
+@takes("truth", "topics", "cameras", "ground", "labels", "frames.max_pixels")
 def info(
     drive: arguments.Drive,
     *,

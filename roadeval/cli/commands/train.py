@@ -13,7 +13,7 @@ from roadeval.cli.options import Given, takes
     *("preset", "config", "variants", "nets", "masks", "tunes", "drives", "training.frames"),
     *("truth", "cameras", "topics.truth", "topics.masks", "labels"),
     *("topics.sync_tolerance_ms", "topics.resize_truth"),
-    *("frames.scale", "frames.keep_corrupt", "frames.max_pixels"),
+    *("frames.scale", "frames.max_pixels"),
     *("frames.start", "frames.end"),
 )
 def train(

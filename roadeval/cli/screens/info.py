@@ -27,8 +27,6 @@ def show(found: Mapping[str, Any], out: Console) -> None:
             out.print(f"{topic['name']} cannot be read: {topic['problem']}", soft_wrap=True)
         for gap in topic["gaps"]:
             out.print(f"{topic['name']}: {_gap(gap, found['start_ns'])}", soft_wrap=True)
-    for oddity in found["oddities"]:
-        out.print(oddity, soft_wrap=True)
     out.print()
     if found["problem"]:
         out.print(f"replay would stop: {with_flags(found['problem'])}", soft_wrap=True)

@@ -263,7 +263,6 @@ def warnings(run: Run) -> tuple[str, ...]:
     return (
         *((unlabelled, *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
-        *run.frames.oddities,
         *tuple(warned),
         *_tuned(run),
         *_missing(run),

@@ -27,10 +27,9 @@ def train(
 
     From each drive ``training.frames`` labelled frames are taken, spread evenly over the selected
     range. Frames without truth are taken where ``training.source`` is ``patch``, or ``auto`` and no
-    drive has truth. The labels hold for every drive without its own (`RunConfig.drives`); where
-    they do not occur, a 0/255 mask is recognised. Frames that cannot be decoded are left out, and
-    listed in `Model.losses`. A `RoadevalError` if some drives have truth and others none, or there
-    is nothing to learn.
+    drive has truth. The labels hold for every drive without its own (`RunConfig.drives`). Frames
+    that cannot be decoded are left out, and listed in `Model.losses`. A `RoadevalError` if some
+    drives have truth and others none, or there is nothing to learn.
     """
     config, paths = (config or RunConfig()).resolved(), listed(drives)
     settings = config.training
@@ -47,10 +46,9 @@ def train(
         on_progress(Progress(len(held.frames), total, "training"))
 
     with holding(output, inputs=paths):
-        drawn = [_draw(path, config, held, show, several=len(paths) > 1) for path in paths]
+        drawn = [_draw(path, config, held, show) for path in paths]
         frames = {each.path: each.frames for each in drawn}
-        warnings = [sentence for each in drawn for sentence in each.warnings]
-        model = learning.from_drives(frames, config.pipelines(), settings, warnings)
+        model = learning.from_drives(frames, config.pipelines(), settings)
         losses = [
             sentence if len(drawn) == 1 or sentence.startswith(start) else f"{start}{sentence}"
             for each in drawn
@@ -68,18 +66,15 @@ class _Drawn:
 
     path: Path
     frames: Sequence[Frame]
-    warnings: Sequence[str]
     losses: Sequence[str]
     """What of the drive could not be read."""
 
 
-def _draw(
-    drive: AnyPath, config: RunConfig, held: HeldFrames, show: Callable[[], None], *, several: bool
-) -> _Drawn:
+def _draw(drive: AnyPath, config: RunConfig, held: HeldFrames, show: Callable[[], None]) -> _Drawn:
     """Decode the training frames of a drive and hold them."""
     own, frames, streams = config.for_drive(drive), list[Frame](), list[logs.FrameStream]()
     with logs.open_log(drive, own.for_training()) as log:
-        selection = log.select(several=several and own.labels == config.labels)
+        selection = log.select()
 
         def begin() -> logs.FrameStream:
             streams.append(log.frames(selection))
@@ -97,8 +92,4 @@ def _draw(
             losses.append(f"{missing} of {total} training frames could not be decoded")
         if losses and not frames:
             raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
-        warnings, truth = [*streams[-1].oddities], selection.truth
-        if truth and own.labels.road and truth.meaning.by_itself:
-            read = f"which was read as {truth.meaning.words}"
-            warnings.insert(0, f"none of the given labels occurs in {truth.where}, {read}")
-        return _Drawn(log.path, frames, [f"{log.name}: {each}" for each in warnings], losses)
+        return _Drawn(log.path, frames, losses)

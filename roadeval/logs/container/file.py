@@ -77,17 +77,15 @@ def containers_in(
     wanted: Wanted,
     stamp_of: StampOf,
     *,
-    keep_corrupt: bool = False,
     opened: IO[bytes] | None = None,
 ) -> Iterator[Container]:
     """Open the log in a file, and those that follow it in the same file.
 
-    ``opened`` is the file where it lies elsewhere. ``stamp_of`` is called only next to damage;
-    ``keep_corrupt`` reads data whose checksum is wrong.
+    ``opened`` is the file where it lies elsewhere. ``stamp_of`` is called only next to damage.
     """
     rest = FileBytes(opened or path.open("rb", buffering=BUFFER))
     while True:
-        container = Container(path, rest, wanted, stamp_of, keep_corrupt=keep_corrupt)
+        container = Container(path, rest, wanted, stamp_of)
         yield container
         rest = rest.part(len(container.source), len(rest))
         if not len(rest):
@@ -103,15 +101,13 @@ class Container:
         source: FileBytes,
         wanted: Wanted,
         stamp_of: StampOf,
-        *,
-        keep_corrupt: bool = False,
     ) -> None:
         self.path = path
         self._wanted, self._stamp_of = wanted, stamp_of
-        self.source, self.scan = source, Scan(source, stamp_of, keep_corrupt=keep_corrupt)
+        self.source, self.scan = source, Scan(source, stamp_of)
         if self.scan.next_log is not None:
             self.source = source.part(0, self.scan.next_log)
-            self.scan = Scan(self.source, stamp_of, keep_corrupt=keep_corrupt)
+            self.scan = Scan(self.source, stamp_of)
         self.reader = self.scan.reader
         self.chunks, self.summary = self.scan.chunks, self.scan.summary
         self.schemas, self.channels = self.scan.schemas, self.scan.channels

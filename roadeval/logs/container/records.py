@@ -273,20 +273,16 @@ def walk(records: Bytes) -> Iterator[Record]:
 
 
 class ChunkReader:
-    """Reads the chunks of a file, the last few from memory.
+    """Reads the chunks of a file, the last few from memory."""
 
-    With ``keep_corrupt`` what is left of a chunk is read whose checksum is wrong.
-    """
-
-    def __init__(self, source: FileBytes, *, keep_corrupt: bool = False) -> None:
+    def __init__(self, source: FileBytes) -> None:
         self._source = source
-        self.keep_corrupt = keep_corrupt
         self._cache: OrderedDict[int, Bytes] = OrderedDict()
         self._doubts_left = DOUBTED + 4 * len(source)
         self.bad: dict[int, str] = {}
         """Why a chunk could not be read, by its offset."""
         self.kept: dict[int, str] = {}
-        """What is wrong with a chunk that was read nevertheless, by its offset."""
+        """What is wrong with a chunk of which something was read, by its offset."""
 
     def read(self, chunk: Chunk) -> Bytes:
         """Read the records of a chunk; of one that is cut off, those before the cut."""
@@ -297,11 +293,8 @@ class ChunkReader:
             try:
                 records = self.remains(chunk) if chunk.cut else self._whole(chunk)
             except BadRecord as error:
-                if not self.keep_corrupt:
-                    self.bad[at] = str(error)
-                    raise
-                self.kept[at] = f"{error}, used all the same"
-                records = self.remains(chunk)
+                self.bad[at] = str(error)
+                raise
             self._keep(at, records)
         self._cache.move_to_end(at)
         return self._cache[at]

@@ -94,8 +94,8 @@ class Gap(NamedTuple):
 class Scan:
     """What there is in a file."""
 
-    def __init__(self, source: FileBytes, stamp_of: StampOf, *, keep_corrupt: bool) -> None:
-        self.reader = ChunkReader(source, keep_corrupt=keep_corrupt)
+    def __init__(self, source: FileBytes, stamp_of: StampOf) -> None:
+        self.reader = ChunkReader(source)
         self.summary = read_summary(source)
         self.chunks: list[Chunk] = []
         """In the order of the file."""
@@ -147,9 +147,8 @@ class Scan:
                 return
             record = following
         checked = self.chunks and all(chunk.crc for chunk in self.chunks)
-        for channel_id, values in self._unsure.items():
-            if self.reader.keep_corrupt or not checked:
-                self.loose[channel_id].extend(values)
+        for channel_id, values in self._unsure.items() if not checked else ():
+            self.loose[channel_id].extend(values)
         size = len(self._source)
         if self.data_end is None and not any(gap.lossy and gap.end == size for gap in self.gaps):
             self._gap(size, size, "the file was never finished; what came after is not in it")

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from roadeval import images
 from roadeval.data import Rgb
-from roadeval.images import DamagedImageError, ImageError, Limits, eight_bits, without_colours
+from roadeval.images import ImageError, Limits, eight_bits, without_colours
 from roadeval.logs.container.records import Buffer
-from roadeval.logs.errors import BadMessage, DamagedMessage
+from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import (
     CompressedPicture,
     DecodedPicture,
@@ -144,16 +144,15 @@ def to_rgb(picture: Picture, limits: Limits) -> Rgb:
     """Decode a picture to ``(H, W, 3)`` uint8 RGB.
 
     16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels. A
-    `BadMessage` if it cannot be decoded; a `DamagedMessage` if it is damaged and the limits forbid
-    that.
+    `BadMessage` if it is damaged or cannot be decoded.
     """
     with _bad_message():
         if isinstance(picture, RawPicture):
             return raw_to_rgb(picture, limits)
         if isinstance(picture, CompressedPicture):
             return images.to_rgb(_image_file(picture), limits)
-    if picture.damage and not limits.keep_damaged:
-        raise DamagedMessage(picture.damage)
+    if picture.damage:
+        raise BadMessage(picture.damage)
     return picture.pixels
 
 
@@ -207,21 +206,10 @@ def lossy_format(picture: Picture) -> str:
     return "" if format_ is None or format_.exact else format_.name
 
 
-def lossy_labels(name: str) -> str:
-    """Return the sentence about label images in a format that changes values."""
-    return (
-        f"is {name}, whose compression changes the values at every edge: log labels as PNG, or "
-        "give `labels.tolerance` (32, for example), and values farther than that from 0 and from "
-        "those that mean road are ignored"
-    )
-
-
 @contextmanager
 def _bad_message() -> Iterator[None]:
     try:
         yield
-    except DamagedImageError as error:
-        raise DamagedMessage(str(error)) from error
     except ImageError as error:
         raise BadMessage(str(error)) from error
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.messages.pixels import lossy_labels
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.reader import TopicInfo
 
@@ -97,7 +96,7 @@ def choose_truth(
     if asked is not None:
         return _asked_for(topics, asked, "`topics.truth`")
     found = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
-    roads = [topic for topic in found if labels.tolerance or not topic.lossy]
+    roads = [topic for topic in found if not topic.lossy]
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
     own = [topic for topic in roads if topic.name not in elsewhere]
     colors = bool(labels.road_colors)
@@ -121,10 +120,15 @@ def choose_truth(
         return Choice(None, f"{why} {_names(roads)}")
     if not found:
         return Choice(None, "no label topic")
-    why = f"{found[0].name} {lossy_labels(found[0].lossy)}"
+    why = lossy_labels(found[0].name, found[0].lossy)
     if labels != LabelSettings():
         raise LogError(why)
     return Choice(None, why)
+
+
+def lossy_labels(name: str, format_: str) -> str:
+    """Return the sentence about label images in a format that changes values."""
+    return f"{name} is {format_}, which changes label values at every edge: log labels as PNG"
 
 
 def _clear_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
@@ -138,9 +142,7 @@ def _clear_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool)
     return (coloured if colors else []) or single or masks or coloured
 
 
-def choose_shadow(
-    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, labels: LabelSettings
-) -> Choice:
+def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None) -> Choice:
     """Choose the topic of the true shadow.
 
     A `LogError` if the one asked for is not there or no image, or if several are candidates.
@@ -152,7 +154,7 @@ def choose_shadow(
         for topic in _label_topics(topics, image)
         if topic.channels == 1
         and words(topic.name) & SHADOW_WORDS
-        and (labels.tolerance or not topic.lossy)
+        and not topic.lossy
         and not other_camera(topic, image, topics)
     ]
     shadow = _only(shadows, image, "shadow", "`topics.shadow`")

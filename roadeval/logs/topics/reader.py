@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -27,7 +25,7 @@ from roadeval.logs.messages.pictures import (
     decoder_for,
     kind_of,
 )
-from roadeval.logs.messages.pixels import lossy_format, raw_format, size_of, to_labels
+from roadeval.logs.messages.pixels import lossy_format, raw_format, to_labels
 from roadeval.logs.settings import NS
 
 PROBES: Final = 3
@@ -162,60 +160,6 @@ def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
         "size": (pixels.shape[1], pixels.shape[0]),
         "channels": 1 if pixels.ndim == 2 else 3,
     }
-
-
-def survey(reader: TopicReader, size: Size | None) -> tuple[str, ...]:
-    """Go through all messages of a topic whose images have this size; return what is odd."""
-    positions = range(len(reader))
-    stamps = np.array([reader.stamp(position) for position in positions], np.int64)
-    sizes = {}
-    for position in positions if size else ():
-        with suppress(FrameError, BadMessage):
-            if (found := size_of(reader.picture(position))) not in (None, size):
-                sizes[position] = found
-    return oddities(reader, size, positions, stamps, sizes)
-
-
-def oddities(
-    reader: TopicReader,
-    size: Size | None,
-    positions: Sequence[int],
-    stamps: npt.NDArray[np.int64],
-    others: Mapping[int, Size],
-) -> tuple[str, ...]:
-    """Return what is odd about the images at some positions, a sentence each.
-
-    ``others`` holds the sizes, by position, of images of another size than the topic's.
-    """
-    found, total = [], len(positions)
-    if others and size is not None:
-        counts = Counter(others.values()).most_common()
-        listed = ", ".join(f"{count} of {width}x{height}" for (width, height), count in counts)
-        found.append(
-            f"not all of the {total} images are {size[0]}x{size[1]}: {listed}, from frame "
-            f"{min(others)} on"
-        )
-    if repeated := _repeats(reader, positions, stamps):
-        found.append(
-            f"{repeated} of the {total} images repeat an earlier one, by stamp and content; each "
-            "of them is counted"
-        )
-    return tuple(found)
-
-
-def _repeats(reader: TopicReader, positions: Sequence[int], stamps: npt.NDArray[np.int64]) -> int:
-    """Count the messages that repeat an earlier one: the same stamp, and the same bytes."""
-    order = np.argsort(stamps, kind="stable")
-    same = np.diff(stamps[order]) == 0
-    repeated = 0
-    for group in np.split(order, np.flatnonzero(~same) + 1):
-        if len(group) > 1 and stamps[group[0]] != UNREADABLE:
-            contents = []
-            for place in group:
-                with suppress(FrameError):
-                    contents.append(bytes(reader.message(positions[place]).data))
-            repeated += len(contents) - len(set(contents))
-    return repeated
 
 
 UNREADABLE: Final = -(2**63) + 1

@@ -18,9 +18,8 @@ from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, listed, of_ids, some
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
-from roadeval.logs.settings import Color
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import Drawing, Drawn, LabelFormat, Size
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Size
 from roadeval.logs.truth.pairing import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
 from roadeval.runtime.discovery import found_in
@@ -69,7 +68,7 @@ def _labels_of(files: Sequence[Path], path: Path, size: Size | None) -> LabelSet
                 return _drawn(own, format_, size)
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
     labels = tuple(map(file_label, of_ids(images)))
-    return LabelSet(labels, colours=colour_names(path)) if labels else None
+    return LabelSet(labels) if labels else None
 
 
 @cache
@@ -121,7 +120,7 @@ def _parsed(file: Path) -> Any:
 
 def _drawn(files: Sequence[Path], format_: LabelFormat, size: Size | None) -> LabelSet:
     """Read all files of a format. One of several that cannot be read is an unreadable label."""
-    drawn: list[Drawn] = []
+    drawn: list[Drawing] = []
     problems: dict[Path, str] = {}
     others: list[str] = []
     for file in files:
@@ -135,7 +134,7 @@ def _drawn(files: Sequence[Path], format_: LabelFormat, size: Size | None) -> La
             problems[file] = str(error).removeprefix(f"{file}: ")
         except _NOT_SO as error:
             problems[file] = f"not as {format_.name} files are: {type(error).__name__} {error}"
-    labelled = [each for each in drawn if not isinstance(each, Drawing) or each.shapes]
+    labelled = [each for each in drawn if each.shapes]
     if not labelled:
         file, problem = next(iter(problems.items()), (files[0], f"{format_.name} without a shape"))
         raise LogError(f"{file}: {problem}")
@@ -154,10 +153,10 @@ def _raise(problem: str, *_: Any) -> Picture:
     raise BadMessage(problem)
 
 
-def _label(drawn: Drawn, classes: dict[str, int]) -> NamedLabel:
-    def picture(content: bytes, limits: Limits) -> Picture:
+def _label(drawn: Drawing, classes: dict[str, int]) -> NamedLabel:
+    def picture(_content: bytes, limits: Limits) -> Picture:
         try:
-            pixels = drawn.pixels(content, classes, limits)
+            pixels = drawn.pixels(classes, limits)
         except _NOT_SO as error:
             raise BadMessage(str(error)) from error
         height, width = pixels.shape
@@ -168,7 +167,7 @@ def _label(drawn: Drawn, classes: dict[str, int]) -> NamedLabel:
 
 
 def _notes(
-    drawn: Sequence[Drawn], labelled: Collection[Drawn], others: Sequence[str]
+    drawn: Sequence[Drawing], labelled: Collection[Drawing], others: Sequence[str]
 ) -> tuple[str, ...]:
     """Return warnings about the labels, a sentence each."""
     notes = []
@@ -176,7 +175,7 @@ def _notes(
         notes.append(f"{some(others)}: of another format than the other labels, not read")
     if bare := len(drawn) - len(labelled):
         notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
-    beyond = [each.image for each in labelled if isinstance(each, Drawing) and each.is_cut()]
+    beyond = [each.image for each in labelled if each.is_cut()]
     if beyond:
         notes.append(
             f"{len(beyond)} of {len(labelled)} labels reach beyond their image, and are cut at its "
@@ -188,21 +187,6 @@ def _notes(
 NPY: Final = ".npy"
 _LONGEST_HEAD: Final = 1 << 16
 """Bytes in which the head of an NPY file of numbers ends."""
-
-
-def colour_names(folder: Path) -> dict[str, Color]:
-    """Return the colours of the classes in CVAT's ``labelmap.txt``, in or above a folder."""
-    places = [each / "labelmap.txt" for each in (folder, folder.parent)]
-    found = next((place for place in places if place.is_file()), None)
-    if found is None:
-        return {}
-    try:
-        lines = read_bounded(found).decode().splitlines()
-        pairs = [line.split(":")[:2] for line in lines if line.strip() and line[0] != "#"]
-        levels = {name: map(int, rgb.split(",")) for name, rgb in pairs}
-        return {name: (red, green, blue) for name, (red, green, blue) in levels.items()}
-    except (OSError, ValueError) as error:
-        raise LogError(f"{found}: not a list of names and colours: {error}") from error
 
 
 def file_label(file: Path) -> NamedLabel:

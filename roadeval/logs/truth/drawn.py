@@ -17,15 +17,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.images import Limits, to_rgb
+from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage
-from roadeval.runtime.files import check_input
 
 Mask = npt.NDArray[np.bool_]
 Size = tuple[int, int]
 """Width and height in pixels."""
-UNLABELLED: Final = "unlabelled"
-"""The class of pixels of which a format says that nobody has labelled them; they are ignored."""
 FARTHEST: Final = 1e6
 """Pixels from the image's corner at which a point may lie."""
 
@@ -122,9 +119,7 @@ class Drawing:
         """Return all that decides its pixels."""
         return json.dumps([self.size, self.shapes]).encode()
 
-    def pixels(
-        self, _content: bytes, values: Mapping[str, int], limits: Limits
-    ) -> npt.NDArray[np.uint16]:
+    def pixels(self, values: Mapping[str, int], limits: Limits) -> npt.NDArray[np.uint16]:
         """Return the ``(H, W)`` values of the classes, 0 where no shape is.
 
         A `BadMessage` if a shape does not fit the image, or the size of that is not known.
@@ -136,46 +131,6 @@ class Drawing:
         for shape in self.shapes:
             found[shape.fill(self.size)] = values[shape.label]
         return found
-
-
-@dataclass(frozen=True, slots=True)
-class Segments:
-    """An image file whose colours are the numbers of segments: red + 256 green + 65536 blue."""
-
-    image: str
-    size: Size | None
-    file: Path
-    labels: Mapping[int, str]
-    """The class of each segment; pixels of number 0 are unlabelled."""
-
-    @property
-    def classes(self) -> set[str]:
-        """The classes that occur."""
-        return {*self.labels.values(), UNLABELLED}
-
-    def content(self) -> bytes:
-        """Return all that decides its pixels; an OSError if the file cannot be read."""
-        check_input(self.file)
-        return json.dumps(sorted(self.labels.items())).encode() + b"\n" + self.file.read_bytes()
-
-    def pixels(
-        self, content: bytes, values: Mapping[str, int], limits: Limits
-    ) -> npt.NDArray[np.uint16]:
-        """Return the ``(H, W)`` values of the classes; a `BadMessage` or `ImageError`."""
-        colors = to_rgb(content.partition(b"\n")[2], limits).astype(np.uint32)
-        numbers = colors[..., 0] | colors[..., 1] << 8 | colors[..., 2] << 16
-        known, places = np.unique(numbers, return_inverse=True)
-        labels = {0: UNLABELLED} | dict(self.labels)
-        if unknown := [number for number in known.tolist() if number not in labels]:
-            raise BadMessage(f"{self.file.name} holds a segment {unknown[0]} that has no class")
-        meant: npt.NDArray[np.uint16] = np.array(
-            [values[labels[number]] for number in known.tolist()], np.uint16
-        )
-        return np.asarray(meant[places.reshape(numbers.shape)])
-
-
-Drawn = Drawing | Segments
-"""The label of one image, as a format reads it."""
 
 
 class Proposal(NamedTuple):
@@ -217,7 +172,7 @@ class LabelFormat:
     """Of its files, in lower case."""
     holds: Callable[[Path, Any], bool]
     """Whether a parsed file is of this format."""
-    read: Callable[[Path, Any, Size | None], Iterable[Drawn]]
+    read: Callable[[Path, Any, Size | None], Iterable[Drawing]]
     """Return the label of each image in a parsed file of this format, given the size of the log's
     images. A `LogError` says what cannot be used; a KeyError, TypeError or ValueError means that
     the file is not as the format asks."""

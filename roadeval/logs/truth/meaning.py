@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -20,19 +19,16 @@ from roadeval.logs.messages.pictures import Picture, RawPicture
 from roadeval.logs.messages.pixels import (
     format_of,
     lossy_format,
-    lossy_labels,
     rows_of,
     to_labels,
     to_rgb,
 )
 from roadeval.logs.settings import Color, LabelSettings
-from roadeval.logs.truth.drawn import UNLABELLED
+from roadeval.logs.topics.choose import lossy_labels
 from roadeval.logs.truth.pairing import LabelSet
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
-FRINGE: Final = 253
-"""Marks a value that lies too far from every known one, as compression makes them at edges."""
 TOP: Final = np.iinfo(np.uint16).max
 """The code of a confidence of 1."""
 _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
@@ -45,8 +41,6 @@ class Labels:
 
     truth: Truth
     """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
-    fringe: int = 0
-    """How many pixels are ignored because their value is too far from every known one."""
     probability: Probability | None = None
     """``(H, W)`` uint16 codes of a confidence map."""
 
@@ -58,13 +52,10 @@ class ClassMap:
     meaning: Mapping[int, int]
     """Truth by label value, or by packed colour (`pack_colors`)."""
     others: int
-    """Truth of any other value. With `UNKNOWN` such a value is an error where it occurs, with
-    `FRINGE` it is ignored and counted."""
+    """Truth of any other value. With `UNKNOWN` such a value is an error where it occurs."""
     by_color: bool
     """Whether colours are looked up instead of values."""
     words: str
-    tolerance: int = 0
-    """How far a value may lie from one in ``meaning`` to mean the same."""
 
     @property
     def by_itself(self) -> bool:
@@ -76,16 +67,16 @@ class ClassMap:
         """``(65536,)`` truth by label value."""
         table = np.full(65536, self.others, np.uint8)
         for value, truth in self.meaning.items():
-            table[max(value - self.tolerance, 0) : value + self.tolerance + 1] = truth
+            table[value] = truth
         return table
 
     def read(self, picture: Picture, limits: Limits) -> Labels:
         """Decode a label picture.
 
         A `BadMessage` if it cannot be decoded, or holds an unknown value, or colours instead of
-        values; or is compressed in a way that changes values, without a tolerance for that.
+        values; or is compressed in a way that changes values.
         """
-        if self.others != FRINGE and (name := lossy_format(picture)):
+        if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes label values")
         if self.by_color:
             colors = pack_colors(to_rgb(picture, limits))
@@ -96,12 +87,7 @@ class ClassMap:
         values = to_labels(picture, limits)
         if values.ndim != 2:
             raise BadMessage("it holds colours, not label values")
-        truth = self.of_values(values)
-        if self.others != FRINGE:
-            return Labels(truth)
-        fringe = truth == FRINGE
-        truth[fringe] = IGNORE
-        return Labels(truth, int(np.count_nonzero(fringe)))
+        return Labels(self.of_values(values))
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
         """Translate ``(H, W)`` uint8 or uint16 labels; a `BadMessage` if a value is unknown."""
@@ -166,10 +152,10 @@ def seen_in(picture: Picture, labels: LabelSettings, name: str, limits: Limits) 
     """Return the values, or packed colours, that occur in a label picture of a topic or folder.
 
     A `BadMessage` if it cannot be decoded. A `LogError` if it holds colours, and values are looked
-    for; or is compressed in a way that changes values, without a tolerance for that.
+    for; or is compressed in a way that changes values.
     """
-    if labels.tolerance is None and (format_ := lossy_format(picture)):
-        raise LogError(f"{name} {lossy_labels(format_)}")
+    if format_ := lossy_format(picture):
+        raise LogError(lossy_labels(name, format_))
     if labels.road_colors:
         return set(np.unique(pack_colors(to_rgb(picture, limits))).tolist())
     pixels = to_labels(picture, limits)
@@ -182,27 +168,23 @@ def seen_in(picture: Picture, labels: LabelSettings, name: str, limits: Limits) 
     return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
 
 
-def understand(
-    labels: LabelSettings, seen: Iterable[int], name: str, *, several: bool = False
-) -> ClassMap:
+def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMap:
     """Decide what the values of label pictures mean.
 
     A `LogError` if a given value does not occur, or none is given and the values are class ids.
     ``seen`` are the values, or packed colours, that occur in some of the pictures, once for each
-    picture in which they do. ``several`` says that the labels are given for several logs at once:
-    then a mask that needs no settings is understood by itself where none of the given values occurs
-    in it.
+    picture in which they do.
     """
     pictures = Counter(seen)
     values = sorted(pictures)
-    if labels.tolerance is not None:
-        return _within(labels, labels.tolerance, values, name)
-    # A mask of 0 and 1 could as well be class ids of a log without the given ones.
-    road, ignore = labels.values
-    if several and {255} <= {*values} <= _MASKS[0].keys() - {*road, *ignore}:
-        labels = LabelSettings()
+    for each in (*labels.road, *labels.ignore):
+        if isinstance(each, str):
+            raise LogError(
+                f"`labels.road` {each}: {name} has no names of classes; give the value that means "
+                "road"
+            )
     if labels.road or labels.road_colors:
-        return _as_given(labels, values, name, several=several)
+        return _as_given(labels, values, name)
     for meaning in _MASKS:
         # A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would
         # be ignored.
@@ -218,7 +200,7 @@ def understand(
     )
 
 
-def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: bool) -> ClassMap:
+def _as_given(labels: LabelSettings, seen: list[int], name: str) -> ClassMap:
     """Return the meaning of the values, or of the colours, that the settings name."""
     by_color = bool(labels.road_colors)
     ending, text = ("_colors", _color_name) if by_color else ("", str)
@@ -227,13 +209,12 @@ def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: boo
         "road": [*road, *map(_packed, labels.road_colors)],
         "ignore": [*ignore, *map(_packed, labels.ignore_colors)],
     }
-    help_ = "; say with `drives` what holds for this drive alone" if several else ""
     for setting, values in wanted.items():
         for value in values:
             if value not in seen:
                 raise LogError(
                     f"`labels.{setting}{ending}` {text(value)} does not occur in {name}, whose "
-                    f"frames hold {_listed(map(text, seen))}{help_}"
+                    f"frames hold {_listed(map(text, seen))}"
                 )
     meaning = dict.fromkeys(wanted["road"], ROAD) | dict.fromkeys(wanted["ignore"], IGNORE)
     return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, v) for v in wanted.values())))
@@ -250,23 +231,24 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     one that does not occur.
     """
     classes = origin.classes
-    if not labels.road and {*classes} - {UNLABELLED} == {ALONE}:
+    if not labels.road and {*classes} == {ALONE}:
         labels = LabelSettings((ALONE,), labels.ignore)
     # A class may be called 7.
     labels = LabelSettings(tuple(map(str, labels.road)), tuple(map(str, labels.ignore)))
-    known = _counted(origin, [each for each in classes if each != UNLABELLED])
+    known = _counted(origin, classes)
     if not labels.road:
         raise LogError(
             f"{name} has the classes {known}: name those that mean road with `labels.road`, and "
             "those to leave out with `labels.ignore`"
         )
-    _check_names(labels, classes, f"{name}, which has the classes {known}")
-    meaning = {classes[each]: truth for each, truth in _named(labels).items()}
-    ignored = [*map(str, labels.ignore)]
-    if UNLABELLED in classes and UNLABELLED not in _named(labels):
-        meaning[classes[UNLABELLED]] = IGNORE
-        ignored.append(UNLABELLED)
-    words = _words(map(str, labels.road), ignored)
+    meaning: dict[int, int] = {}
+    for setting, given, truth in (("road", labels.road, ROAD), ("ignore", labels.ignore, IGNORE)):
+        for each in map(str, given):
+            if each not in classes:
+                where = f"{name}, which has the classes {known}"
+                raise LogError(f"`labels.{setting}` {each} does not occur in {where}")
+            meaning[classes[each]] = truth
+    words = _words(map(str, labels.road), map(str, labels.ignore))
     if rest := [each for each in classes if classes[each] not in meaning]:
         words += f"; non-road is all else, {_counted(origin, rest)}"
     return ClassMap(meaning, NON_ROAD, False, words)
@@ -278,63 +260,6 @@ def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
     more = f", and {len(every) - limit} more" if len(every) > limit else ""
     shown = (f"{name} ({counted(origin.occurring[name], 'label')})" for name in every[:limit])
     return ", ".join(shown) + more
-
-
-def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSettings:
-    """Replace the names of classes by their colours.
-
-    A `LogError` if a class has no such name, or the labels have no names.
-    """
-    names = [*_named(labels)]
-    if not origin.colours:
-        if names:
-            raise LogError(
-                f"`labels.road` {names[0]}: {name} has no names of classes; give the value that "
-                "means road"
-            )
-        return labels
-    if not names:
-        return labels
-    if len(names) < len({*labels.road, *labels.ignore}):
-        raise LogError(f"{name}: give the classes as names or as values, not as both")
-    _check_names(labels, origin.colours, f"{name}, which has the classes {_listed(origin.colours)}")
-    road, ignore = (
-        tuple(origin.colours[str(each)] for each in own) for own in (labels.road, labels.ignore)
-    )
-    return LabelSettings(road_colors=road, ignore_colors=ignore)
-
-
-def _named(labels: LabelSettings) -> dict[str, int]:
-    """Return the truth of each class that is given by its name."""
-    pairs = [(each, ROAD) for each in labels.road] + [(each, IGNORE) for each in labels.ignore]
-    return {each: truth for each, truth in pairs if isinstance(each, str)}
-
-
-def _check_names(labels: LabelSettings, classes: Collection[str], where: str) -> None:
-    for setting, given in (("road", labels.road), ("ignore", labels.ignore)):
-        for each in given:
-            if each not in classes:
-                raise LogError(f"`labels.{setting}` {each} does not occur in {where}")
-
-
-def _within(labels: LabelSettings, tolerance: int, seen: list[int], name: str) -> ClassMap:
-    """Return the meaning of a mask whose values are near the known ones: 0 is non-road."""
-    road, ignore = labels.values
-    given, road = (*road, *ignore), road or (255,)
-    meaning = {0: NON_ROAD} | dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
-    for low, high in pairwise(sorted(meaning)):
-        if meaning[low] != meaning[high] and high - low <= 2 * tolerance:
-            raise LogError(
-                f"{name}: `labels.tolerance` {tolerance} does not keep {low} and {high} apart"
-            )
-    for value in given:
-        if not any(abs(value - each) <= tolerance for each in seen):
-            raise LogError(
-                f"{name} holds nothing within {tolerance} of {value}; its frames hold "
-                f"{_listed(map(str, seen))}"
-            )
-    words = f"{_words(map(str, road), map(str, ignore))}, 0 is non-road, each within {tolerance}"
-    return ClassMap(meaning, FRINGE, False, words, tolerance)
 
 
 def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:

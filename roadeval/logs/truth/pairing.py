@@ -23,7 +23,7 @@ from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import IMAGES, bare, images_of, listed, ordered, some, time_in
 from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.settings import Color, LabelPlace, TopicSettings
+from roadeval.logs.settings import LabelPlace, TopicSettings
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.runtime.text import visible
 
@@ -53,8 +53,6 @@ class LabelSet:
     labels: Sequence[NamedLabel]
     classes: Mapping[str, int] = field(default_factory=dict)
     """Values of the classes by their names, where the format has names."""
-    colours: Mapping[str, Color] = field(default_factory=dict)
-    """Colours of the classes by their names, where images have such a list."""
     occurring: Mapping[str, int] = field(default_factory=dict)
     """In how many labels each class occurs, if that is known without decoding them."""
     notes: tuple[str, ...] = ()

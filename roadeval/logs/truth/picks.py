@@ -136,7 +136,7 @@ def as_read(format_: str, proposal: Proposal) -> npt.NDArray[np.bool_]:
     (content,) = proposal_files(format_, [proposal]).values()
     (drawn,) = WRITTEN[format_].read(Path(proposal.image), json.loads(content), None)
     values = {name: int(name == PROPOSED) for name in drawn.classes}
-    return np.equal(drawn.pixels(b"", values, Limits()), 1)
+    return np.equal(drawn.pixels(values, Limits()), 1)
 
 
 def digest_of(road: npt.NDArray[np.bool_]) -> str:

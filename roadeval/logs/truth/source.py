@@ -26,7 +26,6 @@ from roadeval.logs.truth.meaning import (
     of_classes,
     seen_in,
     understand,
-    with_colours,
 )
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -118,14 +117,12 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[str, Picture]]:
             yield pictures.place(position), pictures.picture(position)
 
 
-def in_log(
-    labels: TopicReader, settings: MaskSettings, camera: Camera, why: str, *, several: bool
-) -> LabelSource:
+def in_log(labels: TopicReader, settings: MaskSettings, camera: Camera, why: str) -> LabelSource:
     """Settle a label topic of the log itself, whose size was checked.
 
     A `LogError` if its values cannot be understood.
     """
-    meaning = _meaning(labels, settings, several=several)
+    meaning = _meaning(labels, settings)
     notes = other_optics(labels.name, camera.topic.name)
     return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why, notes=notes)
 
@@ -136,8 +133,6 @@ def beside_log(
     camera: Camera,
     digest: Callable[[], str],
     log: str = "",
-    *,
-    several: bool = False,
 ) -> LabelSource:
     """Settle labels that have names, or those of a topic of another ``log``.
 
@@ -157,7 +152,7 @@ def beside_log(
         pairing = by_number(labels, settings, camera.images)
     from_log = isinstance(labels, TopicReader)
     words = camera.clock if from_log and settings.pair is None else by
-    meaning = _meaning(labels, settings, camera, several=several)
+    meaning = _meaning(labels, settings, camera)
     notes = labels.origin.notes if isinstance(labels, NamedLabels) else ()
     notes += other_optics(labels.name, camera.topic.name)
     why = f"{count}, paired by {words}"
@@ -201,9 +196,6 @@ def label_files(settings: LabelPlace) -> list[Path]:
     """
     named = (log_and_topic(settings.path)[0] or settings.path, settings.images)
     paths = [Path(each) for each in named if each is not None]
-    # Panoptic labels have a folder of their file's name beside it.
-    beside = [each.with_suffix("") for each in paths if each.suffix == ".json"]
-    paths += [folder for folder in beside if folder.is_dir()]
     return [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
 
 
@@ -228,19 +220,14 @@ def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
 
 
 def _meaning(
-    labels: LabelPictures,
-    settings: MaskSettings,
-    camera: Camera | None = None,
-    *,
-    several: bool = False,
+    labels: LabelPictures, settings: MaskSettings, camera: Camera | None = None
 ) -> Meaning:
     """Find the meaning of labels by looking at some; of those beside the log check the size, too.
 
     A `LogError` if their values cannot be understood.
     """
     origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
-    drawn = bool(origin.occurring)
-    wanted = settings.labels if drawn else with_colours(settings.labels, origin, labels.name)
+    wanted = settings.labels
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
     problem, fractions = "", False
@@ -260,9 +247,9 @@ def _meaning(
     if confidence is not None:
         _check_confidence(max(seen), labels.name, fractions=fractions)
         return confidence
-    if drawn:
+    if origin.occurring:
         return of_classes(wanted, origin, labels.name)
-    return understand(wanted, seen, labels.name, several=several)
+    return understand(wanted, seen, labels.name)
 
 
 def _check_confidence(greatest: int, name: str, *, fractions: bool) -> None:

@@ -67,15 +67,15 @@ def raw(choices: Choices) -> RawPicture:
 
 def _decode(picture: Picture) -> None:
     codec_of(picture)
-    for limits in (Limits(), Limits(keep_damaged=True)):
-        for decode in (to_rgb, to_labels):
-            with suppress(BadMessage):
-                array = decode(picture, limits)
-                assert array.size
-                assert array.dtype in (np.uint8, np.uint16)
-        if isinstance(picture, CompressedPicture):
-            with suppress(ImageError):
-                to_rgb(CompressedPicture(0, "png", to_png(picture.data, limits)), limits)
+    limits = Limits()
+    for decode in (to_rgb, to_labels):
+        with suppress(BadMessage):
+            array = decode(picture, limits)
+            assert array.size
+            assert array.dtype in (np.uint8, np.uint16)
+    if isinstance(picture, CompressedPicture):
+        with suppress(ImageError):
+            to_rgb(CompressedPicture(0, "png", to_png(picture.data, limits)), limits)
 
 
 @cache

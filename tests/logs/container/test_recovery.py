@@ -9,7 +9,7 @@ from time import process_time
 
 import pytest
 
-from roadeval.logs import FrameError, FrameSettings, Log, LogConfig, LogError, open_log
+from roadeval.logs import FrameError, Log, LogError, open_log
 from tests.fixtures.broken import BROKEN as BROKEN_HERE
 from tests.fixtures.elsewhere import SPLIT, WITH_IMAGES, WITHOUT_IMAGES, split_bag
 from tests.fixtures.make import LOGS, make
@@ -310,13 +310,6 @@ def test_a_note_that_says_nothing_of_files_is_no_loss(tmp_path: Path, note: byte
     with open_log(tmp_path) as log:
         assert log.losses == ()
     assert process_time() - start < 5
-
-
-@broken(["chunk_crc_field_bad"])
-def test_data_of_a_wrong_checksum_is_kept_on_demand(log: Path) -> None:
-    with open_log(log, LogConfig(frames=FrameSettings(keep_corrupt=True))) as opened:
-        assert decoded(opened) == (40, 40)
-        assert "checksum is wrong, used all the same" in opened.losses[0]
 
 
 MEASURE = f"""

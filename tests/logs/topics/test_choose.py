@@ -99,7 +99,7 @@ def test_two_label_topics_are_listed_with_the_setting() -> None:
 def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
     topics = [camera("/cam"), label("/truth/road"), label("/truth/shadow")]
     assert choose_truth(topics, topics[0], None, LabelSettings()).topic == topics[1]
-    assert choose_shadow(topics, topics[0], None, LabelSettings()).topic == topics[2]
+    assert choose_shadow(topics, topics[0], None).topic == topics[2]
 
 
 def test_an_empty_name_takes_none() -> None:
@@ -117,18 +117,10 @@ def test_label_images_with_loss_are_named_as_such() -> None:
     topics = [camera("/cam"), lossy("/cam/road_mask")]
     topic, why = choose_truth(topics, topics[0], None, LabelSettings())
     assert topic is None
-    assert "/cam/road_mask is JPEG, whose compression changes the values" in why
+    assert "/cam/road_mask is JPEG, which changes label values" in why
 
 
 def test_label_images_with_loss_are_refused_to_who_says_what_their_values_mean() -> None:
     topics = [camera("/cam"), lossy("/cam/road_mask")]
-    with pytest.raises(LogError, match=r"/cam/road_mask is JPEG.*`labels\.tolerance`"):
+    with pytest.raises(LogError, match=r"/cam/road_mask is JPEG.*: log labels as PNG"):
         choose_truth(topics, topics[0], None, LabelSettings(road=(255,)))
-
-
-def test_label_images_with_loss_are_picked_where_there_is_a_tolerance() -> None:
-    topics = [camera("/cam"), lossy("/cam/road_mask"), lossy("/cam/shadow_mask")]
-    labels = LabelSettings(tolerance=32)
-    assert choose_truth(topics, topics[0], None, labels).topic == topics[1]
-    assert choose_shadow(topics, topics[0], None, labels).topic == topics[2]
-    assert choose_shadow(topics, topics[0], None, LabelSettings()).topic is None

@@ -216,16 +216,12 @@ def test_a_note_beside_label_images_is_no_label(drive, tmp_path):
     assert select(drive, path)[1] == [1]
 
 
-@pytest.mark.parametrize("list_", ["classes.txt", "labelmap.txt"])
-def test_labels_lie_below_a_list_of_names(drive, tmp_path, list_):
-    """As Label Studio and CVAT export them."""
+def test_labels_lie_below_a_list_of_names(drive, tmp_path):
+    """As Label Studio exports them."""
     path = tmp_path / "export"
-    if list_ == "classes.txt":
-        shutil.copytree(LABELS / "yolo" / "labels", path / "labels")
-        images(path / "images", "frame_0000.png")
-        (path / list_).write_text("road\ncar\nego\n")
-    else:
-        shutil.copytree(LABELS / "masks", path)
+    shutil.copytree(LABELS / "yolo" / "labels", path / "labels")
+    images(path / "images", "frame_0000.png")
+    (path / "classes.txt").write_text("road\ncar\nego\n")
     assert select(drive, path, "road")[1] == [0, 1, 3]
 
 
@@ -344,14 +340,10 @@ def look(path: Path) -> None:
         "labelme/frame_0001.json",
         "label_studio/tasks.json",
         "label_studio/min.json",
-        "openlabel/openlabel.json",
-        "panoptic/panoptic_drive.json",
     ],
 )
 def test_any_part_may_be_something_else(tmp_path, path, value):
     content = json.loads((LABELS / path).read_text())
-    if path.startswith("panoptic"):
-        shutil.copytree(LABELS / "panoptic" / "panoptic_drive", tmp_path / "frame_0001")
     for changed in replaced(content, value):
         look(written(tmp_path, "frame_0001.json", changed))
 
@@ -459,14 +451,6 @@ def test_areas_of_a_brush_are_said_to_be_unread(tmp_path):
     }
     with pytest.raises(LogError, match=r"it holds brushlabels, .*; export masks as PNG"):
         labels_in(written(tmp_path / "truth", "a.json", content), SIZE)
-
-
-def test_a_line_of_openlabel_is_no_area(tmp_path):
-    content = json.loads((LABELS / "openlabel" / "openlabel.json").read_text())
-    polygons = content["openlabel"]["frames"]["1"]["objects"]["0"]["object_data"]["poly2d"]
-    polygons[0]["closed"] = False
-    found = opened(written(tmp_path / "truth", "a.json", content), SIZE)
-    assert found.log_times.tolist() == [0, 3]
 
 
 def test_a_long_text_of_runs_is_read_in_a_time_that_grows_with_its_length():

@@ -11,15 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from PIL import Image
 from pycocotools import mask as coco
 from skimage.draw import polygon2mask
 
 from roadeval.data import ROAD
 from roadeval.images import Limits
-from roadeval.logs import LabelPlace, LabelSettings, LogError, label_files
+from roadeval.logs import LabelSettings, LogError
 from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.drawn import UNLABELLED, Outline, Runs
+from roadeval.logs.truth.drawn import Outline, Runs
 from roadeval.logs.truth.meaning import of_classes
 from tests.logs.truth.test_folder import opened
 
@@ -68,7 +67,6 @@ FOREIGN = {
     "yolo/labels": {**WHOLE, 1: painted("road")},
     "label_studio/tasks.json": {**WHOLE, 1: painted("road")},
     "label_studio/min.json": {**WHOLE, 1: painted("road")},
-    "openlabel/openlabel.json": {**WHOLE, 1: painted("road")},
 }
 
 
@@ -115,32 +113,7 @@ def test_rectangles_of_x_anylabeling_may_be_turned():
     np.testing.assert_array_equal(found[3], expected)
 
 
-def test_panoptic_pixels_have_the_class_of_their_segment():
-    found = names_of(LABELS / "panoptic")
-    about = json.loads((LABELS / "panoptic" / "panoptic_drive.json").read_text())
-    classes = {each["id"]: each["name"] for each in about["categories"]}
-    for label in about["annotations"]:
-        segments = {s["id"]: classes[s["category_id"]] for s in label["segments_info"]}
-        with Image.open(LABELS / "panoptic" / "panoptic_drive" / label["file_name"]) as image:
-            pixels = np.asarray(image.convert("RGB")).tolist()
-        expected = [
-            [segments.get(r + 256 * g + 65536 * b, UNLABELLED) for r, g, b in row] for row in pixels
-        ]
-        number = int(label["file_name"][6:10])
-        np.testing.assert_array_equal(found[number], expected)
-        assert {"road", "car"} & set(np.unique(found[number]))
-
-
-def test_pixels_that_nobody_labelled_are_ignored():
-    values, origin = values_of(LABELS / "panoptic")
-    meaning = of_classes(LabelSettings(road=("road",), ignore=("ego",)), origin, "labels")
-    names = names_of(LABELS / "panoptic")[0]
-    truth = meaning.of_values(values[0])
-    for name, expected in (("road", 1), ("car", 0), ("ego", 255), (UNLABELLED, 255)):
-        assert (names == name).any()
-        assert set(truth[names == name].tolist()) == {expected}
-    assert "ego unlabelled is ignored" in meaning.words
-    # Of outlines, what no shape covers is non-road.
+def test_what_no_shape_covers_is_non_road():
     values, origin = values_of(LABELS / "labelme")
     meaning = of_classes(LabelSettings(road=("road",)), origin, "labels")
     np.testing.assert_array_equal(meaning.of_values(values[0]) == 1, WHOLE[0] == "road")
@@ -169,24 +142,6 @@ def test_a_lone_class_called_road_needs_no_naming():
     meaning = of_classes(LabelSettings(), lone, "labels")
     assert meaning.words == "road is road"
     assert meaning.meaning[lone.classes["road"]] == ROAD
-
-
-def test_the_pictures_of_panoptic_labels_count_as_their_files(tmp_path):
-    (tmp_path / "pan").mkdir()
-    files = [tmp_path / "pan.json", tmp_path / "pan" / "0.png"]
-    for file in files:
-        file.touch()
-    assert label_files(LabelPlace(str(files[0]))) == files
-
-
-def test_masks_of_labelmap_have_the_names_of_their_colours():
-    origin = labels_in(LABELS / "masks" / "SegmentationClass", SIZE)
-    names = {color: name for name, color in origin.colours.items()}
-    for label, expected in zip(origin.labels, (WHOLE[0], painted("road", "blob")), strict=False):
-        with Image.open(label.path) as image:
-            pixels = np.asarray(image.convert("RGB")).tolist()
-        found = [[names[r, g, b] for r, g, b in row] for row in pixels]
-        np.testing.assert_array_equal(np.where(expected == "", "background", expected), found)
 
 
 def test_of_four_files_a_frame_that_cityscapes_has_the_ids_are_taken(tmp_path):

@@ -5,11 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.opcode import Opcode
-from mcap.writer import CompressionType, IndexType
 
 from roadeval.data import Frame
-from roadeval.logs import FrameError, FrameSettings, LogConfig, LogError, MaskSettings, open_log
+from roadeval.logs import FrameError, LogConfig, LogError, MaskSettings, open_log
 from tests.fixtures import broken
 from tests.fixtures.broken import (
     FRAMES,
@@ -18,7 +16,6 @@ from tests.fixtures.broken import (
     WIDTH,
     chunk,
     good,
-    inside,
     length_of,
     message,
     over,
@@ -89,10 +86,6 @@ def by_number(masks: Path) -> MaskSettings:
     return MaskSettings(path=str(masks))
 
 
-def keeping(masks: Path) -> LogConfig:
-    return LogConfig({"net": by_number(masks)}, frames=FrameSettings(keep_corrupt=True))
-
-
 @pytest.mark.parametrize("name", WHOLE)
 def test_every_frame_of_a_log_that_lacks_nothing_has_its_mask(masks, tmp_path, name):
     own = {number: number for number in range(FRAMES)}
@@ -143,28 +136,6 @@ def test_a_message_whose_channel_is_damaged_leaves_no_number_after_it_sure(masks
         saved(tmp_path, over(data, message(13, data) + HEAD, b"\7")), by_number(masks)
     )
     assert found == {number: number for number in range(13)}
-
-
-def test_times_that_damage_has_changed_leave_no_number_after_them_sure(masks, tmp_path):
-    """The chunk is kept, and a message in it is logged at 0 now."""
-    data = broken.log(compression=CompressionType.NONE, index_types=IndexType.NONE).bytes()
-    image = next(at for at in inside(data, chunk(7, data)) if data[at] == Opcode.MESSAGE)
-    path = saved(tmp_path, over(data, image + HEAD + 2 + 4, bytes(8)))
-    with open_log(path, keeping(masks)) as log:
-        selection = log.select()
-        assert not any("net" in frame.labels for frame in log.frames(selection))
-
-
-@pytest.mark.parametrize("verified", [False, True])
-@pytest.mark.parametrize("name", NUMBERED)
-def test_damaged_chunks_that_are_kept_shift_no_number_before_or_after_they_are_read(
-    masks, tmp_path, name, verified
-):
-    with open_log(damaged(tmp_path, name), keeping(masks)) as log:
-        if verified:
-            log.verify()
-        selection = log.select()
-    assert selection.masks["net"].pairing.unsure == 0
 
 
 @pytest.mark.parametrize(

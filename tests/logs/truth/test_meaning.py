@@ -1,7 +1,6 @@
 """What the values of a label image mean."""
 
 import io
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.truth.meaning import seen_in, understand
-from tests.images.making import file
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()
@@ -74,39 +72,6 @@ def test_a_sixteen_bit_value_is_understood() -> None:
 def test_a_given_value_that_never_occurs_is_refused(labels: LabelSettings, setting: str) -> None:
     with pytest.raises(LogError, match=rf"{setting} does not occur in /labels.* 0 3"):
         truth([0, 3], labels)
-
-
-def several(values: list[int], labels: LabelSettings) -> list[int]:
-    table = understand(labels, values, "/labels", several=True)
-    return table.of_values(np.array([values], np.uint8))[0].tolist()
-
-
-@pytest.mark.parametrize("values", [[0, 255], [0, 128, 255]])
-def test_labels_for_several_logs_leave_a_plain_mask_to_be_understood_by_itself(values):
-    assert several(values, LabelSettings(road=(3,), ignore=(11,))) == truth(values)
-
-
-@pytest.mark.parametrize(
-    ("values", "road", "ignore"),
-    [
-        # These may be class ids of a log without the given ones.
-        ([0, 1], 3, 11),
-        ([0, 1, 255], 3, 11),
-        ([0, 128], 3, 11),
-        ([0, 3, 255], 7, 11),
-        # Here a given value occurs, so that the values are what the settings say.
-        ([0, 255], 3, 255),
-        ([0, 128, 255], 3, 128),
-    ],
-)
-def test_what_is_not_plainly_a_mask_is_not_guessed_for_several_logs(values, road, ignore):
-    labels = LabelSettings(road=(road,), ignore=(ignore,))
-    with pytest.raises(LogError, match=r"does not occur .*; say with `drives` what holds"):
-        several(values, labels)
-
-
-def test_given_values_hold_for_a_log_in_which_they_occur_among_several():
-    assert several([0, 255], LabelSettings(road=(0,))) == [1, 0]
 
 
 def test_ignore_needs_road() -> None:
@@ -180,59 +145,10 @@ def test_three_equal_channels_are_one() -> None:
     assert to_labels(colors([(0, 0, 0), (3, 3, 3)]), LIMITS).tolist() == [[0, 3]]
 
 
-def fringed(values: list[int], labels: LabelSettings) -> tuple[list[int], int]:
-    """Return the truth of an exact image of these values, and how many are fringes."""
-    table = understand(labels, values, "/labels")
-    picture = CompressedPicture(0, "", png(np.array([values], np.uint8)))
-    found = table.read(picture, LIMITS)
-    return found.truth[0].tolist(), found.fringe
-
-
-def test_with_a_tolerance_values_far_from_all_known_ones_are_ignored_and_counted() -> None:
-    values = [0, 9, 10, 11, 244, 245, 255]
-    found = fringed(values, LabelSettings(tolerance=10))
-    assert found == ([0, 0, 0, 255, 255, 1, 1], 2)
-
-
-def test_a_tolerance_holds_around_the_given_values() -> None:
-    labels = LabelSettings(road=(100,), ignore=(200,), tolerance=5)
-    assert fringed([3, 6, 95, 106, 198, 255], labels) == ([0, 255, 1, 255, 255, 255], 3)
-
-
-@pytest.mark.parametrize(
-    ("labels", "reason"),
-    [
-        (LabelSettings(road=(20,), tolerance=10), "10 does not keep 0 and 20 apart"),
-        (LabelSettings(road=(90,), tolerance=10), "holds nothing within 10 of 90"),
-    ],
-)
-def test_a_tolerance_that_cannot_be_is_refused(labels: LabelSettings, reason: str) -> None:
-    with pytest.raises(LogError, match=reason):
-        understand(labels, [0, 20, 255], "/labels")
-
-
-@pytest.mark.parametrize("given", [{"road": (0,)}, {"road_colors": (ROAD,)}])
-def test_a_tolerance_is_for_masks_of_values_in_which_zero_is_non_road(given: Any) -> None:
-    with pytest.raises(ValueError, match="in which 0 is non-road"):
-        LabelSettings(tolerance=10, **given)
-
-
 @pytest.mark.parametrize("labels", [LabelSettings(), LabelSettings(road=(255,))])
 def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelSettings) -> None:
     picture = CompressedPicture(0, "jpeg", jpeg(grey(255)))
-    with pytest.raises(LogError, match=r"/labels is JPEG, .*PNG, or give `labels\.tolerance`"):
+    with pytest.raises(LogError, match=r"/labels is JPEG, .*: log labels as PNG"):
         seen_in(picture, labels, "/labels", LIMITS)
     with pytest.raises(BadMessage, match="a JPEG, whose compression changes label values"):
         understand(labels, [0, 255], "/labels").read(picture, LIMITS)
-
-
-def test_labels_compressed_with_loss_are_read_with_a_tolerance() -> None:
-    mask = 255 * np.tri(32, dtype=np.uint8)
-    picture = CompressedPicture(0, "jpeg", file("JPEG", mask, quality=20))
-    labels = LabelSettings(tolerance=20)
-    table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
-    labels = table.read(picture, LIMITS)
-    found = labels.truth
-    assert 0 < labels.fringe < 200
-    assert np.count_nonzero(found == 255) == labels.fringe
-    np.testing.assert_array_equal(found == 1, (mask == 255) & (found != 255))

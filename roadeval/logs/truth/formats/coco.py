@@ -1,4 +1,4 @@
-"""Label format: COCO, with polygons or runs of pixels, and COCO panoptic."""
+"""Label format: COCO, with polygons or runs of pixels."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import (
     PROPOSED,
     Drawing,
-    Drawn,
     LabelFormat,
     Outline,
     Proposal,
     Runs,
-    Segments,
     Shape,
     Size,
 )
@@ -30,7 +28,7 @@ def _holds(_: Path, content: Any) -> bool:
     return isinstance(content, dict) and keys <= content.keys()
 
 
-def _read(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawn]:
+def _read(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
     names = {each["id"]: str(each["name"]) for each in content["categories"]}
     own = defaultdict(list)
     for annotation in content["annotations"]:
@@ -39,15 +37,9 @@ def _read(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Dr
         annotations = own.pop(image["id"], [])
         size = int(image["width"]), int(image["height"])
         if annotations and "segments_info" in annotations[0]:
-            for each in annotations:
-                segments = {int(s["id"]): names[s["category_id"]] for s in each["segments_info"]}
-                bare = Path(each["file_name"]).name
-                places = (path.with_suffix("") / bare, path.parent / bare)
-                file = next((place for place in places if place.exists()), places[0])
-                yield Segments(str(image["file_name"]), size, file, segments)
-        else:
-            shapes = [s for each in annotations for s in _shapes(each, names[each["category_id"]])]
-            yield Drawing(str(image["file_name"]), size, shapes)
+            raise LogError(f"{path}: COCO panoptic; save its masks as PNG files, one a frame")
+        shapes = [s for each in annotations for s in _shapes(each, names[each["category_id"]])]
+        yield Drawing(str(image["file_name"]), size, shapes)
     if own:
         raise LogError(f"{path}: annotations are of image {next(iter(own))}, which is not listed")
 
