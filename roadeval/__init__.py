@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.run.frame import run_frame
     from roadeval.jobs.run.replay import Outcome, replay
     from roadeval.jobs.run.train import train
-    from roadeval.jobs.serve.pages import serve
+    from roadeval.jobs.serve import serve
     from roadeval.recording import Recording
     from roadeval.training import Model, load_model, save_model
 

@@ -34,14 +34,6 @@ Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
 Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
 Json = Annotated[bool, option("--json", "Print the result on stdout as JSON.")]
 Quiet = Annotated[bool, option("-q --quiet", "No progress and no table; warnings stay.")]
-TrustSources = Annotated[
-    bool,
-    option(
-        "--trust-sources",
-        "Of a fleet: read logs, masks, networks and recordings from places that its folder names, "
-        "files and URLs alike. Without it nothing outside the folder is read.",
-    ),
-]
 PaperSize = Annotated[str, option("--paper", "Default: a4.", "a4|letter", show_default=False)]
 
 

@@ -230,7 +230,6 @@ OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option
 """In the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "topics.image": "--image-topic",
-    "trust_sources": "--trust-sources",
 }
 _MARKED: Final = re.compile(r"`([\w-]+(?:\.[\w-]+)*)`")
 

@@ -101,13 +101,12 @@ def recording_path(folder: Path, drive: str) -> Path:
 class FleetFolder:
     """Reads a fleet's folder, perhaps made on another machine, by anybody.
 
-    With ``trust_sources`` logs, masks, models and recordings may be read that lie elsewhere, where
-    the folder names them. A `ResultsError` if it is no fleet's folder, or one of another version.
+    Nothing that lies elsewhere is read or written, where its links and tables lead. A
+    `ResultsError` if it is no fleet's folder, or one of another version.
     """
 
-    def __init__(self, folder: Path, *, trust_sources: bool = False) -> None:
+    def __init__(self, folder: Path) -> None:
         self.path: Final = folder
-        self.trust_sources: Final = trust_sources
         self.facts: Final = FleetFacts.read(folder / FLEET)
         if not all(is_plain(member.drive) for member in self.facts.drives):
             raise ResultsError(
@@ -120,23 +119,21 @@ class FleetFolder:
         """The folder's name."""
         return self.path.resolve().name
 
-    def recording(self, drive: str, *, new: bool = False) -> Path:
-        """Return where the recording of a drive lies, or where a ``new`` one is to be written.
+    def recording(self, drive: str) -> Path:
+        """Return where the recording of a drive lies, which may not have been kept.
 
-        A `ResultsError` if a link there leads out of the folder: nothing is written through it, and
-        it is read only with `trust_sources`.
+        A `ResultsError` if a link there leads out of the folder.
         """
-        return self._inside(recording_path(self.path, drive), new=new)
+        return self._inside(recording_path(self.path, drive))
 
     def results(self, drive: str) -> Path:
         """Return where the results folder of a drive lies, as of `recording`."""
         return self._inside(results_path(self.path, drive))
 
-    def _inside(self, path: Path, *, new: bool = False) -> Path:
-        if not leads_outside(path, self.path) or (self.trust_sources and not new):
-            return path
-        what = "nothing is written there; remove it" if new else "`trust_sources` reads it there"
-        raise ResultsError(f"{path}: a link leads out of the fleet's folder; {what}")
+    def _inside(self, path: Path) -> Path:
+        if leads_outside(path, self.path):
+            raise ResultsError(f"{path}: a link leads out of the fleet's folder; remove it")
+        return path
 
     def table(self, name: str, columns: list[str] | None = None) -> pa.Table:
         """Read a table, or some columns of it."""
@@ -214,9 +211,7 @@ class FleetFolder:
 
     def inspect(self, frame: Mapping[str, Any]) -> str:
         """Return the command that opens a row of ``worst`` in the viewer."""
-        kept = recording_path(self.path, frame["drive"]).exists()
-        words = ["roadeval", "inspect", str(self.path), "--worst", str(frame["rank"])]
-        return shlex.join([*words, *([] if kept else ["--trust-sources"])])
+        return shlex.join(["roadeval", "inspect", str(self.path), "--worst", str(frame["rank"])])
 
     @property
     def height(self) -> int:

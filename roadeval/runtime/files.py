@@ -18,7 +18,7 @@ import shutil
 import stat
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -164,37 +164,6 @@ def put(path: Path, content: bytes) -> None:
         file.publish()
     finally:
         file.discard()
-
-
-def companion_name(path: Path, files: Mapping[str, bytes]) -> str:
-    """Return the name of the folder beside a file, from its content: ``page.files-0a1b2c3d``."""
-    digest = hashlib.blake2b(digest_size=4)
-    for name, content in sorted(files.items()):
-        digest.update(f"{name}\0{len(content)}\0".encode() + content)
-    return f"{path.stem}.files-{digest.hexdigest()}"
-
-
-def put_with(path: Path, content: bytes, files: Mapping[str, bytes]) -> None:
-    """Write a file and the folder of files beside it, whose name is `companion_name`.
-
-    The folder is complete before the file, and the folder of the earlier file is removed after it:
-    the file always finds its folder. An OSError leaves the earlier ones.
-    """
-    target = target_of(path)
-    folder = target.with_name(companion_name(target, files))
-    is_new = not folder.exists()
-    try:
-        for name, each in files.items():
-            put(folder / name, each)
-        put(path, content)
-    except OSError:
-        if is_new:
-            remove(folder)
-        raise
-    pattern = re.compile(rf"{re.escape(target.stem)}\.files-[0-9a-f]{{8}}")
-    for other in target.parent.iterdir():
-        if pattern.fullmatch(other.name) and other != folder:
-            remove(other)
 
 
 @dataclass(frozen=True, slots=True)

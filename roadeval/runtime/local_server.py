@@ -60,13 +60,6 @@ class Response:
     status: HTTPStatus = HTTPStatus.OK
     headers: Mapping[str, str] = field(default_factory=dict)
     """Headers beside those of every answer."""
-    kept: bool = False
-    """Whether the browser may keep it, as the content of this address never changes."""
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether it is the content that was asked for."""
-        return self.status is HTTPStatus.OK
 
 
 def told(status: HTTPStatus, sentence: str) -> Response:
@@ -166,12 +159,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send(self, response: Response) -> None:
         self.send_response(response.status)
-        age = "private, max-age=3600, immutable" if response.kept else "no-store"
         sent = {
             **_HEADERS,
             "Content-Type": response.media,
             "Content-Length": str(len(response.content)),
-            "Cache-Control": age,
+            "Cache-Control": "no-store",
             **response.headers,
         }
         for name, value in sent.items():

@@ -18,7 +18,6 @@ from roadeval.cli.app import main
 from roadeval.cli.screens.fleet import problems
 from roadeval.errors import RoadevalError
 from roadeval.jobs.run.fleet_work import train_fold
-from roadeval.jobs.serve.replayed import recording_of
 from roadeval.logs import LogWriter
 from roadeval.results.fleet import record_path, recording_path
 from tests.e2e.commands import here
@@ -276,18 +275,6 @@ def test_a_fold_whose_model_cannot_be_written_is_told(two, tmp_path):
     drives, config = two
     with pytest.raises(RoadevalError, match=r"cannot be written: (File exists|Not a directory)"):
         roadeval.replay_fleet(drives, tmp_path / "f", config, executor=Full())
-
-
-def test_a_folder_with_folds_that_has_moved_is_looked_at_with_its_own_models(tmp_path):
-    for number, name in enumerate("xy"):
-        write(tmp_path / "logs" / f"{name}.mcap", 100 * number)
-    run(tmp_path / "logs", tmp_path / "before", executor=ThreadTasks(), folds=2)
-    (tmp_path / "before").rename(tmp_path / "after")
-    moved = roadeval.Result(tmp_path / "after", trust_sources=True)
-    recording, warnings = recording_of(moved.fleet, moved.worst.drive[0])
-    assert recording.is_relative_to(tmp_path / "after")
-    assert recording.exists()
-    assert not warnings
 
 
 class ThreadTasks(ThreadPoolExecutor):

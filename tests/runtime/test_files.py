@@ -136,40 +136,6 @@ def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
     assert names(tmp_path / "new") == ["other"]
 
 
-def page(path, text):
-    beside = {"a.jpg": text.encode()}
-    files.put_with(path, files.companion_name(path, beside).encode(), beside)
-
-
-def test_a_page_finds_its_folder_and_the_earlier_one_is_removed(tmp_path):
-    path = tmp_path / "page.html"
-    others = [tmp_path / "page.files-mine", tmp_path / "other.files-00000000"]
-    for each in others:
-        each.mkdir()
-    for text in ("one", "two", "two"):
-        page(path, text)
-        companion = tmp_path / path.read_text()
-        assert set(tmp_path.iterdir()) == {path, companion, *others}
-        assert (companion / "a.jpg").read_text() == text
-
-
-def test_where_a_page_cannot_be_written_the_earlier_one_and_its_folder_stay(tmp_path, monkeypatch):
-    path = tmp_path / "page.html"
-    page(path, "one")
-    before = names(tmp_path)
-    usual = files.put
-
-    def full(to, content):
-        if to == path:
-            raise OSError("full")
-        usual(to, content)
-
-    monkeypatch.setattr(files, "put", full)
-    with pytest.raises(OSError, match="full"):
-        page(path, "two")
-    assert names(tmp_path) == before
-
-
 def test_one_path_is_a_list_of_one():
     assert files.listed("out.rrd") == ["out.rrd"]
     assert files.listed(("a.rrd", Path("b.rrd"))) == ["a.rrd", Path("b.rrd")]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
@@ -49,14 +49,13 @@ def inspect(
     drive: Drive = None,
     camera: arguments.Camera = None,
     screenshot: Screenshot = None,
-    trust_sources: arguments.TrustSources = False,
     json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
 
     The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
     is listed. Of a fleet the frames of all drives are ranked together, and the worst of all opens
-    by default; a drive that was not kept is replayed from its log, if --trust-sources allows it.
+    by default.
     """
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")
@@ -64,7 +63,7 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.of_camera(Result(recording, trust_sources=trust_sources), camera)
+    opened = arguments.of_camera(Result(recording), camera)
     if opened.fleet:
         if variant is not None:
             raise typer.BadParameter(
@@ -74,9 +73,8 @@ def inspect(
             raise typer.BadParameter("--frame of a fleet needs its drive: --drive ID")
         if drive is not None and worst is not None:
             raise typer.BadParameter("--worst counts over all drives; give it without --drive")
-    elif drive is not None or trust_sources:
-        option = "--drive" if drive is not None else "--trust-sources"
-        raise typer.BadParameter(f"{option} goes with a fleet's folder alone")
+    elif drive is not None:
+        raise typer.BadParameter("--drive goes with a fleet's folder alone")
     if listed:
         _list(opened, worst, variant, as_json=json)
     else:
@@ -113,17 +111,13 @@ def _show(
     from roadeval.jobs.results.result import DriveResult
 
     drive, of, why = opened.drive, "", ""
-    warnings: tuple[str, ...] = ()
     if opened.fleet:
-        from roadeval.jobs.serve.replayed import recording_of
-
         if name is None:
             worst = job.of_rank(opened, rank or 1)
             name, frame = worst.drive, worst.frame
-        with progress.watched() as watch:
-            path, warnings = recording_of(opened.fleet, name, watch, messages.note)
-        drive, of = DriveResult(path), f"{name}, "
-        warnings = (*drive.warnings, *warnings)
+        drive, of = DriveResult(job.recording_of(opened.fleet, name)), f"{name}, "
+        for warning in drive.warnings:
+            messages.warning(warning)
     elif opened.rig:
         found = job.of_rank(opened, rank or 1, variant)
         if frame is None:
@@ -142,8 +136,6 @@ def _show(
     shown = job.view(drive, frame, file)
     if file:
         console.emit(f"{file}: {of}frame {shown}{why}")
-    for warning in warnings:
-        messages.warning(warning)
 
 
 COMMAND: Final = inspect

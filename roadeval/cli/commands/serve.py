@@ -14,17 +14,15 @@ def serve(
         list[Path],
         arguments.argument("RESULT...", "Recordings (.rrd), results folders, or fleets' folders."),
     ],
-    *,
-    trust_sources: arguments.TrustSources = False,
 ) -> int:
     """Serve results as pages to browse, on 127.0.0.1 alone.
 
     Every frame has its pictures, and a button that opens the viewer there. The address that is
     printed holds a token; without it nothing is answered. Ctrl-C ends the server and the viewer.
     """
-    from roadeval.jobs.serve import pages as job
+    from roadeval.jobs.serve import serve as run
 
-    job.serve(results, _tell, trust_sources=trust_sources)
+    run(results, _tell)
     return ExitCode.DONE
 
 

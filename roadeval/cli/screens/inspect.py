@@ -50,7 +50,7 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
     show_table(Table(titles, rows, text_columns=words, breaks=breaks), out)
     if of_fleet and not all(each.recording for each in found):
         out.print()
-        out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")
+        out.print("Where no recording was kept, --worst K says how to make it.")
 
 
 def _light(frame: WorstFrame) -> tuple[str, ...]:

@@ -192,20 +192,17 @@ def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
     return write_file(path, content)
 
 
-def as_page(compared: Compared, home: str = "") -> bytes:
-    """Return a comparison as a page that is whole by itself.
+def as_page(compared: Compared) -> bytes:
+    """Return a comparison as a page that is whole by itself."""
+    from roadeval.report.page.render import page
 
-    ``home`` is the address of the page above, or empty.
-    """
-    from roadeval.report.page.render import Place, page
-
-    place, made = Place(home=home), _document(compared)
+    made = _document(compared)
 
     def rendered(frames: FrameBrowser) -> bytes:
-        return page(replace(made, blocks=[*made.blocks, *browser(frames)]), place)
+        return page(replace(made, blocks=[*made.blocks, *browser(frames)]))
 
     frames = browsed(compared, lambda frames: len(rendered(frames)))
-    return page(made, place) if frames is None else rendered(frames)
+    return page(made) if frames is None else rendered(frames)
 
 
 def _document(compared: Compared) -> Document:

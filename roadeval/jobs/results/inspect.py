@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +17,9 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path
-from roadeval.results.schema import LIGHT
+from roadeval.results.folder import RUN
+from roadeval.results.schema import FAILED, LIGHT
+from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
 """Frames that are listed by default."""
@@ -123,6 +126,27 @@ def _ranked(
         )
         for place, (frame, stamp) in enumerate(zip(frames, stamps, strict=True))
     ]
+
+
+def recording_of(fleet: FleetFolder, drive: str) -> Path:
+    """Return the recording of a fleet's drive.
+
+    A `RoadevalError` if there is no such drive, or its recording was not kept: it says how to make
+    one.
+    """
+    row = fleet.drives.get(drive)
+    if row is None:
+        alike = [other for other, own in fleet.drives.items() if own["name"] == drive]
+        hint = f"; by that name there is {', '.join(alike)}" if alike else ""
+        raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
+    if (path := fleet.recording(drive)).exists():
+        return path
+    source = visible(without_secrets(str(row["source"])))
+    if row["status"] == FAILED:
+        raise RoadevalError(f"{source}: has no recording, for it failed: {row['reason']}")
+    words = ["roadeval", "replay", source, "--config", str(fleet.results(drive) / RUN)]
+    words += ["--record", "worst:10", "--save", str(path), "--reports", str(Path("reports", drive))]
+    raise RoadevalError(f"{drive}: no recording was kept; make it with: {shlex.join(words)}")
 
 
 def _nothing_scored(path: Path) -> RoadevalError:

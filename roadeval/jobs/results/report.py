@@ -64,8 +64,7 @@ def write_report(
     with holding(path, inputs=[source]):
         if not is_page(path):
             return write_file(path, pdf(document(findings_of(opened)), paper))
-        made = page_of(opened, pictures, on_progress)
-        return write_page(path, made, beside=opened.fleet is not None)
+        return write_page(path, page_of(opened, pictures, on_progress))
 
 
 def findings_of(result: Result) -> Findings | FleetFolder:

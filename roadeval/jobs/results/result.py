@@ -246,9 +246,9 @@ class RigResult:
 Opened = DriveResult | RigResult | FleetFolder
 
 
-def _open(path: Path, *, trust_sources: bool) -> Opened:
+def _open(path: Path) -> Opened:
     if is_fleet(path):
-        return FleetFolder(path, trust_sources=trust_sources)
+        return FleetFolder(path)
     try:
         drive = DriveResult(path)
     except SeveralCamerasError as error:
@@ -266,9 +266,6 @@ class Result:
     ----------
     paths
         Recordings, results folders and fleets' folders, perhaps from elsewhere.
-    trust_sources
-        Whether logs, masks, models and recordings may be read that a fleet's folder names and that
-        lie outside it.
 
     Examples
     --------
@@ -281,11 +278,9 @@ class Result:
     1 blind filtered unfiltered
     """
 
-    def __init__(self, *paths: str | Path, trust_sources: bool = False) -> None:
+    def __init__(self, *paths: str | Path) -> None:
         self.paths: Final = tuple(map(Path, paths))
-        self._opened: list[Opened] = [
-            _open(path, trust_sources=trust_sources) for path in self.paths
-        ]
+        self._opened: list[Opened] = [*map(_open, self.paths)]
 
     @cached_property
     def cameras(self) -> dict[str, Result]:

@@ -11,7 +11,7 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.resources import files
@@ -34,12 +34,9 @@ from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import drawn, span_of_frames, values
 from roadeval.report.pdf.typeset import ReportError
 from roadeval.report.sections.frames import FrameBrowser
-from roadeval.runtime.files import companion_name, put_with, writing
+from roadeval.runtime.files import put, writing
 from roadeval.runtime.text import visible
 
-STYLE: Final = "page.css"
-SCRIPT: Final = "page.js"
-"""Names of the files with a page's style and script, where they are not inside it."""
 _SCRIPTS: Final = (
     *("tables.js", "choice.js", "charts.js", "places.js", "pictures.js", "frames.js", "start.js"),
 )
@@ -50,9 +47,6 @@ _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 class Place:
     """Where a page finds what belongs to it."""
 
-    pictures: str | None = None
-    code: str | None = None
-    """Begin of the addresses of pictures, and of style and script; None: inside the page."""
     frames: str | None = None
     """Address of a frame, with ``{}`` for its number, where a server gives it; None: all that the
     page shows is on it."""
@@ -66,9 +60,9 @@ class Place:
         return "; ".join(
             [
                 "default-src 'none'",
-                f"img-src data:{' ' + _BESIDE if self.pictures is not None else ''}",
-                f"style-src {_hash(style()) if self.code is None else _BESIDE}",
-                f"script-src {_hash(script()) if self.code is None else _BESIDE}",
+                "img-src data:",
+                f"style-src {_hash(style())}",
+                f"script-src {_hash(script())}",
                 *(["connect-src 'self'"] if self.frames else []),
                 "base-uri 'none'",
                 "form-action 'none'",
@@ -76,15 +70,11 @@ class Place:
         )
 
 
-_BESIDE: Final = "'self'"
 INSIDE: Final = Place()
 
 
 def page(document: Document, place: Place = INSIDE) -> bytes:
-    """Return a document as a page in UTF-8; equal documents give equal bytes.
-
-    ``place`` says where it finds its parts; the caller writes those that are beside it.
-    """
+    """Return a document as a page in UTF-8; equal documents give equal bytes."""
     found = sections(document.blocks)
     return _rendered(
         "page.html",
@@ -93,7 +83,6 @@ def page(document: Document, place: Place = INSIDE) -> bytes:
         doc=document,
         sections=found,
         policy=place.policy,
-        code_at=place.code,
         home=place.home,
         home_title=place.home_title,
         style=style(),
@@ -109,7 +98,7 @@ def part(block: Block, place: Place) -> bytes:
 @cache
 def style() -> str:
     """Return the style sheet of every page."""
-    return _asset(STYLE)
+    return _asset("page.css")
 
 
 @cache
@@ -141,15 +130,13 @@ def _rendered(template: str, place: Place, document: Document | None, **given: A
             drawn=lambda chart: drawn(chart, span),
             legend=legend,
             values=values,
-            source=lambda image: _source(image, place),
+            source=_source,
             frame_link=own_frame.format,
             filled=_filled,
             variants=variants,
             variant_of=partial(_variant_of, variants),
             unknown=_unknown,
             is_live=place.frames is not None,
-            # A picture inside the page is there already, and paper shows it only if it is loaded.
-            loading="eager" if place.pictures is None else "lazy",
             **given,
         )
     )
@@ -184,10 +171,8 @@ def _shown(value: Any) -> Any:
     return visible(value) if type(value) is str else value
 
 
-def _source(image: ImageFile | bytes, place: Place) -> str:
+def _source(image: ImageFile | bytes) -> str:
     image = ImageFile(image) if isinstance(image, bytes) else image
-    if place.pictures is not None:
-        return f"{place.pictures}{image.name}"
     media = _MEDIA[image.name.rpartition(".")[2]]
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
 
@@ -220,11 +205,6 @@ def _filled(table: Table) -> Iterator[_Row]:
 
 def _unknown(kind: str) -> NoReturn:
     raise NotImplementedError(f"templates/blocks.html draws no {kind}")
-
-
-def code() -> Mapping[str, bytes]:
-    """Return the files of style and script, for pages that have them beside them."""
-    return {STYLE: style().encode(), SCRIPT: script().encode()}
 
 
 @dataclass(slots=True)
@@ -280,13 +260,8 @@ def _name(text: str, taken: set[str]) -> str:
     return name
 
 
-def write_page(path: Path, document: Document, *, beside: bool = False) -> Path:
-    """Write a document as a page, perhaps with its pictures in a folder beside it.
-
-    They are replaced with it, as one. A `ReportError` if it cannot be written.
-    """
-    files = document.files() if beside else {}
-    place = Place(pictures=f"{companion_name(path, files)}/") if files else INSIDE
+def write_page(path: Path, document: Document) -> Path:
+    """Write a document as a page; a `ReportError` if it cannot be written."""
     with writing(path, ReportError, "; choose another place"):
-        put_with(path, page(document, place), files)
+        put(path, page(document))
     return path

@@ -28,7 +28,7 @@ from roadeval.report.blocks import (
     TwoColumns,
 )
 from roadeval.report.chart import Chart, ChartKind, Look, Series
-from roadeval.report.page.render import page, write_page
+from roadeval.report.page.render import page
 from roadeval.report.sections.frames import FrameBrowser, FrameRow
 from tests.report.making import a_document
 
@@ -184,14 +184,3 @@ def test_a_picture_inside_a_page_says_of_which_kind_it_is(content, media):
 
 def test_equal_documents_give_equal_bytes():
     assert rendered(*every_block("word")) == rendered(*every_block("word"))
-
-
-def test_pictures_beside_a_page_are_named_by_it_and_replaced_with_it(tmp_path):
-    path = tmp_path / "page.html"
-    write_page(path, a_document(ImageGrid([("a", JPEG)], 1)), beside=True)
-    (folder,) = (each for each in tmp_path.iterdir() if each.is_dir())
-    made = Reader(path.read_bytes())
-    named = [own["src"] for own in made.all("img") if "src" in own]
-    assert {tmp_path / name for name in named} == set(folder.iterdir())
-    write_page(path, a_document(Text("other")))
-    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]

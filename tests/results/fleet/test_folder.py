@@ -14,7 +14,6 @@ from roadeval.results.fleet import (
     frames_path,
     read_record,
     record_path,
-    recording_path,
 )
 from roadeval.results.rows import Key, cells
 from roadeval.results.schema import OF_DRIVES
@@ -122,16 +121,6 @@ def test_a_column_of_another_type_is_damage(folder):
     parquet.write_table(words, path)
     with pytest.raises(ResultsError, match="column TP is not of type int64"):
         FleetFolder(folder).table("scores")
-
-
-def test_a_worst_frame_whose_recording_was_not_kept_opens_where_its_log_is_trusted(folder):
-    fleet = FleetFolder(folder)
-    first = fleet.worst[0]
-    assert fleet.inspect(first).endswith("--worst 1 --trust-sources")
-    kept = recording_path(folder, first["drive"])
-    kept.parent.mkdir(exist_ok=True)
-    kept.touch()
-    assert fleet.inspect(first).endswith("--worst 1")
 
 
 # --- The record of a drive: written and read back as it was ---------------------------------------

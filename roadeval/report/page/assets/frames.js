@@ -197,12 +197,7 @@ async function openInViewer(button, address) {
   [button.disabled, button.textContent] = [true, "Opening \u2026"];
   let told = "The server has ended.";
   try {
-    let answer = await fetch(address, { method: "POST" });
-    while (answer.status === 202) { // The drive is replayed first.
-      button.textContent = (await answer.text()).trim();
-      await new Promise((done) => setTimeout(done, 500));
-      answer = await fetch(address, { method: "POST" });
-    }
+    const answer = await fetch(address, { method: "POST" });
     told = (await answer.text()).trim();
   } catch {
     // It is told below.

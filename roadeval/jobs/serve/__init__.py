@@ -1,1 +1,0 @@
-"""Results served as pages."""
