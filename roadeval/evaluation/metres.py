@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import CODES, NON_ROAD, ROAD, Histogram, Probability, Truth
-from roadeval.data.arrays import Bits, Floats, Matrix, Sums, TruthBits, pack, unpack
+from roadeval.data.arrays import Bits, Floats, Matrix, TruthBits, pack, unpack
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import Ground
 from roadeval.geometry.plan import OUTSIDE, Plan, pixels_of
@@ -117,41 +117,37 @@ class Survey:
 
     def histogram(self, probability: Probability, truth: Truth) -> Histogram:
         """Count cells of the ground seen from above as `roadeval.data.histogram` does pixels."""
-        first, pixels, cells = self._above
-        codes, labels = (each[first:].ravel()[pixels] for each in (probability, truth))
+        cells = self._cells[0]
+        pixels = np.flatnonzero(cells)
+        codes, labels, cells = (e.ravel()[pixels] for e in (probability, truth, cells))
         counts = [
-            np.bincount(codes[labels == each], cells[0, labels == each], CODES)
+            np.bincount(codes[labels == each], cells[labels == each], CODES)
             for each in (NON_ROAD, ROAD)
         ]
         return np.array(counts, np.uint32)
 
     @cached_property
-    def _above(self) -> tuple[int, Pixels, npt.NDArray[np.float32]]:
-        """The first row seen from above, the pixels below it, and the cells that each stands for.
+    def _cells(self) -> npt.NDArray[np.int64]:
+        """How many cells of the ground seen from above each pixel stands for, ``(S, H, W)``.
 
-        Cells are ``(S, n)``, for each stance: a cell takes the pixel in which its centre lies.
+        A cell takes the pixel in which its centre lies.
         """
         height, width = self._shape
-        cells = np.zeros((len(self._grounds), height * width), np.float32)
-        for stance, ground in enumerate(self._grounds):
-            found = plan_of(ground, self._settings).cells
-            cells[stance] = np.bincount(found[found != OUTSIDE], minlength=height * width)
-        used = np.flatnonzero(cells.any(axis=0))
-        first = int(used[0]) // width if len(used) else height
-        return first, used - first * width, cells[:, used]
+        counts = []
+        for ground in self._grounds:
+            cells = plan_of(ground, self._settings).cells
+            counts.append(np.bincount(cells[cells != OUTSIDE], minlength=height * width))
+        return np.reshape(counts, (-1, height, width))
 
-    def from_above(self, masks: Bits, truth: TruthBits) -> Sums:
-        """Count cells of ground by outcome, ``(K, S, 4)``: of ``(K, H, words)`` masks."""
-        first, pixels, cells = self._above
-        width = self._shape[1]
-        rows = np.concatenate([[truth.road, truth.other], masks])[:, first:]
-        sets = np.concatenate([rows[:2], rows[2:] & rows[0], rows[2:] & rows[1]])
-        flags = np.unpackbits(sets.view(np.uint8), axis=2, count=width, bitorder="little")
-        taken = flags.reshape(len(flags), -1).take(pixels, axis=1).astype(np.float32)
-        # Whole numbers below 2 ** 24: float32 adds them without error, in any order.
-        road, other, *found = (cells @ taken.T).T.astype(np.int64)
-        tp, fp = np.reshape(found, (2, len(masks), -1))
-        return np.stack([tp, other - fp, fp, road - tp], axis=2)
+    @cached_property
+    def digits(self) -> list[Bits]:
+        """The binary digits of how many cells each pixel stands for, ``(H, words)`` each.
+
+        The least digit of a stance is its first. Pixels counted in each digit, times the digit's
+        worth, are the cells.
+        """
+        digits = range(max(1, int(self._cells.max()).bit_length()))
+        return [pack((cells >> digit) & 1) for cells in self._cells for digit in digits]
 
     @cached_property
     def _lines(self) -> list[_Line]:

@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from roadeval.data import FrameMetres, Packed, TruthBits, histogram
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, RIGHT, STANCES, UNPLACED, Survey, plan_of
-from roadeval.evaluation.score.metres import MetreSums, differences_of, kitti, measure, quantile
+from roadeval.evaluation.score.metres import MetreSums, differences_of, kitti, measure
 from roadeval.evaluation.score.thresholds import Curves
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import ground_of
@@ -172,12 +170,6 @@ def test_of_a_homography_alone_nothing_is_said_of_other_cameras():
     assert all(np.isnan(each.low) for each in sums.totals(Curves()))
 
 
-@given(st.lists(st.integers(-300, 300), min_size=1), st.sampled_from([0.05, 0.5, 0.95]))
-def test_a_quantile_is_numpys(values: list[int], share: float):
-    expected = np.quantile(values, share, method="inverted_cdf") / 100
-    assert quantile(Counter(values), share) == pytest.approx(float(expected))
-
-
 def devkit(truth: Mask, confidence: npt.NDArray[Any]) -> dict[str, float]:
     """MaxF and AP as defined by KITTI's benchmark, threshold by threshold."""
     points = []
@@ -261,6 +253,28 @@ def test_sums_are_means_over_frames_and_ranges_over_stances():
     )
     above = sum(each.counts[0, -1] for each in found)
     assert rows["recall", ABOVE].value == pytest.approx(above[0] / (above[0] + above[3]))
+
+
+def test_what_is_summed_up_is_numpys_quantile_of_all_frames_differences():
+    rng, sums, found = np.random.default_rng(0), MetreSums(), []
+    measures = [(LEFT, 5), (RIGHT, 5), (FREE, 0)]
+    for _ in range(50):
+        ends = rng.normal(0, 30, (5, 3, 2)).round(2)
+        ends[rng.random(ends.shape) < 0.2] = np.nan
+        found.append(FrameMetres(measures, ends, [ABOVE], np.ones((5, 1, 4), np.int64)))
+        sums.add({"m": found[-1]})
+    rows = {e.measure: e for e in sums.totals(Curves())}
+    for place, (name, _) in enumerate(measures):
+        every = np.array([differences_of(each)[:, place] for each in found])
+        middles = np.nanquantile(every, 0.5, axis=0, method="inverted_cdf")
+        row, truths = rows[name], np.array([each.ends[0, place, 1] for each in found])
+        expected = middles[0], middles.min(), middles.max()
+        assert (row.value, row.low, row.high) == pytest.approx(expected)
+        assert row.p95 == pytest.approx(
+            np.nanquantile(np.abs(every[:, 0]), 0.95, method="inverted_cdf")
+        )
+        assert row.frames == (~np.isnan(truths)).sum()
+        assert row.missing == row.frames - (~np.isnan(every[:, 0])).sum()
 
 
 @pytest.mark.parametrize(

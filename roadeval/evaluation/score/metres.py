@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,6 +20,8 @@ LEVELS: Final = 256
 """Thresholds of KITTI's road benchmark, whose confidences have eight bits."""
 RECALLS: Final = np.linspace(0, 1, 11)
 CENTIMETRES: Final = 100
+SPAN: Final = 1 << 20
+"""More centimetres than two ends can lie apart, in either direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +52,13 @@ def measure(survey: Survey, masks: Mapping[str, Bits], truth: TruthBits) -> dict
     """
     bits = np.array([*masks.values()], np.uint64)
     inside = [band for bands in survey.bands for band in bands.values()]
-    counts = count(bits, truth, inside)[:, 1:].reshape(len(bits), len(survey.bands), -1, 4)
-    counts = np.concatenate([counts, survey.from_above(bits, truth)[:, :, None]], axis=2)
+    counts = count(bits, truth, [*inside, *survey.digits])[:, 1:]
+    by_band, by_digit = (
+        part.reshape(len(bits), survey.stances, -1, 4)
+        for part in np.split(counts, [len(inside)], axis=1)
+    )
+    cells = (by_digit << np.arange(by_digit.shape[2])[:, None]).sum(axis=2)
+    counts = np.concatenate([by_band, cells[:, :, None]], axis=2)
     ends, regions = survey.ends(bits, truth), (*survey.bands[0], ABOVE)
     return {
         name: FrameMetres(survey.measures, ends[place], regions, counts[place])
@@ -63,38 +70,30 @@ class MetreSums:
     """Sums up the measures of final masks, by variant."""
 
     def __init__(self) -> None:
-        self._differences: Final[defaultdict[tuple[str, str, int], list[Counter[int]]]] = (
-            defaultdict(list)
-        )
-        """By variant, measure and place: for each stance how often each difference, in cm."""
-        self._seen: Final[Counter[tuple[str, str, int]]] = Counter()
+        self._measures: Sequence[tuple[str, int]] = ()
+        self._regions: Sequence[str] = ()
+        self._differences: Final[defaultdict[str, Counter[int]]] = defaultdict(Counter)
+        """How often each difference in centimetres, plus `SPAN` times the place of its stance and
+        measure."""
+        self._seen: Final[dict[str, Sums]] = {}
+        """``(M,)``: frames on which the truth has the measure."""
         self._rates: Final[dict[str, Floats]] = {}
         """``(S, R, 2)``: sums of the frames' ERR, and frames that have one."""
         self._above: Final[dict[str, Sums]] = {}
-        self._regions: tuple[str, ...] = ()
 
     def add(self, metres: Mapping[str, FrameMetres]) -> None:
         """Add a frame's measures."""
         for variant, own in metres.items():
-            self._regions = tuple(own.regions)
-            differences = differences_of(own)
-            for place, (measure, at) in enumerate(own.measures):
-                name = variant, measure, at
-                self._seen[name] += not math.isnan(own.ends[0, place, 1])
-                counters = self._differences[name]
-                counters += [Counter() for _ in range(len(differences) - len(counters))]
-                for counter, metre in zip(counters, differences[:, place].tolist(), strict=False):
-                    if not math.isnan(metre):
-                        counter[round(metre * CENTIMETRES)] += 1
-            labelled = own.counts.sum(axis=2)
-            wrong = own.counts[..., 2:].sum(axis=2)
+            self._measures, self._regions = own.measures, own.regions
+            self._seen[variant] = self._seen.get(variant, 0) + ~np.isnan(own.ends[0, :, 1])
+            differences = differences_of(own).ravel()
+            keys = np.rint(differences * CENTIMETRES) + SPAN * np.arange(len(differences))
+            self._differences[variant].update(keys[~np.isnan(keys)].astype(int).tolist())
+            labelled, wrong = own.counts.sum(axis=2), own.counts[..., 2:].sum(axis=2)
             known = labelled > 0
             shares = np.divide(wrong, labelled, out=np.zeros(wrong.shape), where=known)
-            sums = np.stack([shares, known], axis=2)
-            if self._rates.setdefault(variant, np.zeros(sums.shape)).shape == sums.shape:
-                self._rates[variant] += sums
-            above = own.counts[0, self._regions.index(ABOVE)]
-            self._above[variant] = above + self._above.get(variant, 0)
+            self._rates[variant] = self._rates.get(variant, 0) + np.stack([shares, known], axis=2)
+            self._above[variant] = self._above.get(variant, 0) + own.counts[0, -1]
 
     def totals(self, curves: Curves) -> Iterator[Measured]:
         """Yield the measures, variant by variant.
@@ -110,16 +109,24 @@ class MetreSums:
                 yield Measured(variant, "ERR", region, frames, 0, value, math.nan, low, high)
             for name, value in kitti(self._above[variant], _final(curves, variant)).items():
                 yield Measured(variant, name, ABOVE, 0, 0, value, *(math.nan,) * 3)
-            for (own, measured, at), counters in self._differences.items():
-                if own == variant:
-                    sizes = Counter[int]()
-                    for size, count in counters[0].items():
-                        sizes[abs(size)] += count
-                    frames = self._seen[own, measured, at]
-                    value, low, high = _ranged(np.array([quantile(e, 0.5) for e in counters]))
-                    where, missing = f"{at}m" if at else "ahead", frames - sizes.total()
-                    p95 = quantile(sizes, 0.95)
-                    yield Measured(variant, measured, where, frames, missing, value, p95, low, high)
+            for place, (measured, at) in enumerate(self._measures):
+                every = [
+                    self._of(variant, stance * len(self._measures) + place)
+                    for stance in range(len(sums))
+                ]
+                value, low, high = _ranged(np.array([quantile(each, 0.5) for each in every]))
+                frames = int(self._seen[variant][place])
+                p95 = quantile(np.abs(every[0]), 0.95)
+                where, missing = f"{at}m" if at else "ahead", frames - len(every[0])
+                yield Measured(variant, measured, where, frames, missing, value, p95, low, high)
+
+    def _of(self, variant: str, place: int) -> Floats:
+        """Return a variant's differences at a place, in metres."""
+        counter = self._differences[variant]
+        keys, counts = (np.array([*each], np.int64) for each in (counter, counter.values()))
+        own = np.abs(keys - place * SPAN) < SPAN // 2
+        metres: Floats = (keys[own] - place * SPAN) / CENTIMETRES
+        return np.repeat(metres, counts[own])
 
 
 def _ranged(every: Floats) -> tuple[float, float, float]:
@@ -139,17 +146,11 @@ def differences_of(metres: FrameMetres) -> Floats:
     return found
 
 
-def quantile(counter: Counter[int], share: float) -> float:
-    """Return the least of some counted centimetres that a share of them does not exceed, in metres.
-
-    NaN without any.
-    """
-    total, so_far = counter.total(), 0
-    for value in sorted(counter):
-        so_far += counter[value]
-        if so_far >= share * total:
-            return value / CENTIMETRES
-    return math.nan
+def quantile(metres: Floats, share: float) -> float:
+    """Return the least of some values that a share of them does not exceed; NaN without any."""
+    if not len(metres):
+        return math.nan
+    return float(np.quantile(metres, share, method="inverted_cdf"))
 
 
 def _final(curves: Curves, variant: str) -> Sums | None:
