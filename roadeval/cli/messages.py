@@ -39,13 +39,13 @@ def losses(sentences: Sequence[str]) -> ExitCode:
     return ExitCode.LOSS if sentences else ExitCode.DONE
 
 
-def conditions(held: Sequence[str], unjudged: Sequence[str], otherwise: ExitCode) -> ExitCode:
+def conditions(held: Sequence[str], unjudged: Sequence[str]) -> ExitCode:
     """Write which conditions hold and which could not be judged; return the exit code."""
     for sentence in (*held, *unjudged):
         error(sentence)
     if held:
         return ExitCode.CONDITION_HELD
-    return ExitCode.FAILED if unjudged else otherwise
+    return ExitCode.FAILED if unjudged else ExitCode.DONE
 
 
 def traceback(text: str) -> None:

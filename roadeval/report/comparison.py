@@ -123,12 +123,6 @@ def _title(judgements: Sequence[Judgement]) -> str:
     return f"roadeval: {told.headline([each.holds for each in judgements])}"
 
 
-def replayed(judgements: Sequence[Judgement], verdict: str) -> str:
-    """Return limits that were judged on a drive, and its verdict, as Markdown of a comment."""
-    blocks = [*_limits(judgements), Text(verdict, "verdict")]
-    return f"## {_title(judgements)}\n\n{written(blocks)}"
-
-
 def _limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
     for title, kind, tone in (
         ("Limits exceeded", True, "warning"),

@@ -248,7 +248,6 @@ class Case:
     """The drive or the result."""
     parts: Mapping[str, str | None] = field(default_factory=dict)
     """Texts by JUnit's elements: ``error``, ``failure``, ``skipped``, ``system-out``."""
-    seconds: float | None = None
 
 
 def comparison_cases(comparison: Comparison, judgements: Iterable[Judgement]) -> Iterator[Case]:
@@ -269,8 +268,6 @@ def junit_xml(name: str, cases: Iterable[Case]) -> bytes:
     suite = ElementTree.Element("testsuite", name=visible(name))
     for case in cases:
         about = {"classname": visible(case.kind), "name": visible(case.name)}
-        if case.seconds is not None:
-            about["time"] = f"{case.seconds:.3f}"
         element = ElementTree.SubElement(suite, "testcase", about)
         for kind, text in case.parts.items():
             said = "\n".join(visible(line) for line in (text or "").splitlines())

@@ -13,9 +13,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
 from roadeval.evaluation.score import Effect, final_stages
@@ -31,15 +31,9 @@ FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; written last."""
 
 
-def _with_mean(value: Any) -> Any:
-    """Read an undefined mean, which JSON has as null, as NaN."""
-    undefined = isinstance(value, dict) and value.get("mean", 0) is None
-    return {**value, "mean": math.nan} if undefined else value
-
-
 Totals = dict[str, dict[str, dict[str, Any]]]
 """Counts and rates by variant and stage; an undefined rate is NaN, or None where it was read."""
-Differences = dict[str, dict[str, Annotated[Difference, BeforeValidator(_with_mean)]]]
+Differences = dict[str, dict[str, Difference]]
 """Differences by stage or variant, then by rate."""
 
 
@@ -347,43 +341,15 @@ class Member:
     """As the columns of the table ``drives``."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OverDrives(Difference):
-    """The difference of a rate between two final masks, over drives."""
-
-    base: str
-    variant: str
-    stage: str
-    metric: str
-    pooled: float | None = None
-    """That of the rates of all pixels together."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StratumFacts(Difference):
-    """A difference of ERR over a part of the drives: of a tag, or of a third of the light."""
-
-    base: str
-    variant: str
-    stage: str
-    metric: str
-    by: str
-    value: str
-    least: float | None
-    most: float | None
-    """The range of the light."""
-
-
 @dataclass(frozen=True, slots=True)
-class ConditionFacts:
-    """A condition that was judged on each drive."""
+class StratumFacts:
+    """A difference of ERR between two final masks, over the drives that have a value of a tag."""
 
-    condition: str
-    judged: int
-    not_judged: dict[str, str]
-    """Why not, by drive."""
-    holds: dict[str, str]
-    """What was found, by drive."""
+    base: str
+    variant: str
+    tag: str
+    value: str
+    difference: Difference
 
 
 @dataclass(frozen=True)
@@ -400,42 +366,28 @@ class FleetFacts(Document):
     """Evaluated frames."""
     failed: dict[str, str]
     """Why drives failed."""
-    rates: list[dict[str, Any]]
-    """Of each final mask, a row: the mean over drives, and of all pixels together."""
-    effects: list[Annotated[OverDrives, BeforeValidator(_with_mean)]]
-    strata: list[Annotated[StratumFacts, BeforeValidator(_with_mean)]]
+    totals: Totals
+    """Of each final mask: the mean over drives, and of all pixels together."""
+    effects: list[Effect]
+    """The differences of final masks: within the drive where there is one, else over drives."""
+    strata: list[StratumFacts]
     warnings: list[str]
-    conditions: list[ConditionFacts] = field(default_factory=list)
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
 
     @property
-    def totals(self) -> Totals:
-        """The rates by variant and final stage."""
-        return {row["variant"]: {row["stage"]: row} for row in self.rates}
-
-    @property
     def finals(self) -> dict[str, str]:
         """Each scored variant's final stage."""
-        return {row["variant"]: row["stage"] for row in self.rates}
+        return {variant: stage for variant, own in self.totals.items() for stage in own}
 
     @property
     def final_effects(self) -> list[Effect]:
-        """The differences, those of two masks together."""
-        found: dict[tuple[str, str], dict[str, Difference]] = {}
-        for each in self.effects:
-            found.setdefault((each.base, each.variant), {})[each.metric] = each
-        last = self.finals
-        return [
-            Effect(base, last[base], variant, last[variant], final=True, rates=rates)
-            for (base, variant), rates in found.items()
-        ]
+        """The differences, as `Facts` has them."""
+        return self.effects
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
-    RESULTS = (
-        *("verdict", "counts", "frames", "rates", "effects", "strata", "conditions", "warnings"),
-    )
+    RESULTS = ("verdict", "counts", "frames", "totals", "effects", "strata", "warnings")
 
 
 def is_fleet(path: str | Path) -> bool:

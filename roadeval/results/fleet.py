@@ -19,31 +19,19 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import Rows, is_plain
-from roadeval.evaluation.comparison import Condition, Judgement
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED, by_region
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.comparison import judged, junit_xml
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
-    ConditionFacts,
     Document,
     FleetFacts,
     Member,
     check_format,
     is_fleet,
-    json_text,
-    plain,
 )
-from roadeval.results.over_drives import (
-    drive_cases,
-    final_rows,
-    flat_metrics,
-    judge_drives,
-    scores_of,
-    summarise,
-)
+from roadeval.results.over_drives import final_rows, summarise
 from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
 from roadeval.results.tables import (
     AGAIN,
@@ -62,9 +50,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 RUN: Final = "run.toml"
-METRICS: Final = "metrics.json"
-JUNIT: Final = "junit.xml"
-FILES: Final = (FLEET, RUN, METRICS, JUNIT, *(f"{table}.parquet" for table in OF_DRIVES))
+FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in OF_DRIVES))
 """The files of a fleet's folder; beside them lie folders with files of each drive."""
 RECORDS: Final = "records"
 RESULTS: Final = "results"
@@ -370,46 +356,22 @@ class FleetWriter:
         run: Mapping[str, Any],
         run_toml: str,
         *,
-        conditions: Sequence[Condition] = (),
         asked: Mapping[str, str] | None = None,
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
         The members are in the tables' order; each has its record. ``run`` and ``run_toml`` are the
-        configuration of the fleet, as plain data and as a text. The conditions are judged on each
-        drive, see `roadeval.results.over_drives.judge_drives`. ``asked`` has the digests of what
+        configuration of the fleet, as plain data and as a text. ``asked`` has the digests of what
         each drive's record must have been made for; anything by default.
         """
         # Two commands may replay drives of one folder together.
         with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
             write_tables(self.folder, members, _Records(self.folder, asked or {}))
-            scores = scores_of(self.folder) if conditions else ()
-            judgements = [*judge_drives(scores, conditions, settings.least_frames)]
             drives = read_parquet(self.folder / "drives.parquet", "drives").to_pylist()
-            facts = summarise(
-                self.folder,
-                drives,
-                members,
-                settings,
-                run=dict(run),
-                conditions=[_condition(each, judgements) for each in conditions],
-            )
+            facts = summarise(self.folder, drives, members, settings, dict(run))
             put(self.folder / RUN, run_toml.encode())
-            put(self.folder / METRICS, json_text(plain(flat_metrics(facts))).encode())
-            put(self.folder / JUNIT, junit_xml(self.folder.name, drive_cases(drives, judgements)))
             put(self.folder / FLEET, facts.text().encode())
         return facts
-
-
-def _condition(condition: Condition, judgements: Sequence[Judgement]) -> ConditionFacts:
-    """Return on which drives a condition holds."""
-    own = [each for each in judgements if each.condition is condition]
-    return ConditionFacts(
-        condition.text,
-        judged=sum(each.holds is not None for each in own),
-        not_judged={each.result: each.why for each in own if each.holds is None},
-        holds={each.result: judged(each) for each in own if each.holds},
-    )
 
 
 def write_tables(

@@ -232,8 +232,6 @@ def score_rows(
 def effect_rows(facts: Facts) -> Iterator[dict[str, Any]]:
     """Yield the rows of ``effects``: each variant minus ``unfiltered``, and minus ``blind``."""
     for each in facts.effects:
-        mine = facts.totals[each.variant][each.stage]
-        theirs = facts.totals[each.base][each.base_stage]
         for metric, found in each.rates.items():
             yield {
                 "base": each.base,
@@ -250,10 +248,6 @@ def effect_rows(facts: Facts) -> Iterator[dict[str, Any]]:
                 "effective_frames": found.effective,
                 "worse": found.worse,
                 "better": found.better,
-                "base_wrong": theirs["FP"] + theirs["FN"],
-                "base_N": theirs["N"],
-                "wrong": mine["FP"] + mine["FN"],
-                "N": mine["N"],
             }
 
 

@@ -123,14 +123,6 @@ MEANS: Final = tuple(
 POOLED: Final = tuple(
     Column(f"pooled_{rate.name}", Kind.RATE, f"{rate.name} of the summed counts") for rate in RATES
 )
-LIGHT: Final = (
-    Column("luminance", Kind.RATE, "mean brightness of the image, from 0 to 1"),
-    Column("contrast", Kind.RATE, "standard deviation of the brightness"),
-    Column("shadow", Kind.RATE, "share of the image's lower half that is dark beside its lit part"),
-    Column("sun", Kind.NUMBER, "how much bluer grey things are there: above 0 in the sun"),
-)
-"""The light, measured from the images: see `roadeval.evaluation.score.light_of`."""
-
 MEASURE: Final = Column("measure", Kind.NAME, "`left_edge`, `right_edge`, `free_distance`, a rate")
 WHERE: Final = Column("where", Kind.NAME, "as `10m`, `ahead`, `0-10m`, `from_above`")
 """Measures of a camera that is known: metres to the left, or ahead, on flat ground."""
@@ -145,7 +137,7 @@ _OF_FRAMES: Final = (
             *(VARIANT, STAGE, *COUNTS, *RATES),
         ),
         streamed=True,
-        of_a_fleet=(FINAL, *LIGHT),
+        of_a_fleet=(FINAL,),
     ),
     TableSchema(
         "regions",
@@ -306,7 +298,6 @@ _OF_DRIVES: Final = (
             Column("verdict", Kind.TEXT, "the verdict on this drive alone"),
             Column("model", Kind.NAME, "SHA-256 of the model file; empty if it trained its own"),
             Column("identity", Kind.NAME, "digest of log, settings, model and software"),
-            *LIGHT,
         ),
     ),
     TableSchema(
@@ -342,10 +333,6 @@ _OF_DRIVES: Final = (
             Column("effective_frames", Kind.NUMBER, "independent frames that tell as much"),
             Column("worse", Kind.COUNT, "frames on which it is worse than the base"),
             Column("better", Kind.COUNT, "frames on which it is better"),
-            Column("base_wrong", Kind.COUNT, "wrong pixels of the base on all its frames"),
-            Column("base_N", Kind.COUNT, "labelled pixels of the base's frames"),
-            Column("wrong", Kind.COUNT, "wrong pixels of the variant on all its frames"),
-            Column("N", Kind.COUNT, "labelled pixels of the variant's frames"),
         ),
     ),
     TableSchema(
@@ -356,7 +343,6 @@ _OF_DRIVES: Final = (
             *(*KEY, FRAME, STAMP, VARIANT, STAGE),
             *(rate for rate in RATES if rate.name in ("ERR", "FPR", "FNR")),
             Column("picture", Kind.TEXT, "its file in the fleet's folder, errors in colour"),
-            *LIGHT,
         ),
     ),
 )

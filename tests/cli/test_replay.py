@@ -21,8 +21,8 @@ def asked(monkeypatch):
     """What the main job was asked for; it does nothing and is done at once."""
     asked = {"warnings": (), "losses": ()}
 
-    def replay(drive, config, *, fail_if, on_progress):
-        asked.update(drive=drive, config=config, fail_if=fail_if)
+    def replay(drive, config, *, on_progress):
+        asked.update(drive=drive, config=config)
         on_progress(Progress(3, 3, "replaying"))
         return Outcome(None, None, FACTS, asked["warnings"], asked["losses"], ())
 
@@ -32,7 +32,6 @@ def asked(monkeypatch):
 
 def test_the_defaults_are_those_of_the_library(asked):
     assert main(["replay", "drive.mcap"]) == 0
-    assert not asked["fail_if"]
     assert asked["drive"] == "drive.mcap"
     assert asked["config"] == RunConfig()
 

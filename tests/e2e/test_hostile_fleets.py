@@ -203,7 +203,7 @@ def test_a_report_is_not_written_through_a_link(fleet):
     assert "a link leads out of the folder" in runs["report"].stderr
 
 
-@pytest.mark.parametrize("name", ["metrics.json", "junit.xml", "records"])
+@pytest.mark.parametrize("name", ["worst.parquet", "run.toml", "records"])
 def test_the_fleets_own_command_writes_through_no_link(fleet, made, name):
     if (fleet / name).is_dir():
         shutil.rmtree(fleet / name)

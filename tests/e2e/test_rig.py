@@ -222,9 +222,9 @@ def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path,
     fleet = roadeval.Result(tmp_path / "fleet")
     assert fleet.drives["name"].tolist() == ["rig front", "rig copy"]
     (effect,) = [
-        e
+        e.rates["ERR"]
         for e in fleet.facts.effects
-        if (e.base, e.variant, e.metric) == ("unfiltered", "filtered", "ERR")
+        if (e.base, e.variant) == ("unfiltered", "filtered")
     ]
     assert (effect.units, effect.groups, effect.low) == (2, 1, None)
     assert any("cameras of one log count as one drive" in each for each in fleet.facts.warnings)

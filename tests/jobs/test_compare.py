@@ -55,7 +55,7 @@ def test_the_variants_of_one_fleet_are_compared_over_its_drives(fleets):
     (final,) = (change for change in found.changes if change.final)
     assert (final.variant, final.drives, final.difference["ERR"].unit) == ("filtered", 8, "drives")
     effects = FleetFolder(fleets[0]).facts.effects
-    told = next(e for e in effects if (e.base, e.metric) == ("unfiltered", "ERR"))
+    told = next(e.rates["ERR"] for e in effects if e.base == "unfiltered")
     own = final.difference["ERR"]
     assert (own.mean, own.low, own.high, own.p) == pytest.approx(
         (told.mean, told.low, told.high, told.p)

@@ -19,7 +19,7 @@ def blocks(language):
     return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
 
 
-DUSK, WEATHER, SUN = blocks("sql")
+(WEATHER,) = blocks("sql")
 
 
 def final(fleet):
@@ -28,10 +28,9 @@ def final(fleet):
 
 @pytest.fixture(scope="module")
 def fleets(tmp_path_factory):
-    """Two fleets of the same drives."""
+    """A folder with a fleet."""
     folder = tmp_path_factory.mktemp("fleets")
-    for seed, name in enumerate(("last_week", "monday")):
-        fleet_of(folder / name, 30, seed, frames=5)
+    fleet_of(folder / "monday", 30, frames=5)
     return folder
 
 
@@ -41,17 +40,6 @@ def asked(fleets, monkeypatch):
     monkeypatch.chdir(fleets)
     with duckdb.connect() as database:
         yield lambda query: database.execute(query).df()
-
-
-def test_which_drives_got_worse_at_dusk(asked, fleets):
-    new, old = (roadeval.Result(fleets / name) for name in ("monday", "last_week"))
-    change = final(new).set_index("drive").ERR - final(old).set_index("drive").ERR
-    dark = new.drives[new.drives.luminance < 0.35].drive
-    wanted = change[change.index.isin(dark) & (change > 0)].sort_values(ascending=False)
-    found = asked(DUSK)
-    assert len(found) > 2
-    assert found.drive.to_list() == wanted.index.to_list()
-    assert found.change.to_list() == pytest.approx(wanted.to_list())
 
 
 def test_err_by_weather_in_duckdb_and_in_pandas(asked, fleets):
@@ -67,15 +55,6 @@ def test_err_by_weather_in_duckdb_and_in_pandas(asked, fleets):
         assert row.mean_ERR == pytest.approx(own.ERR.mean())
         assert row.mean_ERR == pytest.approx(names["weather"].loc[weather, "mean"])
         assert row.pooled_ERR == pytest.approx((own.FP + own.FN).sum() / own.N.sum())
-
-
-def test_the_worst_frames_in_the_sun(asked, fleets):
-    fleet = roadeval.Result(fleets / "monday")
-    own = fleet.frames.query("variant == 'filtered' and final and sun > 0.1")
-    rows = [(-(r.FP + r.FN) / r.N, r.drive, r.frame) for r in own.itertuples()]
-    found = asked(SUN)
-    assert len(found) == 20
-    assert [*zip(found.drive, found.frame, strict=True)] == [row[1:] for row in sorted(rows)[:20]]
 
 
 def test_the_manifests_say_the_same_of_a_drive_and_can_be_read(tmp_path):

@@ -1,15 +1,11 @@
 """Rows that are made of sums, and what a drive's row and case say of it."""
 
-from xml.etree import ElementTree
-
 import numpy as np
 import pytest
 
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.comparison import junit_xml
-from roadeval.results.over_drives import drive_cases
 from roadeval.results.rows import drive_row, score_rows, sum_rows
 from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES, Kind, documentation
 from tests.results.making import facts_of
@@ -49,23 +45,6 @@ def test_scores_of_a_final_mask_have_its_edge_flicker_and_episodes():
     }
     assert raw == {"variant": "net", "stage": "raw", "final": False, "region": "all", "ERR": 0.3}
     assert post == raw | {"stage": "post", "final": True, "ERR": 0.2} | further
-
-
-@pytest.mark.parametrize(
-    ("status", "kind", "said"),
-    [
-        ("scored", "", ""),
-        ("unscored", "skipped", "no truth"),
-        ("failed", "error", "no truth"),
-        ("damaged", "system-err", "2 frames"),
-    ],
-)
-def test_the_case_of_a_drive_says_why_it_has_no_score_and_what_was_lost(status, kind, said):
-    row = {"drive": "a", "seconds": 1.0, "status": status, "reason": "no truth", "verdict": ""}
-    xml = junit_xml("fleet", drive_cases([row | {"losses": "2 frames"}]))
-    (case,) = ElementTree.fromstring(xml)
-    assert [part.tag for part in case] == [kind] * bool(kind)
-    assert "".join(part.get("message") or part.text for part in case) == said
 
 
 # --- One schema a table: what is written, read and documented is the same -------------------------

@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from roadeval.cli import arguments, console, messages
-from roadeval.cli.exit_codes import ExitCode
 
 
 def _ending(paths: list[Path] | None) -> list[Path] | None:
@@ -88,7 +87,7 @@ def compare(
         screen.show(compared.comparison, judged, console.results())
     for warning in compared.warnings:
         messages.warning(warning)
-    return messages.conditions(compared.held, compared.unjudged, ExitCode.DONE)
+    return messages.conditions(compared.held, compared.unjudged)
 
 
 COMMAND: Final = compare

@@ -36,7 +36,6 @@ def fleet(
         ),
     ],
     given: Given,
-    fail_if: arguments.Conditions = None,
     retry_failed: Annotated[
         bool, arguments.option("--retry-failed", "Try drives again that failed before.")
     ] = False,
@@ -46,22 +45,15 @@ def fleet(
     """Replay many drives and judge them together.
 
     On this machine or a cluster. The folder is the state: the same command again does only what is
-    missing or has changed. A drive that cannot be used is a row with the reason; the exit code is 3
-    then, and 4 where a --fail-if condition holds on a drive.
+    missing or has changed. A drive that cannot be used is a row with the reason, and the exit code
+    is 3 then.
     """
     config = arguments.configuration(given)
     from roadeval.cli.screens import fleet as screen
     from roadeval.jobs.run.fleet import replay_fleet as run
 
     with progress.watched(quiet) as watch:
-        found = run(
-            paths,
-            output,
-            config,
-            fail_if=fail_if or (),
-            retry_failed=retry_failed,
-            on_progress=watch,
-        )
+        found = run(paths, output, config, retry_failed=retry_failed, on_progress=watch)
     if json:
         console.emit(found.facts.text().rstrip())
     elif not quiet:
@@ -69,8 +61,7 @@ def fleet(
     messages.loops_missing()
     for sentence in screen.problems(found):
         messages.warning(sentence)
-    otherwise = ExitCode.LOSS if found.lost else ExitCode.DONE
-    return messages.conditions(found.held, found.unjudged, otherwise)
+    return ExitCode.LOSS if found.lost else ExitCode.DONE
 
 
 COMMAND: Final = fleet

@@ -94,7 +94,7 @@ def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bo
     if as_json:
         console.emit(json_text(plain([asdict(each) for each in found])).rstrip())
     else:
-        screen.show(opened.name, found, console.results())
+        screen.show(opened.name, found, console.results(), of_fleet=opened.fleet is not None)
 
 
 def _show(

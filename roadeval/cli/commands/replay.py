@@ -19,16 +19,13 @@ def replay(
     drive: arguments.Drive,
     *,
     given: Given,
-    fail_if: arguments.Conditions = None,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Replay a log; record, score and plot every step.
 
     Every intermediate goes into a recording for the Rerun viewer. Where the log has truth, each
-    stage is scored against it, with the shadow filter and without. Exit code 4 if a --fail-if
-    condition holds on the drive; 1 if one cannot be judged. With --fail-if, limits and verdict are
-    appended as Markdown to the file that $GITHUB_STEP_SUMMARY names.
+    stage is scored against it, with the shadow filter and without.
     """
     config = arguments.configuration(given)
     from roadeval.cli.screens import replay as screen
@@ -36,21 +33,17 @@ def replay(
 
     _spare_pandas(config)
     with progress.watched(quiet) as watch:
-        found = run(drive, config, fail_if=fail_if or (), on_progress=watch)
+        found = run(drive, config, on_progress=watch)
     if json:
         console.emit(found.facts.text().rstrip())
     elif not quiet:
         screen.show(found, console.results())
-    if found.judgements:
-        from roadeval.report.comparison import replayed
-
-        console.to_step_summary(lambda: replayed(found.judgements, found.facts.verdict))
     for text in found.tracebacks:
         messages.traceback(text)
     messages.loops_missing()
     for warning in found.warnings:
         messages.warning(warning)
-    return messages.conditions(found.held, found.unjudged, messages.losses(found.losses))
+    return messages.losses(found.losses)
 
 
 def _spare_pandas(config: RunConfig) -> None:

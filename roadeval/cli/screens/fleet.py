@@ -38,13 +38,13 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     out.print()
     out.print(facts.verdict)
     out.print()
-    if facts.rates:
+    if facts.totals:
         blocks = [rates_table(facts), *([differences_table(facts)] if facts.effects else [])]
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show([*blocks, Heading("Drives with the highest ERR"), worst], out)
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
-    listed = [f"roadeval inspect {outcome.folder} --list"] if facts.rates else []
+    listed = [f"roadeval inspect {outcome.folder} --list"] if facts.totals else []
     console.show_next(out, *listed, f"roadeval report {outcome.folder}")
 
 
@@ -53,10 +53,6 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     for path in outcome.unused:
         yield f"the settings for {path} hold for none of these drives"
     yield from outcome.facts.warnings
-    for condition in outcome.facts.conditions:
-        if condition.judged and (missing := [*condition.not_judged.values()]):
-            more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
-            yield f"{missing[0]}{more}"
     fleet = FleetFolder(outcome.folder)
     failed = (fleet.drives[drive] for drive in outcome.problems)
     for reason, drives in by_reason(fleet, failed).items():

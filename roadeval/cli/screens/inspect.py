@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from roadeval.jobs.results.inspect import WorstFrame
 
 
-def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
+def show(name: str, found: Sequence[WorstFrame], out: Console, *, of_fleet: bool) -> None:
     """Print the worst frames with their rates.
 
-    Of a drive with the parts of ERR and the notes; of a fleet with the light, and whether the
-    drive's recording was kept.
+    Of a drive with the parts of ERR and the notes; of a fleet with whether the drive's recording
+    was kept.
     """
     mask = f"{found[0].variant} by {found[0].by} of {found[0].stage}"
-    of_fleet, scored = bool(found[0].light), found[0].by == "ERR"
+    scored = found[0].by == "ERR"
     what, rule = "worst frames", "of neighbours only the worst"
     if not scored:
         what, rule = "without truth, frames to look at", "one a scene; a rank, and no error rate"
@@ -32,14 +32,14 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
     rates, rig = [*found[0].rates], any(each.camera for each in found)
     names = short_names([*dict.fromkeys(each.camera for each in found)])
     whose = ["drive"] if of_fleet else ["camera"] if rig else []
-    more = ["bright %", "shade %", "sun", "kept"] if of_fleet else ["why"] if scored else []
+    more = ["kept"] if of_fleet else ["why"] if scored else []
     rows = [
         [
             str(each.rank),
             *([each.drive if of_fleet else names[each.camera]] if whose else []),
             str(each.frame),
             *(percent(each.rates[rate]) for rate in rates),
-            *(_light(each) if of_fleet else [_why(each)] if scored else []),
+            *(["yes" if each.recording else "-"] if of_fleet else [_why(each)] if scored else []),
         ]
         for each in found
     ]
@@ -51,15 +51,6 @@ def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
     if of_fleet and not all(each.recording for each in found):
         out.print()
         out.print("Where no recording was kept, --worst K says how to make it.")
-
-
-def _light(frame: WorstFrame) -> tuple[str, ...]:
-    sun = frame.light["sun"]
-    return (
-        *(percent(frame.light[name], 0) for name in ("luminance", "shadow")),
-        "-" if sun is None else f"{sun:+.2f}",
-        "yes" if frame.recording else "-",
-    )
 
 
 def _why(frame: WorstFrame) -> str:

@@ -16,7 +16,6 @@ from roadeval.evaluation.comparison.conditions import (
     ConditionError,
     Judgement,
     judge,
-    judge_mask,
 )
 from roadeval.evaluation.comparison.pairing import (
     Disagreement,

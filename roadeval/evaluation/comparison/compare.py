@@ -188,10 +188,12 @@ def variants_as_sides(
     """Return the variants of one result as results of their own, the base first.
 
     ``there`` are all its variants, ``chosen`` those to compare, in order: all but the baseline by
-    default, ``unfiltered`` first. A `ComparisonError` if a variant is not there, or fewer than two
-    are.
+    default, ``unfiltered`` first; of a single one, that against the baseline. A `ComparisonError`
+    if a variant is not there, or fewer than two are.
     """
     pipelines = sorted((n for n in there if n != BASELINE), key=lambda name: name != UNFILTERED)
+    if len(pipelines) == 1:
+        pipelines = [BASELINE] * (BASELINE in there) + pipelines
     names = list(chosen or pipelines)
     for name in names:
         if name not in there:

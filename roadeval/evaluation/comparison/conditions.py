@@ -177,18 +177,10 @@ def judge(
     judgements = []
     for condition in conditions:
         for mask in _named(condition, comparison):
-            found = judge_mask(condition, mask, comparison.results, settings.least_frames)
-            judgements.append(found)
+            if why := _unjudged(condition, mask, comparison.results, settings.least_frames):
+                raise ConditionError(f"{condition.text}: not judged, because {why}")
+            judgements.append(condition.judge(mask))
     return tuple(judgements)
-
-
-def judge_mask(
-    condition: Condition, mask: Change, results: Sequence[ComparedResult], least: int
-) -> Judgement:
-    """Judge a condition on a mask; of a level no ``results`` are asked. Errors are `judge`'s."""
-    if why := _unjudged(condition, mask, results, least):
-        raise ConditionError(f"{condition.text}: not judged, because {why}")
-    return condition.judge(mask)
 
 
 def _named(condition: Condition, comparison: Comparison) -> list[Change]:

@@ -21,10 +21,8 @@ from roadeval.evaluation.score.counts import (
 from roadeval.evaluation.score.frame import (
     BlindPrior,
     CountsNotConservedError,
-    Light,
     check_conserved,
     judge,
-    light_of,
 )
 from roadeval.evaluation.score.metres import Measured, differences_of
 from roadeval.evaluation.score.rows import (

@@ -11,7 +11,6 @@ from roadeval.evaluation.stats.autocorrelation import (
 from roadeval.evaluation.stats.drives import (
     STUDENT_FROM,
     DriveMean,
-    Stratum,
     group_means,
     over_drives,
     sign_flip_can_tell,

@@ -36,10 +36,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final, Literal, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BeforeValidator
 
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.runtime.imports import special
@@ -210,8 +211,8 @@ def _bent(t: float, skewness: float) -> float:
 class Difference:
     """A mean of paired differences, new minus base, with its interval. Fractions."""
 
-    mean: float
-    """NaN if no unit has a difference."""
+    mean: Annotated[float, BeforeValidator(lambda read: math.nan if read is None else read)]
+    """NaN if no unit has a difference; null where it is read from JSON."""
     low: float | None
     high: float | None
     """The interval; within a drive not beyond what the base's rate leaves room for. None together

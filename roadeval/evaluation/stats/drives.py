@@ -32,7 +32,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -190,79 +190,22 @@ def _sums(values: Values) -> Values:
     return sums
 
 
-THIRDS: Final = ("low", "middle", "high")
-"""Of the fleet's drives, by a measured condition."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stratum:
-    """The difference on a part of the drives: those with a value of a tag, or a condition."""
-
-    by: str
-    """The tag or the condition."""
-    value: str
-    """The tag's, or one of `THIRDS`."""
-    least: float | None
-    most: float | None
-    """The condition's least and greatest value in it; None for a tag."""
-    difference: Difference
-
-
-_Part = tuple[str, str, float | None, float | None, Sequence[int]]
-"""A stratum with the places of its drives in place of their difference."""
-
-
 def strata(
-    drives: Sequence[DriveMean],
-    tags: Mapping[str, Sequence[str | None]],
-    conditions: Mapping[str, Sequence[float | None]],
-    confidence: float,
-) -> list[Stratum]:
-    """Divide drives by each tag and each condition, and average every part.
+    drives: Sequence[DriveMean], tags: Mapping[str, Sequence[str | None]], confidence: float
+) -> Iterator[tuple[str, str, Difference]]:
+    """Divide drives by each tag, and average every part.
 
-    Their p-values are corrected together. A tag or a condition that does not divide the drives
-    makes no parts. ``tags`` and ``conditions`` are by name each drive's value, in the order of
-    ``drives``; None (or NaN) where it has none, which leaves the drive out of this division. A
-    condition's thirds are of the drives that have it, from low to high; drives of one value stay
-    together, so that thirds may differ in size. Tags come first, in the order given, their values
-    sorted. Drives without a mean are left out.
+    Yielded are the tag, its value and the difference on the drives that have it; p-values are
+    corrected together. ``tags`` are by name each drive's value, in the order of ``drives``; None
+    where it has none, which leaves the drive out of this division. A tag that does not divide the
+    drives makes no parts. Drives without a mean are left out.
     """
-    known = [place for place, each in enumerate(drives) if not np.isnan(each.mean)]
-    parts = [part for by, values in tags.items() for part in _by_value(by, values, known)]
-    for by, measured in conditions.items():
-        parts += _by_third(by, measured, known)
-    found = holm([over_drives([drives[place] for place in part[4]], confidence) for part in parts])
-    return [
-        Stratum(by, value, least, most, each)
-        for (by, value, least, most, _), each in zip(parts, found, strict=True)
-    ]
-
-
-def _by_value(by: str, values: Sequence[str | None], known: Sequence[int]) -> list[_Part]:
-    """Return the drives of each value of a tag."""
-    by_value: dict[str, list[int]] = {}
-    for place in known:
-        value = values[place]
-        if value is not None:
-            by_value.setdefault(value, []).append(place)
-    if any(len(places) == len(known) for places in by_value.values()):
-        return []
-    return [(by, value, None, None, places) for value, places in sorted(by_value.items())]
-
-
-def _by_third(by: str, values: Sequence[float | None], known: Sequence[int]) -> list[_Part]:
-    """Return the drives of each third of a condition."""
-    measured = np.array([values[place] for place in known], np.float64)  # None becomes NaN
-    finite = np.isfinite(measured)
-    if not finite.any():
-        return []
-    # A value on a cut is below it.
-    cuts = np.quantile(measured[finite], [1 / 3, 2 / 3])
-    number = np.where(finite, np.searchsorted(cuts, measured, side="left"), -1)
-    parts: list[_Part] = []
-    for third, value in enumerate(THIRDS):
-        own = np.flatnonzero(number == third)
-        if len(own):
-            ends = float(measured[own].min()), float(measured[own].max())
-            parts.append((by, value, *ends, [known[place] for place in own.tolist()]))
-    return parts if len(parts) > 1 else []
+    parts: dict[tuple[str, str], list[DriveMean]] = {}
+    for by, values in tags.items():
+        pairs = zip(values, drives, strict=True)
+        known = [(value, each) for value, each in pairs if not math.isnan(each.mean)]
+        names = sorted({value for value, _ in known if value is not None})
+        if len(names) > 1 or any(value is None for value, _ in known):
+            parts |= {(by, name): [e for value, e in known if value == name] for name in names}
+    found = holm([over_drives(own, confidence) for own in parts.values()])
+    yield from ((*part, each) for part, each in zip(parts, found, strict=True))

@@ -18,7 +18,7 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
-from roadeval.results.schema import FAILED, LIGHT
+from roadeval.results.schema import FAILED
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -44,8 +44,6 @@ class WorstFrame:
     """The parts of ERR by stage, see `roadeval.evaluation.score.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()
     """What the recording says about it."""
-    light: Mapping[str, float | None] = field(default_factory=dict)
-    """In a fleet: the light of the image, see `roadeval.results.schema.LIGHT`."""
     picture: str | None = None
     """In a fleet: the file of its errors."""
     recording: Path | None = None
@@ -87,7 +85,6 @@ def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
     return WorstFrame(
         **{name: row[name] for name in names},
         rates={name: row[name] for name in ("ERR", "FPR", "FNR")},
-        light={column.name: row[column.name] for column in LIGHT},
         picture=str(fleet.path / row["picture"]) if row["picture"] else None,
         recording=recording if recording.exists() else None,
     )

@@ -354,9 +354,7 @@ class Result:
     def variants(self) -> list[str]:
         """The variants that were scored, in order."""
         found = (
-            (row["variant"] for row in each.facts.rates)
-            if isinstance(each, FleetFolder)
-            else each.rows.distinct("variant")
+            each.facts.finals if isinstance(each, FleetFolder) else each.rows.distinct("variant")
             for each in self._drives
         )
         return [*dict.fromkeys(chain(*found))]

@@ -13,7 +13,6 @@ from typing import Any
 
 from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.comparison import Condition
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import (
     DriveEntry,
@@ -40,7 +39,6 @@ from roadeval.jobs.run.fleet_work import (
 from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter, recording_path
-from roadeval.results.over_drives import check_conditions
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
 from roadeval.version import VERSION
@@ -89,20 +87,6 @@ class FleetOutcome:
         return self.facts.as_dict()
 
     @property
-    def held(self) -> list[str]:
-        """The sentences of the conditions that hold, a drive each."""
-        return [text for each in self.facts.conditions for text in each.holds.values()]
-
-    @property
-    def unjudged(self) -> list[str]:
-        """The conditions that could be judged on no drive, with the reason on the first."""
-        return [
-            next(iter(each.not_judged.values()))
-            for each in self.facts.conditions
-            if each.not_judged and not each.judged
-        ]
-
-    @property
     def lost(self) -> bool:
         """Whether a drive failed, or a part of one was lost."""
         return bool(self.counts.get(FAILED) or self.counts.get(DAMAGED))
@@ -114,7 +98,6 @@ def replay_fleet(
     config: RunConfig | None = None,
     *,
     executor: Executor | None = None,
-    fail_if: Sequence[str] = (),
     retry_failed: bool = False,
     on_progress: OnFleetProgress = lambda _: None,
 ) -> FleetOutcome:
@@ -136,9 +119,6 @@ def replay_fleet(
         Every option, those of the fleet included (`RunConfig.fleet`).
     executor
         Who replays the drives; by default Dask's workers, as `RunConfig.fleet` says.
-    fail_if
-        Conditions on a rate of each drive, as ``post.filtered.ERR > 20%``; see
-        `roadeval.evaluation.comparison.conditions`.
     retry_failed
         Whether drives that failed before are tried again.
     on_progress
@@ -153,8 +133,6 @@ def replay_fleet(
         raise FleetError(
             "`fleet.folds` and `training.model` do not go together: folds train models"
         )
-    conditions = [Condition.parse(text) for text in fail_if]
-    check_conditions(conditions)
     writer = FleetWriter(Path(output))
     writer.begin()
     run = FleetRun(writer.folder, tuple(entries), config, on_progress, retry_failed)
@@ -163,9 +141,7 @@ def replay_fleet(
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
     asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    facts = writer.finish(
-        members, config.evaluation, config.as_dict(), text, conditions=conditions, asked=asked
-    )
+    facts = writer.finish(members, config.evaluation, config.as_dict(), text, asked=asked)
     counts = Counter(each.status for each in run.done.values())
     if (allowed := config.fleet.max_failures) is not None:
         most = float(allowed.removesuffix("%"))

@@ -11,7 +11,7 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, astuple, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +23,7 @@ from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
 from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.regions import ALL
-from roadeval.evaluation.score import Light, final_stages, light_of
+from roadeval.evaluation.score import final_stages
 from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.fleet.remote import readable, stamp
 from roadeval.jobs.run.prepared import asked, content_of, software
@@ -490,8 +490,8 @@ class FrameGatherer:
         self._folder: Final = folder
         self._drive: Final = drive
         self._rows: Final = TableFile(frames_path(folder, drive), "frames")
-        self._lights: Final[list[tuple[float, ...]]] = []
         self._stamps: list[int] = []
+        """Of the first and the last evaluated frame."""
         self._worst: list[tuple[dict[str, Any], bytes]] = []
         """Rows of the table ``worst`` without their ranks, and the pictures."""
 
@@ -506,21 +506,19 @@ class FrameGatherer:
         """Add a frame; one that was not evaluated is ignored."""
         if result.role is not Role.EVALUATED:
             return
-        light = light_of(result.frame.image)
-        self._lights.append(astuple(light))
         self._stamps = [*self._stamps[:1], result.frame.stamp_ns]
         key = self._drive, result.frame.camera
         stages = final_stages((tally.variant, tally.stage) for tally in result.tallies)
         self._rows.add(
-            (*key, *row, stages[tally.variant] == tally.stage, *astuple(light))
+            (*key, *row, stages[tally.variant] == tally.stage)
             for tally, row in zip(result.tallies, frame_rows(result)["frames"], strict=True)
         )
         first = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
         if first is not None:
             *_, final = (tally for tally in result.tallies if tally.variant == first)
-            self._offer(result, final, light)
+            self._offer(result, final)
 
-    def _offer(self, result: FrameResult, tally: Tally, light: Light) -> None:
+    def _offer(self, result: FrameResult, tally: Tally) -> None:
         """Keep a frame as long as it is one of the worst."""
         frame, err = result.frame, tally.rates["ERR"]
         near = [w for w in self._worst if abs(w[0]["stamp_ns"] - frame.stamp_ns) < APART_NS]
@@ -541,26 +539,19 @@ class FrameGatherer:
             "stage": tally.stage,
             **{name: tally.rates[name] for name in ("ERR", "FPR", "FNR")},
             "picture": Path(PICTURES, self._drive, f"{frame.number}.jpg").as_posix(),
-            **asdict(light),
         }
         ranked = sorted([*rest, (row, picture)], key=lambda w: (-w[0]["ERR"], w[0]["frame"]))
         self._worst = ranked[:WORST]
 
     def facts(self) -> dict[str, Any]:
-        """Return what a drive's row says of its evaluated frames: their times and mean light."""
-        if not self._lights:
+        """Return what a drive's row says of when its evaluated frames are."""
+        if not self._stamps:
             return {}
-        values = np.array(self._lights)
-        known = ~np.isnan(values)
-        sums = np.where(known, values, 0).sum(axis=0)
-        means = sums / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-        names = (field.name for field in fields(Light))
-        times = {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
-        return times | dict(zip(names, means.tolist(), strict=True))
+        return {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
 
     def finish(self) -> None:
         """Write the rows and the worst frames' pictures; an OSError if they cannot be written."""
-        if self._lights:
+        if self._stamps:
             self._rows.finish()
         for row, picture in self._worst:
             put(self._folder / row["picture"], picture)

@@ -12,7 +12,6 @@ from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
-from roadeval.evaluation.comparison import Condition, Judgement
 from roadeval.evaluation.score import Measured
 from roadeval.fleet import readable
 from roadeval.jobs.outputs import Outputs
@@ -21,10 +20,8 @@ from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
 from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
-from roadeval.results.comparison import judged
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
-from roadeval.results.over_drives import check_conditions, judge_drives
 from roadeval.results.rows import Row, as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
@@ -54,23 +51,11 @@ class Outcome:
     """Those of the tables ``scores`` and ``effects``."""
     metres: tuple[Measured, ...] = ()
     """The measures on the ground; empty of a rig, and of a camera that is not known."""
-    judgements: tuple[Judgement, ...] = ()
-    """Of the conditions that were given."""
 
     @property
     def summary(self) -> dict[str, Any]:
         """The content of ``summary.json``."""
         return self.facts.as_dict()
-
-    @property
-    def held(self) -> list[str]:
-        """The sentences of the conditions that hold."""
-        return [judged(each) for each in self.judgements if each.holds]
-
-    @property
-    def unjudged(self) -> list[str]:
-        """Why conditions could not be judged."""
-        return [each.why for each in self.judgements if each.holds is None]
 
 
 def replay(
@@ -80,7 +65,6 @@ def replay(
     save: AnyPath | None = None,
     reports: AnyPath | None = None,
     mcap: AnyPath | None = None,
-    fail_if: Sequence[str] = (),
     on_progress: OnProgress = ignore,
     on_frame: OnFrame = pass_by,
 ) -> Outcome:
@@ -97,9 +81,6 @@ def replay(
     save, reports, mcap
         Where the recording, the folder of tables and figures, and the log of masks land; in place
         of what the configuration says.
-    fail_if
-        Conditions on a rate, as ``post.filtered.ERR > 20%``; see
-        `roadeval.evaluation.comparison.conditions`.
     on_progress
         Called in the caller's thread after every frame, and where something else begins that takes
         its time.
@@ -112,8 +93,6 @@ def replay(
     RoadevalError
         For whatever a user can mend: one line with what is wrong, where, and what to do.
     """
-    conditions = [Condition.parse(text) for text in fail_if]
-    check_conditions(conditions)
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
@@ -127,9 +106,7 @@ def replay(
                     left.unlink()
                 removed = f"removed {left}, the partial recording of an earlier run"
                 warnings = (*warnings, f"{removed}: this one is whole")
-    scores = [{"drive": log.name, **row} for row in outcome.rows["scores"]]
-    judgements = judge_drives(scores, conditions, config.evaluation.least_frames)
-    return replace(outcome, warnings=warnings, judgements=tuple(judgements))
+    return replace(outcome, warnings=warnings)
 
 
 def _written(
@@ -197,8 +174,6 @@ def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -
     shown = [each.frame for each in examples]
     facts = summary.of(run, shown, {} if run.camera else results.tables)
     scores = list(score_rows(facts, run.board.regions()))
-    if run.camera:
-        scores = [{"drive": f"{run.log.name} {run.camera}", **row} for row in scores]
     return _Ended(
         facts,
         _texts(run, facts, sums),

@@ -1,4 +1,4 @@
-"""The sections of many drives: differences, parts by tag and light, worst frames, missing ones."""
+"""The sections of many drives: differences, parts by tag, worst frames, missing ones."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from functools import partial
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import DASH, first_of, number, percent, points
-from roadeval.evaluation.score import BASES, TESTED
+from roadeval.data.words import first_of, number, percent, points
+from roadeval.evaluation.score import BASES, TESTED, Effect
+from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -22,9 +23,9 @@ from roadeval.report.blocks import (
     Text,
 )
 from roadeval.report.charts.standard import ForestRow, forest
-from roadeval.results.facts import OverDrives, StratumFacts
+from roadeval.results.facts import StratumFacts
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.schema import FAILED, LIGHT, TAG, UNSCORED
+from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, is_significant, marked_interval
 from roadeval.runtime.text import elided
 
@@ -34,7 +35,6 @@ OF_ONE_REASON: Final = 4
 """Drives named for one reason."""
 TAGS: Final = 48
 """Letters of a drive's tags, at most."""
-_LIGHT: Final = {column.name for column in LIGHT}
 _WORDS: Final = ("drive", "state", "group", "tags")
 _SHOWN: Final = ("ERR", "FPR", "FNR")
 Row = Mapping[str, Any]
@@ -53,20 +53,20 @@ def plots(findings: FleetFolder) -> Iterator[Block]:
     yield Details("Drives with the highest error rate", [drives_table(findings, NAMED), units])
 
 
-def plotted(findings: FleetFolder) -> Iterator[tuple[OverDrives, str]]:
+def plotted(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
     """Yield the differences that have a plot: of the filter, and of the best against blind."""
-    known = [each for each in findings.facts.effects if each.metric == TESTED and each.units]
+    known = [each for each in findings.facts.effects if each.rates[TESTED].units]
     for each in known:
         if (each.base, each.variant) == (UNFILTERED, FILTERED):
             yield each, "What the filter changes"
     blind = [each for each in known if each.base == BASELINE]
     if blind:
-        best = min(blind, key=lambda each: each.mean)
+        best = min(blind, key=lambda each: each.rates[TESTED].mean)
         which = "" if len(blind) == 1 else ", the best variant,"
         yield best, f"What {best.variant}{which} gains over {best.base}"
 
 
-def _plot(findings: FleetFolder, effect: OverDrives) -> Iterator[Block]:
+def _plot(findings: FleetFolder, effect: Effect) -> Iterator[Block]:
     rows = [
         ForestRow(
             findings.names[row["drive"]],
@@ -78,7 +78,8 @@ def _plot(findings: FleetFolder, effect: OverDrives) -> Iterator[Block]:
         for row in findings.effects.get((effect.base, effect.variant), ())
     ]
     if rows:
-        yield forest(rows, effect, f"ERR of {effect.variant} minus that of {effect.base}")
+        label = f"ERR of {effect.variant} minus that of {effect.base}"
+        yield forest(rows, effect.rates[TESTED], label)
 
 
 def _differences(findings: FleetFolder) -> dict[str, dict[str, float]]:
@@ -110,16 +111,16 @@ def table(findings: FleetFolder) -> Iterator[Block]:
     yield Heading("All drives")
     yield replace(drives_table(findings), find="Find drives, tags, states:")
     yield Text(
-        "Rates of the first variant's final mask in percent, differences in percentage points; "
-        "light as it was measured, from 0 to 1. A click on a title sorts.",
+        "Rates of the first variant's final mask in percent, differences in percentage points. A "
+        "click on a title sorts.",
         "note",
     )
 
 
 def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
-    """Tabulate every drive with its state, its rates, its light and its tags.
+    """Tabulate every drive with its state, its rates and its tags.
 
-    Or the ``worst`` ones, those with the highest ERR, without state, group and light.
+    Or the ``worst`` ones, those with the highest ERR, without state and group.
     """
     scores, differences = findings.first_scores, _differences(findings)
     tags, pages = _tags(findings), findings.pages()
@@ -131,14 +132,13 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "frames": lambda drive: number(findings.drives[drive]["evaluated"] or 0),
         **{rate: partial(_rate, scores, rate) for rate in _SHOWN},
         **{f"against {base}": partial(_point, own) for base, own in differences.items()},
-        **{column.name: partial(_light, findings, column.name) for column in LIGHT},
     }
     shown = [*findings.drives]
     if worst is not None:
         known = (row for row in scores.values() if row[TESTED] is not None)
         ranked = sorted(known, key=lambda row: (-row[TESTED], row["drive"]))
         shown = [row["drive"] for row in ranked[:worst]]
-        unused = ["state", "group", *_LIGHT, *([] if any(tags.values()) else ["tags"])]
+        unused = ["state", "group", *([] if any(tags.values()) else ["tags"])]
         columns = {title: cell for title, cell in columns.items() if title not in unused}
     return Table(
         [*columns],
@@ -154,11 +154,6 @@ def _rate(scores: Mapping[str, Row], rate: str, drive: str) -> Cell:
 
 def _point(values: Mapping[str, float], drive: str) -> str:
     return points(values.get(drive))
-
-
-def _light(findings: FleetFolder, name: str, drive: str) -> str:
-    value = findings.drives[drive][name]
-    return DASH if value is None else f"{value:.2f}"
 
 
 def missing(findings: FleetFolder) -> Iterator[Block]:
@@ -225,46 +220,20 @@ STRATA: Final = 30
 
 
 def strata(findings: FleetFolder) -> Iterator[Block]:
-    """Yield a table of parts for each difference that has a plot.
-
-    Thirds by light are shown where one of them has drives enough for an interval.
-    """
-    tables = []
-    for effect, title in plotted(findings):
+    """Yield a table of parts for each difference that has a plot."""
+    for place, (effect, title) in enumerate(plotted(findings)):
         mask = (effect.base, effect.variant)
-        own = [each for each in findings.facts.strata if (each.base, each.variant) == mask]
-        if all(each.low is None for each in own):
-            own = [each for each in own if each.by not in _LIGHT]
-        if own:
-            tables.append((title, own))
-    if not tables:
-        return
-    yield Heading("By tag and by light")
-    yield from (Details(title, [*_strata_table(rows)]) for title, rows in tables)
-    if any(row.by in _LIGHT for _, rows in tables for row in rows):
-        yield Text(_OF_LIGHT, "note")
-
-
-_OF_LIGHT: Final = (
-    "Light is measured from the images: luminance and contrast from 0 to 1; shadow: the share "
-    "of the lower half that is dark beside its lit part; sun: above 0 where shadows are bluer "
-    "than what is lit. Each is divided into thirds of the drives."
-)
-
-
-def _value(each: StratumFacts) -> str:
-    """Return what the drives of a part share: a tag's value, or a third and its range."""
-    if each.by not in _LIGHT:
-        return each.value
-    least, most = ("?" if end is None else f"{end:.2f}" for end in (each.least, each.most))
-    return f"{each.value} ({least} to {most})"
+        if own := [each for each in findings.facts.strata if (each.base, each.variant) == mask]:
+            if not place:
+                yield Heading("By tag")
+            yield Details(title, [*_strata_table(own)])
 
 
 def _strata_table(rows: Sequence[StratumFacts]) -> Iterator[Block]:
-    """Yield a table of parts, those with the most drives of each division, and what marks mean."""
-    ranked = sorted(range(len(rows)), key=lambda place: (-rows[place].units, place))
+    """Yield a table of parts, those with the most drives of each tag, and what marks mean."""
+    ranked = sorted(range(len(rows)), key=lambda place: (-rows[place].difference.units, place))
     shown = [rows[place] for place in sorted(ranked[:STRATA])]
-    first = [place == 0 or shown[place - 1].by != row.by for place, row in enumerate(shown)]
+    first = [place == 0 or shown[place - 1].tag != row.tag for place, row in enumerate(shown)]
     yield Table(
         ["by", "value", "drives", "mean", "interval", "worse", "better"],
         [_part_cells(row, first=begins) for row, begins in zip(shown, first, strict=True)],
@@ -272,30 +241,31 @@ def _strata_table(rows: Sequence[StratumFacts]) -> Iterator[Block]:
         breaks=[place for place, begins in enumerate(first) if begins and place],
         small=True,
     )
-    yield Text(_legend(rows, len(rows) - len(shown)), "note")
+    yield Text(_legend([row.difference for row in rows], len(rows) - len(shown)), "note")
 
 
 def _part_cells(row: StratumFacts, *, first: bool) -> list[Cell | str]:
+    found = row.difference
     return [
-        row.by.removeprefix(TAG) if first else "",
-        _value(row),
-        number(row.units),
-        Cell(points(row.mean), bold=is_significant(row.p_holm, row.confidence)),
-        marked_interval(row),
-        number(row.worse or 0),
-        number(row.better or 0),
+        row.tag if first else "",
+        row.value,
+        number(found.units),
+        Cell(points(found.mean), bold=is_significant(found.p_holm, found.confidence)),
+        marked_interval(found),
+        number(found.worse or 0),
+        number(found.better or 0),
     ]
 
 
-def _legend(rows: Sequence[StratumFacts], left_out: int) -> str:
-    counts = {row.comparisons for row in rows if row.comparisons}
+def _legend(found: Sequence[Difference], left_out: int) -> str:
+    counts = {each.comparisons for each in found if each.comparisons}
     legend = "Percentage points, means over drives."
     if counts:
         legend += (
             f" {MARK} significant after Holm's correction for the {max(counts)} parts that were "
             "tested together."
         )
-    elif all(row.low is None for row in rows):
+    elif all(each.low is None for each in found):
         legend += " No part has enough drives, or groups of them, for an interval."
     if left_out:
         legend += f" {left_out} smaller parts are left out."

@@ -90,7 +90,7 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
         yield LinkList([(title, WORST_AT)], findings.inspect(frame))
     if note := _how_sure_over_drives(facts):
         yield Text(note, "note")
-    if facts.rates:
+    if facts.totals:
         yield rates_table(facts)
     if facts.effects:
         yield differences_table(facts)
@@ -173,7 +173,8 @@ def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
             f"{_were(own)} scored by a model trained on the drive's own frames (none of "
             "these is evaluated): the rates say how well it does on a road that it has seen."
         )
-    if worse := _worse_than_baseline({row["variant"]: row["ERR"] for row in facts.rates}):
+    errors = {name: facts.totals[name][stage]["ERR"] for name, stage in facts.finals.items()}
+    if worse := _worse_than_baseline(errors):
         yield f"{worse}, which never looks at the image."
     yield from (f"{sentence}." for sentence in facts.warnings)
 
@@ -183,7 +184,8 @@ def _were(count: int) -> str:
 
 
 def _how_sure_over_drives(facts: FleetFacts) -> str:
-    first = next((each for each in facts.effects if each.metric == "ERR" and each.units), None)
+    errors = (each.rates["ERR"] for each in facts.effects)
+    first = next((each for each in errors if each.units), None)
     if first is None:
         return ""
     if first.unit == "frames":

@@ -209,76 +209,51 @@ def test_every_mean_in_the_interval_is_accepted_and_none_outside():
 
 FLEET = drives(np.random.default_rng(3).normal(0.01, 0.02, 24).tolist())
 LIGHT = ["dusk", "day", "night"] * 8
-LUMINANCE = [float(place) for place in range(24)]
 
 
-def parts(tags=None, conditions=None, fleet=FLEET):
-    return strata(fleet, tags or {}, conditions or {}, 0.95)
+def parts(tags, fleet=FLEET):
+    return [*strata(fleet, tags, 0.95)]
 
 
 def test_each_value_of_a_tag_is_summed_up_by_itself():
     found = parts({"light": LIGHT})
-    assert [(each.by, each.value, each.least) for each in found] == [
-        ("light", "day", None),
-        ("light", "dusk", None),
-        ("light", "night", None),
-    ]
-    assert [each.difference for each in found] == holm(
+    assert [part[:2] for part in found] == [("light", own) for own in ("day", "dusk", "night")]
+    assert [difference for *_, difference in found] == holm(
         [over_drives(FLEET[start::3], 0.95) for start in (1, 0, 2)]
     )
 
 
-def test_a_condition_is_cut_at_the_fleet_s_thirds():
-    found = parts(None, {"luminance": LUMINANCE[::-1]})
-    assert [(each.value, each.least, each.most) for each in found] == [
-        ("low", 0.0, 7.0),
-        ("middle", 8.0, 15.0),
-        ("high", 16.0, 23.0),
-    ]
-    assert [each.difference for each in found] == holm(
-        [over_drives(FLEET[start : start + 8], 0.95) for start in (16, 8, 0)]
-    )
-
-
-def test_drives_of_one_value_stay_together():
-    found = parts(None, {"luminance": [1.0] * 20 + [2.0] * 4})
-    assert [(each.value, each.difference.units) for each in found] == [("low", 20), ("high", 4)]
-
-
 def test_a_drive_without_a_value_is_left_out_of_that_division_alone():
-    found = parts({"light": [None, *LIGHT[1:]]}, {"luminance": [*LUMINANCE[:22], None, math.nan]})
+    found = parts({"light": [None, *LIGHT[1:]], "place": ["city", "country"] * 12})
     drives_in = {
-        name: sum(each.difference.units for each in found if each.by == name)
-        for name in ("light", "luminance")
+        name: sum(difference.units for by, _, difference in found if by == name)
+        for name in ("light", "place")
     }
-    assert drives_in == {"light": 23, "luminance": 22}
+    assert drives_in == {"light": 23, "place": 24}
 
 
 def test_what_does_not_divide_the_drives_makes_no_parts():
-    assert parts({"light": ["day"] * 24}, {"luminance": [3.0] * 24}) == []
-    assert parts({"light": [None] * 24}, {"luminance": [None] * 24}) == []
-    assert [each.value for each in parts({"light": ["day"] * 23 + [None]})] == ["day"]
-    assert parts({"light": []}, {"luminance": []}, fleet=[]) == []
+    assert parts({"light": ["day"] * 24}) == []
+    assert parts({"light": [None] * 24}) == []
+    assert [value for _, value, _ in parts({"light": ["day"] * 23 + [None]})] == ["day"]
+    assert parts({"light": []}, fleet=[]) == []
 
 
 def test_a_drive_without_a_mean_counts_nowhere():
     fleet = [*FLEET, *drives([math.nan])]
-    found = strata(fleet, {"light": [*LIGHT, "fog"]}, {"sun": [*LUMINANCE, 1000.0]}, 0.95)
-    assert "fog" not in [each.value for each in found]
-    assert found[-1].most == 23.0
+    assert "fog" not in [value for _, value, _ in parts({"light": [*LIGHT, "fog"]}, fleet)]
 
 
 def test_p_values_are_corrected_for_all_parts_together():
-    found = parts({"light": LIGHT}, {"luminance": LUMINANCE})
-    expected = multipletests([each.difference.p for each in found], method="holm")[1]
-    assert [each.difference.p_holm for each in found] == pytest.approx(expected.tolist())
-    assert {each.difference.comparisons for each in found} == {6}
+    found = parts({"light": LIGHT, "place": ["city", "country"] * 12})
+    expected = multipletests([difference.p for *_, difference in found], method="holm")[1]
+    assert [difference.p_holm for *_, difference in found] == pytest.approx(expected.tolist())
+    assert {difference.comparisons for *_, difference in found} == {5}
 
 
 def test_parts_in_which_nothing_can_be_found_are_not_counted():
     weather = ["fog"] * 2 + ["rain"] * 10 + ["sun"] * 12
     fleet = FLEET[:12] + drives([0.0] * 12)
-    fog, rain, sun = parts({"weather": weather}, fleet=fleet)
-    fog, rain, sun = fog.difference, rain.difference, sun.difference
+    fog, rain, sun = (difference for *_, difference in parts({"weather": weather}, fleet))
     assert fog.p is fog.p_holm is sun.p_holm is sun.comparisons is None
     assert (rain.p_holm, rain.comparisons) == (rain.p, 1)

@@ -15,7 +15,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.facts import Member
 from roadeval.results.fleet import FleetWriter, Record, frames_path
 from roadeval.results.rows import Key, cells
-from roadeval.results.schema import LIGHT, TABLES
+from roadeval.results.schema import TABLES
 from roadeval.runtime.files import put
 
 STAGES = ("similarity", "svm", "post")
@@ -52,10 +52,9 @@ def fleet_of(
         rows = _broken(i, member) if broken else None
         if rows is None:
             masks = _counts(i, rng, frames or 20, change)
-            rows = _scored(i, member.drive, masks, rng, lost=broken and i % 10 == 8)
-            lights = {c.name: rows["drives"][0][c.name] for c in LIGHT}
+            rows = _scored(i, member.drive, masks, lost=broken and i % 10 == 8)
             if frames:
-                _write_frames(folder, member.drive, masks, lights)
+                _write_frames(folder, member.drive, masks)
             if i < pictures:
                 _write_pictures(folder, member.drive)
         key = Key(member.drive, "/camera/image")
@@ -91,9 +90,8 @@ def _broken(i, member):
     return {"drives": [own], "scores": [], "effects": [], "worst": []}
 
 
-def _scored(i, drive, masks, rng, *, lost):
+def _scored(i, drive, masks, *, lost):
     n = len(masks["blind", "post"])
-    lights = dict(zip((c.name for c in LIGHT), rng.random(4).tolist(), strict=True))
     own = {
         "drive": drive,
         "status": "damaged" if lost else "scored",
@@ -106,13 +104,12 @@ def _scored(i, drive, masks, rng, *, lost):
         "evaluated": n,
         "trained_on": 10,
         "in_log": n + 10,
-        **lights,
     }
     return {
         "drives": [own],
         "scores": list(_scores(drive, masks)),
         "effects": list(_effects(drive, masks)),
-        "worst": list(_worst(drive, masks, lights)),
+        "worst": list(_worst(drive, masks)),
     }
 
 
@@ -176,14 +173,10 @@ def _effects(drive, masks):
                     "p": math.erfc(abs(mean) / (math.sqrt(2) * error)) if error else 1.0,
                     "frames": len(mine),
                     "effective_frames": float(len(mine)),
-                    "base_wrong": int(theirs[:, 2:].sum()),
-                    "base_N": int(theirs.sum()),
-                    "wrong": int(mine[:, 2:].sum()),
-                    "N": int(mine.sum()),
                 }
 
 
-def _worst(drive, masks, lights):
+def _worst(drive, masks):
     rates = metrics.table(masks["filtered", "post"])
     order = np.argsort(-rates[:, [*METRICS].index("ERR")], kind="stable")[:3].tolist()
     for rank, frame in enumerate(order, 1):
@@ -197,7 +190,6 @@ def _worst(drive, masks, lights):
             "stage": "post",
             **{name: own[name] for name in ("ERR", "FPR", "FNR")},
             "picture": f"pictures/{drive}/{frame}.jpg",
-            **lights,
         }
 
 
@@ -205,7 +197,7 @@ def _stamp(frame):
     return 1_700_000_000_000_000_000 + 100_000_000 * frame
 
 
-def _write_frames(folder, drive, masks, lights):
+def _write_frames(folder, drive, masks):
     n = len(masks["blind", "post"])
     counts = np.concatenate([*masks.values()])
     columns = {
@@ -220,7 +212,6 @@ def _write_frames(folder, drive, masks, lights):
         **dict(zip(("TP", "TN", "FP", "FN"), counts.T, strict=True)),
         "N": counts.sum(axis=1),
         **dict(zip(METRICS, metrics.table(counts).T, strict=True)),
-        **{name: np.full(len(counts), value) for name, value in lights.items()},
     }
     path = frames_path(folder, drive)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -36,7 +36,7 @@ def change(path, **parts):
 
 
 @pytest.mark.parametrize(
-    ("part", "other"), [("verdict", "Better."), ("counts", {}), ("frames", 5), ("rates", [])]
+    ("part", "other"), [("verdict", "Better."), ("counts", {}), ("frames", 5), ("totals", {})]
 )
 def test_a_result_that_was_changed_is_damage(folder, part, other):
     change(folder / "fleet.json", **{part: other})
@@ -50,7 +50,7 @@ def test_where_the_drives_lie_may_change(folder):
     assert FleetFolder(folder).facts.drives[0].source == "elsewhere"
 
 
-@pytest.mark.parametrize("part", ["drives", "rates", "effects", "strata", "conditions"])
+@pytest.mark.parametrize("part", ["drives", "effects", "strata"])
 @pytest.mark.parametrize("value", [None, 5, {}, [5]])
 def test_a_part_of_another_shape_is_damage(folder, part, value):
     change(folder / "fleet.json", **{part: value, "digest": None})
