@@ -52,7 +52,7 @@ def test_a_signal_ends_it_at_once_and_its_port_is_free(number, demo):
     with serving(demo.recording) as (address, run):
         assert status(f"{address}0/frame/40/part") == 200
         run.send_signal(number)
-        assert run.wait(10) == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
+        assert run.wait(60) == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
         assert "Traceback" not in run.stderr.read()
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(address, timeout=5)

@@ -37,7 +37,7 @@ def server():
 def ask(server, path="", method="GET", *, whole=False, body=None, **headers):
     """Send a request below the token, or as the path says; return status, headers and text."""
     address = urlsplit(server.address)
-    connection = http.client.HTTPConnection(address.hostname, address.port, timeout=5)
+    connection = http.client.HTTPConnection(address.hostname, address.port, timeout=60)
     wanted = path if whole else address.path + path
     given = {name.replace("_", "-"): value for name, value in headers.items()}
     connection.request(method, wanted, body=body, headers=given)
