@@ -20,14 +20,14 @@ def serving(*words):
             yield run.stdout.readline().strip(), run
         finally:
             run.send_signal(signal.SIGINT)
-            run.wait(20)
+            run.wait(60)
 
 
 def status(address, *, method="GET", **headers):
     """The status of an answer, asked for as no browser would."""
     asked = urllib.request.Request(address, method=method, headers=headers)
     try:
-        with urllib.request.urlopen(asked, timeout=20) as answer:
+        with urllib.request.urlopen(asked, timeout=60) as answer:
             return answer.status
     except urllib.error.HTTPError as error:
         return error.code

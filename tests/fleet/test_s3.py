@@ -39,7 +39,7 @@ def bucket():
     server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
     server.start()
     url = "http://{}:{}".format(*server.get_host_and_port())
-    urlopen(Request(f"{url}/bucket", method="PUT"), timeout=20).close()
+    urlopen(Request(f"{url}/bucket", method="PUT"), timeout=60).close()
     yield url
     server.stop()
 
@@ -63,7 +63,7 @@ def filled(s3):
     from obstore.store import S3Store
 
     store = S3Store("bucket", client_options={"allow_http": "true"})
-    urlopen(Request(f"{os.environ['AWS_ENDPOINT_URL']}/one-bag", method="PUT"), timeout=20).close()
+    urlopen(Request(f"{os.environ['AWS_ENDPOINT_URL']}/one-bag", method="PUT"), timeout=60).close()
     for name, content in split_bag().items():
         obstore.put(S3Store("one-bag", client_options={"allow_http": "true"}), name, content)
     for key, content in OBJECTS.items():
