@@ -117,9 +117,8 @@ class Survey:
 
     def histogram(self, probability: Probability, truth: Truth) -> Histogram:
         """Count cells of the ground seen from above as `roadeval.data.histogram` does pixels."""
-        cells = self._cells[0]
-        pixels = np.flatnonzero(cells)
-        codes, labels, cells = (e.ravel()[pixels] for e in (probability, truth, cells))
+        pixels, cells = self._above
+        codes, labels = (each.ravel()[pixels] for each in (probability, truth))
         counts = [
             np.bincount(codes[labels == each], cells[labels == each], CODES)
             for each in (NON_ROAD, ROAD)
@@ -138,6 +137,13 @@ class Survey:
             cells = plan_of(ground, self._settings).cells
             counts.append(np.bincount(cells[cells != OUTSIDE], minlength=height * width))
         return np.reshape(counts, (-1, height, width))
+
+    @cached_property
+    def _above(self) -> tuple[Pixels, Floats]:
+        """The pixels seen from above as the camera is said to stand, and the cells of each."""
+        cells = self._cells[0].ravel().astype(float)
+        pixels = np.flatnonzero(cells)
+        return pixels, cells[pixels]
 
     @cached_property
     def digits(self) -> list[Bits]:
