@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from itertools import takewhile
-from typing import Final, TypeGuard
+from typing import Any, Final, TypeGuard
 
 DASH: Final = "\N{EN DASH}"
 """Between two numbers; and where a number is undefined."""
@@ -91,6 +91,21 @@ def first_of(words: Sequence[str], most: int) -> str:
     """
     more = f" and {number(len(words) - most)} more" if len(words) > most else ""
     return f"{', '.join(words[:most])}{more}"
+
+
+def setting(value: Any) -> str:
+    """Return the value of a setting.
+
+    >>> setting(None), setting([3, 4]), setting(0.50)
+    ('not given', '3, 4', '0.5')
+    """
+    if value is None or value in ({}, [], ()):
+        return "not given"
+    if isinstance(value, dict):
+        return ", ".join(f"{name}={each}" for name, each in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def timestamp(stamp_ns: int) -> str:

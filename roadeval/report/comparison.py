@@ -12,7 +12,6 @@ from roadeval.evaluation.comparison import (
     Change,
     ComparedResult,
     Comparison,
-    Disagreement,
     DriveChange,
     Judgement,
     MovedFrame,
@@ -39,7 +38,7 @@ from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
-Row = Change | MovedFrame | RegionChange | Disagreement | DriveChange
+Row = Change | MovedFrame | RegionChange | DriveChange
 """Something about a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
 """What a row has in each column, by their titles."""
@@ -51,22 +50,13 @@ LONGEST: Final = 65_536
 """Characters of a comment on GitHub."""
 _CUT: Final = "\nThe rest is left out here: `roadeval compare -o changes.md` writes all of it.\n"
 _COMMAND: Final = "in the viewer"
-_WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region, or frames", "stamp")
+_WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp")
 """The columns that hold words, beside the commands."""
 _REGIONS: Final = "ERR of the final masks, percent: means over the frames that label any of it."
-_OVER_DRIVES: Final = (
-    "ERR of the final masks, percent: means over drives, of the frames that label any of it; a "
-    "drive counts where both results have scored the same frames of it."
-)
-_FRAMES: Final = "Percent of the labelled pixels that only one of the two final masks has right."
 _SAME: Final = "Regions without any change are left out."
 _LEFT_OUT: Final = (
     "A region that is not the same pixels in both, as the shadow that another filter found, is "
     "left out."
-)
-_SHADE: Final = (
-    "Frames with most shadow are a third, by the share of their pixels in true shadow, or in that "
-    "which both detected."
 )
 
 
@@ -100,21 +90,17 @@ def document(
     )
 
 
-def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
-    """Return a comparison as Markdown."""
+def markdown(
+    comparison: Comparison, judgements: Sequence[Judgement], longest: int | None = None
+) -> str:
+    """Return a comparison as Markdown, perhaps of so many characters at most."""
     blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
-    return f"# {_title(judgements)}\n\n{written(blocks)}"
-
-
-def comment(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
-    """Return the verdict, the table and the changed drives as Markdown of one comment at most."""
-    blocks = [*overview(comparison, judgements), *changed_drives(comparison)]
-    text = f"## {_title(judgements)}\n\n{written([*blocks, *_warnings(comparison)])}"
-    if len(text) <= LONGEST:
+    text = f"# {_title(judgements)}\n\n{written(blocks)}"
+    if longest is None or len(text) <= longest:
         return text
-    begin = text[: LONGEST - len(_CUT)]
+    begin = text[: longest - len(_CUT)]
     whole = begin.rfind("\n") + 1  # lines; a single long one is cut within
-    return (begin[:whole] if 2 * whole > LONGEST else begin) + _CUT
+    return (begin[:whole] if 2 * whole > longest else begin) + _CUT
 
 
 def _title(judgements: Sequence[Judgement]) -> str:
@@ -140,8 +126,8 @@ def _about(result: ComparedResult) -> str:
 
 
 def _warnings(comparison: Comparison) -> Iterator[Block]:
-    if comparison.notes:
-        yield BulletList("Beware", told.warnings(comparison), "warning")
+    if comparison.warnings:
+        yield BulletList("Beware", comparison.warnings, "warning")
 
 
 def overview(
@@ -272,15 +258,10 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
     if comparison.regions:
         legend = correction(row.difference for row in comparison.regions)
         yield Heading("Where it is better, and where worse", 2)
-        over = _OVER_DRIVES if comparison.drives else _REGIONS
         if rows := [row for row in comparison.regions if not row.difference.is_zero]:
-            yield _region_table(rows, over)
+            yield _region_table(rows)
         same = "" if len(rows) == len(comparison.regions) else _SAME
-        notes = [legend, same, _LEFT_OUT, "" if comparison.drives else _SHADE]
-        yield Text(" ".join(filter(None, notes)), "note")
-    if comparison.disagreements:
-        yield Heading("Frames on which they disagree most", 2)
-        yield _disagreement_table(comparison.disagreements)
+        yield Text(" ".join(filter(None, [legend, same, _LEFT_OUT])), "note")
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         yield _moved_table(comparison.moved, inspect)
@@ -344,24 +325,13 @@ def _plot(comparison: Comparison) -> Iterator[Block]:
     yield charts.forest(rows, over, f"change of {TESTED} of {own[0].variant}")
 
 
-def _region_table(rows: Sequence[RegionChange], caption: str) -> Table:
+def _region_table(rows: Sequence[RegionChange]) -> Table:
     columns: Columns = {
-        "region, or frames": lambda row: row.title,
+        "region": lambda row: row.title,
         "frames": lambda row: str(row.frames),
         **_change(lambda row: marked_interval(row.difference)),
     }
-    return _table(rows, columns, caption)
-
-
-def _disagreement_table(rows: Sequence[Disagreement]) -> Table:
-    columns: Columns = {
-        "frame": lambda row: str(row.frame),
-        "stamp": lambda row: timestamp(row.stamp_ns),
-        "disagree": lambda row: Cell(percent(row.base_right + row.new_right), bold=True),
-        "base right": lambda row: percent(row.base_right),
-        "new right": lambda row: percent(row.new_right),
-    }
-    return _table(rows, columns, _FRAMES)
+    return _table(rows, columns, _REGIONS)
 
 
 def _moved_table(rows: Sequence[MovedFrame], inspect: Inspect | None) -> Table:

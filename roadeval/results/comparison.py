@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 from itertools import groupby
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from roadeval.data.words import first_of, listing, percent, plain_points
-from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
+from roadeval.data.words import listing, percent, plain_points, setting
+from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement
 from roadeval.evaluation.score import TESTED
 from roadeval.results.sentences import is_significant, levels, sentence
 from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
 NAMED: Final = 5
-"""Drives of those left out for one reason, and settings that changed, which are named."""
+"""Settings that changed, which are named on a screen."""
 
 
 def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dict[str, Any]:
@@ -34,7 +34,6 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         **facts,
         "drives": drives,
         "false_discovery_rate": FALSE,
-        "warnings": warnings(comparison),
         "conditions": [_condition(each) for each in judgements],
     }
 
@@ -50,10 +49,10 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
     With ``most`` only the first so many are named.
     """
     lines = []
-    for each in comparison.changed_settings:
-        named = [f"{name} {_value(a)} to {_value(b)}" for name, (a, b) in each.settings.items()]
+    for label, settings in comparison.changed_settings.items():
+        named = [f"{name} {setting(a)} to {setting(b)}" for name, (a, b) in settings.items()]
         more = f"; and {len(named) - most} more" if most and len(named) > most else ""
-        of = f" in {each.other}" if len(comparison.results) > 2 else ""
+        of = f" in {label}" if len(comparison.results) > 2 else ""
         lines.append(f"Changed settings{of}: {'; '.join(named[:most])}{more}.")
     return lines
 
@@ -113,8 +112,7 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
         elif names:
             parts.append(f"{word} ({'; '.join(names)})")
     told = ", ".join(parts) or "no change is sure in any"
-    shade = "" if comparison.drives else " and shade"
-    return f"{_whose(result, variant)} by region{shade}: {told}"
+    return f"{_whose(result, variant)} by region: {told}"
 
 
 def _whose(result: str, variant: str) -> str:
@@ -143,54 +141,6 @@ def changed_drives(comparison: Comparison) -> list[str]:
             f"{percent(FALSE, 0)} %)"
         )
     return lines
-
-
-def warnings(comparison: Comparison) -> list[str]:
-    """Return what was left out and what makes results less comparable than they look."""
-    return [_told(each) for each in comparison.notes]
-
-
-def _told(note: Note) -> str:
-    one, other, count = note.result, note.other, note.count
-    drives = "1 drive is" if count == 1 else f"{count} drives are"
-    names = first_of(note.names, NAMED)
-    settings = ", ".join(
-        f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in note.settings.items()
-    )
-    guess = "" if note.settings else " (other labels or topics?)"
-    if note.kind is Kind.LOG_UNKNOWN and not note.names:
-        return f"{one} does not say which log it is of: nothing is subtracted"
-    return {
-        Kind.ABSENT: f"{drives} left out of {one} (not in {other}): {names}",
-        Kind.UNSCORED: f"{drives} left out of {one} (not scored in both): {names}",
-        Kind.OTHER_LOG: f"{drives} left out of {one} (of another log in {other}): {names}",
-        Kind.NO_FRAME: (
-            f"{drives} left out of {one} (no evaluated frame in common with {other}): {names}"
-        ),
-        Kind.LOG_UNKNOWN: f"{drives} left out of {one} (log unknown): {names}",
-        Kind.SAME_LOGS: (
-            f"{count} drives have other names in {one} and {other}, and are taken for the same by "
-            "the digests of their logs"
-        ),
-        Kind.FRAMES: (
-            f"{count} frames that {one} evaluated are left out against {other}, which lacks them "
-            "or trained on them"
-        ),
-        Kind.VARIANT: f"{names} is left out: {one} and {other} share no frame of it",
-        Kind.SETTINGS: (
-            f"{one} and {other} were replayed with different settings ({settings}): part of the "
-            "change may be theirs"
-        ),
-        Kind.TRUTH: (
-            f"the truth differs on {count} frames between {one} and {other}{guess}: part of the "
-            "change may be the truth's"
-        ),
-        Kind.OTHER_DRIVES: (
-            f"{one} and {other} are of different drives: side by side only, for a difference "
-            "would mix the scene with the method"
-        ),
-        Kind.END_MISSING: f"{one} is a partial recording: the end of its drive is missing",
-    }[note.kind]
 
 
 def judged(judgement: Judgement) -> str:
@@ -227,61 +177,30 @@ def discovery_note() -> str:
     )
 
 
-def _value(value: Any) -> str:
-    """Write a setting's value for a person."""
-    if value is None or value in ({}, [], ()):
-        return "not given"
-    if isinstance(value, dict):
-        return ", ".join(f"{name}={each}" for name, each in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(map(str, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def junit_xml(comparison: Comparison, judgements: Iterable[Judgement]) -> bytes:
+    """Return JUnit's XML, as CI systems read it.
 
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A case of a JUnit file."""
-
-    kind: str
-    """What was done, or the condition that was judged."""
-    name: str
-    """The drive or the result."""
-    parts: Mapping[str, str | None] = field(default_factory=dict)
-    """Texts by JUnit's elements: ``error``, ``failure``, ``skipped``, ``system-out``."""
-
-
-def comparison_cases(comparison: Comparison, judgements: Iterable[Judgement]) -> Iterator[Case]:
-    """Yield a case with what changed, and one a condition and result, which fails if it holds.
-
-    One that could not be judged is an error.
+    A case has what changed, and one a condition and result fails if the condition holds. One that
+    could not be judged is an error.
     """
     labels = ", ".join(each.label for each in comparison.results)
     lines = [*changed_settings(comparison), verdict(comparison), *where(comparison)]
-    yield Case("compare", labels, {"system-out": "\n".join(lines)})
+    cases = [("compare", labels, "system-out", lines)]
     for each in judgements:
         kind = {True: "failure", False: "system-out", None: "error"}[each.holds]
-        yield Case(each.condition.text, each.result, {kind: judged(each)})
-
-
-def junit_xml(name: str, cases: Iterable[Case]) -> bytes:
-    """Return JUnit's XML of a suite, as CI systems read it."""
-    suite = ElementTree.Element("testsuite", name=visible(name))
-    for case in cases:
-        about = {"classname": visible(case.kind), "name": visible(case.name)}
-        element = ElementTree.SubElement(suite, "testcase", about)
-        for kind, text in case.parts.items():
-            said = "\n".join(visible(line) for line in (text or "").splitlines())
-            if kind.startswith("system"):
-                ElementTree.SubElement(element, kind).text = said
-            else:
-                ElementTree.SubElement(element, kind, message=said)
-    for count, kind in (
-        ("tests", "testcase"),
-        ("errors", "testcase/error"),
-        ("failures", "testcase/failure"),
-        ("skipped", "testcase/skipped"),
-    ):
-        suite.set(count, str(len(suite.findall(kind))))
+        cases.append((each.condition.text, each.result, kind, judged(each).splitlines()))
+    suite = ElementTree.Element("testsuite", name=visible(labels))
+    for what, name, kind, texts in cases:
+        about = {"classname": visible(what), "name": visible(name)}
+        part = ElementTree.SubElement(ElementTree.SubElement(suite, "testcase", about), kind)
+        said = "\n".join(map(visible, texts))
+        if kind == "system-out":
+            part.text = said
+        else:
+            part.set("message", said)
+    suite.set("tests", str(len(cases)))
+    for count in ("error", "failure"):
+        suite.set(f"{count}s", str(len(suite.findall(f"testcase/{count}"))))
     ElementTree.indent(suite)
     xml: bytes = ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True)
     return xml + b"\n"

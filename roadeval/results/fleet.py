@@ -16,9 +16,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from roadeval.data import Rows, is_plain
+from roadeval.data import is_plain
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED, by_region
 from roadeval.evaluation.settings import EvaluationSettings
@@ -142,14 +140,6 @@ class FleetFolder:
             drive: row["name"] if times[row["name"]] == 1 else drive
             for drive, row in self.drives.items()
         }
-
-    @cached_property
-    def scores(self) -> dict[str, Rows]:
-        """The rows of ``scores`` of each drive that has any."""
-        rows = parquet_rows(self.table("scores"), "scores")
-        names, first, counts = np.unique(rows["drive"], return_index=True, return_counts=True)
-        ends = zip(names.tolist(), first.tolist(), counts.tolist(), strict=True)
-        return {name: rows.take(slice(begin, begin + count)) for name, begin, count in ends}
 
     @property
     def finals(self) -> dict[str, str]:

@@ -166,12 +166,13 @@ def a_change(
 def a_comparison(*changes: Change, **more: Any) -> Comparison:
     """A comparison with these changes, of one drive."""
     labels = ["base", *dict.fromkeys(change.result for change in changes)]
-    parts = ("changed_settings", "drives", "regions", "moved", "disagreements", "notes")
+    parts = ("drives", "regions", "moved", "disagreements", "warnings")
     known: dict[str, Any] = {
         "paired": True,
         "results": tuple(ComparedResult(label, 1, 1, "street", "d", 12, None) for label in labels),
         "changes": changes,
         "levels": changes,
+        "changed_settings": {},
         **dict.fromkeys(parts, ()),
         "settings": EvaluationSettings(),
     }

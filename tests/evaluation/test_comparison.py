@@ -1,7 +1,6 @@
 """Results side by side: which frames are compared, and what is said of them."""
 
-from collections.abc import Mapping
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +9,6 @@ from roadeval.evaluation.comparison import (
     ComparisonError,
     Condition,
     ConditionError,
-    Kind,
-    Note,
     Side,
     compare,
     judge,
@@ -46,7 +43,7 @@ def test_a_result_against_itself_differs_by_nothing_for_sure():
     for told in change.difference.values():
         assert (told.mean, told.low, told.high) == (0, 0, 0)
     assert found.moved == ()
-    assert found.notes == ()
+    assert found.warnings == ()
 
 
 def test_differences_are_new_minus_base_on_the_frames_that_both_have():
@@ -56,7 +53,10 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     assert change.frames == 2
     assert change.base["ERR"] == pytest.approx(0.10)
     assert change.difference["ERR"].mean == pytest.approx(0.03)
-    assert found.notes == (Note(Kind.FRAMES, "base", "new", 2),)
+    assert found.warnings == (
+        "2 frames that base evaluated are left out against new, which lacks them or trained on "
+        "them",
+    )
 
 
 def test_a_variant_that_both_have_on_no_frame_both_is_told():
@@ -66,7 +66,7 @@ def test_a_variant_that_both_have_on_no_frame_both_is_told():
         Side(name, [compared_drive({"frames": rows.take(~net | mine)})])
         for name, mine in (("a", frame < 2), ("b", frame >= 2))
     ]
-    assert compare(sides, SETTINGS).notes == (Note(Kind.VARIANT, "a", "b", names=("net",)),)
+    assert compare(sides, SETTINGS).warnings == ("net is left out: a and b share no frame of it",)
 
 
 def test_different_drives_stand_side_by_side_without_differences():
@@ -75,19 +75,25 @@ def test_different_drives_stand_side_by_side_without_differences():
     assert not found.paired
     assert [change.new["ERR"] for change in found.changes] == pytest.approx([0.1, 0.3])
     assert all(change.difference == {} for change in found.changes)
-    assert found.notes == (Note(Kind.OTHER_DRIVES, "a", "b"),)
+    assert found.warnings == (
+        "a and b are of different drives: side by side only, for a difference would mix the scene "
+        "with the method",
+    )
 
 
 def test_a_result_that_does_not_know_its_log_is_not_subtracted():
     sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
     found = compare(sides, SETTINGS)
-    assert found.notes == (Note(Kind.LOG_UNKNOWN, "b"),)
+    assert found.warnings == ("b does not say which log it is of: nothing is subtracted",)
 
 
 def test_another_truth_is_told():
     base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
     found = compare([base, altered(new, N=lambda pixels: pixels - 1)], SETTINGS)
-    assert found.notes == (Note(Kind.TRUTH, "base", "new", 2),)
+    assert found.warnings == (
+        "the truth differs on 2 frames between base and new (other labels or topics?): part of the "
+        "change may be the truth's",
+    )
 
 
 def test_settings_that_differ_are_named_with_both_values():
@@ -96,27 +102,26 @@ def test_settings_that_differ_are_named_with_both_values():
     base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
     found = compare([base, altered(new, N=lambda pixels: pixels - 1)], SETTINGS)
     of_the_log = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
-    assert found.changed_settings == (
-        Note(Kind.SETTINGS, "base", "new", settings=of_the_log | {"svm.c": (1, 2)}),
-    )
-    assert found.notes == (
-        Note(Kind.SETTINGS, "base", "new", settings=of_the_log),
-        Note(Kind.TRUTH, "base", "new", 2, settings=of_the_log),
+    assert found.changed_settings == {"new": of_the_log | {"svm.c": (1, 2)}}
+    assert found.warnings == (
+        "base and new were replayed with different settings (`frames.scale` 1 and 0.5, "
+        "`labels.road` not given and 3): part of the change may be theirs",
+        "the truth differs on 2 frames between base and new: part of the change may be the truth's",
     )
 
 
 def test_another_method_is_named_and_no_reason_for_doubt():
     sides = [a_side(name, [10] * 12, asked={"svm.c": c}) for name, c in (("a", 1), ("b", 2))]
     found = compare(sides, SETTINGS)
-    assert found.changed_settings == (Note(Kind.SETTINGS, "a", "b", settings={"svm.c": (1, 2)}),)
-    assert found.notes == ()
+    assert found.changed_settings == {"b": {"svm.c": (1, 2)}}
+    assert found.warnings == ()
 
 
 @pytest.mark.parametrize("asked", [{}, {"frames.scale": 1.0}])
 def test_a_result_that_does_not_know_its_settings_is_compared_without_a_word(asked):
     sides = [a_side("base", [10] * 12, asked=asked), a_side("new", [12] * 12)]
     found = compare(sides, SETTINGS)
-    assert found.notes == ()
+    assert found.warnings == ()
     assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
 
 
@@ -241,7 +246,8 @@ def test_a_drive_is_compared_with_a_fleet_that_has_it():
     (change,) = found.changes
     assert (change.drives, change.difference["ERR"].unit) == (1, "frames")
     assert change.base["ERR"] == pytest.approx(noisy(5)[2].mean() / 100)
-    assert {note.kind for note in found.notes} == {Kind.ABSENT}
+    assert len(found.warnings) == 1
+    assert "left out of fleet (not in alone)" in found.warnings[0]
 
 
 def test_a_group_and_copies_of_a_log_count_as_one():
@@ -273,10 +279,10 @@ def test_drives_that_are_left_out_or_have_moved_are_told():
     moved = [
         replace(part, drive=f"new/{part.drive}", name=f"new/{part.drive}") for part in new.parts
     ]
-    notes = compare([base, replace(new, parts=moved)], SETTINGS).notes
-    assert notes == (
-        Note(Kind.ABSENT, "b", "a", 1, ("new/3",)),
-        Note(Kind.SAME_LOGS, "a", "b", 3),
+    assert compare([base, replace(new, parts=moved)], SETTINGS).warnings == (
+        "1 drive is left out of b (not in a): new/3",
+        "3 drives have other names in a and b, and are taken for the same by the digests of their "
+        "logs",
     )
 
 
@@ -382,27 +388,3 @@ def test_certainty_is_judged_by_the_interval_of_any_stage_and_rate():
     texts = ("post.filtered.ERR > 4pp surely", "post.filtered.FPR > 9pp surely")
     judged = judge(compare(sides, SETTINGS), [Condition.parse(text) for text in texts], SETTINGS)
     assert [row.holds for row in judged] == [True, True]
-
-
-def strings(value):
-    """Every text in a result."""
-    match value:
-        case str():
-            yield value
-        case Mapping():
-            yield from strings([*value, *value.values()])
-        case tuple() | list():
-            for item in value:
-                yield from strings(item)
-
-
-def test_a_comparison_is_made_of_names_and_numbers_and_says_nothing():
-    base = a_side("base", [10] * 40, asked={"frames.every": 1})
-    new = altered(a_side("new", [12] * 30, asked={"frames.every": 2}), N=lambda pixels: pixels - 1)
-    found = compare([base, new], SETTINGS)
-    apart = compare([base, a_side("other", [10] * 12, digest="d2")], SETTINGS)
-    unknown = compare([base, a_side("other", [10] * 12, digest=None)], SETTINGS)
-    several = compare([a_fleet("a", noisy(3)), a_fleet("b", noisy(4))], SETTINGS)
-    (judgement,) = judge(found, [Condition.parse("post.filtered.ERR>1pp")], SETTINGS)
-    for result in (found, apart, unknown, several, judgement):
-        assert not [text for text in strings(astuple(result)) if " " in text]

@@ -3,7 +3,6 @@
 import numpy as np
 
 from roadeval.evaluation.comparison import (
-    Kind,
     Side,
     common_masks,
     match_drives,
@@ -25,38 +24,46 @@ def pairs_of(found):
     return [(one.drive, other.drive) for one, other in found[0]]
 
 
-def why(found):
-    return [(*each.names, each.result, each.kind) for each in found[1]]
-
-
 def test_drives_of_one_name_are_one_and_those_of_one_log_too():
     found = match_drives(
         a_result("base", ("a", "1"), ("b", "2"), ("c", "3")),
         a_result("new", ("moved", "2"), ("a", "1"), ("other", "9")),
     )
     assert pairs_of(found) == [("a", "a"), ("b", "moved")]
-    assert why(found) == [("c", "base", Kind.ABSENT), ("other", "new", Kind.ABSENT)]
+    assert found[1] == [
+        "1 drive is left out of base (not in new): c",
+        "1 drive is left out of new (not in base): other",
+    ]
 
 
 def test_a_log_that_is_in_a_result_twice_is_matched_twice_and_no_more():
     base = a_result("base", ("a", "f"), ("b", "f"), ("c", "f"))
     found = match_drives(base, a_result("new", ("x", "f"), ("y", "f")))
     assert pairs_of(found) == [("a", "x"), ("b", "y")]
-    assert why(found) == [("c", "base", Kind.ABSENT)]
+    assert found[1] == ["1 drive is left out of base (not in new): c"]
 
 
 def test_one_name_with_another_log_is_no_match():
     found = match_drives(a_result("base", ("a", "1")), a_result("new", ("a", "2")))
     assert not pairs_of(found)
-    assert why(found) == [("a", "base", Kind.OTHER_LOG)]
+    assert found[1] == ["1 drive is left out of base (of another log in new): a"]
 
 
 def test_drives_without_a_digest_or_a_score_are_no_match():
     one, other = a_result("base", ("a", None)), a_result("new", ("b", None))
     assert not pairs_of(match_drives(one, other))
-    assert why(match_drives(one, a_result("new", ("a", "1")))) == [("a", "base", Kind.LOG_UNKNOWN)]
+    (told,) = match_drives(one, a_result("new", ("a", "1")))[1]
+    assert told == "1 drive is left out of base (log unknown): a"
     failed = a_result("base", ("a", "1"), scored=False)
-    assert why(match_drives(failed, a_result("new", ("a", "1")))) == [("a", "base", Kind.UNSCORED)]
+    (told,) = match_drives(failed, a_result("new", ("a", "1")))[1]
+    assert told == "1 drive is left out of base (not scored in both): a"
+
+
+def test_five_of_the_drives_left_out_for_a_reason_are_named():
+    base = a_result("a", *((f"d{place}", f"{place}") for place in range(7)))
+    assert match_drives(base, a_result("b"))[1] == [
+        "7 drives are left out of a (not in b): d0, d1, d2, d3, d4 and 2 more"
+    ]
 
 
 def test_one_drive_of_several_is_found_where_only_that_is_compared():

@@ -1,7 +1,6 @@
-"""Where one of two masks is better: by region and shade, and on which frames they disagree."""
+"""Where one of two masks is better: by region, and on which frames they disagree."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from roadeval.data import Rows
@@ -98,38 +97,6 @@ def test_of_two_results_the_same_variant_is_compared():
     ]
 
 
-def scores(wrong, labelled=100, frames=12):
-    """Rows of the sums of one mask over a drive: of the whole frames, and of one region."""
-    counts = {"TP": 0, "TN": frames * (labelled - wrong), "FP": frames * wrong, "FN": 0}
-    sums = {"frames": frames, **counts, "ERR": wrong / labelled}
-    rows = [
-        {"variant": "first", "stage": "post", "region": name, **sums} for name in ("all", "lit")
-    ]
-    return rows_of(pd.DataFrame(rows))
-
-
-def over_drives(wrong, **more):
-    frames = rows_of(a_table({("first", "post"): [10] * 12}))
-    parts = [
-        compared_drive(
-            {"frames": frames, "scores": scores(wrong + place, **more)}, f"{place}", f"d{place}"
-        )
-        for place in range(6)
-    ]
-    return Side(str(wrong), parts)
-
-
-def test_over_several_drives_a_region_is_that_of_the_drives():
-    (row,) = compare([over_drives(20), over_drives(30)], SETTINGS).regions
-    assert (row.frames, row.difference.unit, row.difference.units) == (72, "drives", 6)
-    assert (row.base, row.difference.mean) == (pytest.approx(0.225), pytest.approx(0.1))
-
-
-@pytest.mark.parametrize("more", [{"labelled": 101}, {"frames": 11}])
-def test_of_several_drives_regions_of_other_pixels_or_frames_are_left_out(more):
-    assert not compare([over_drives(20), over_drives(30, **more)], SETTINGS).regions
-
-
 def test_a_region_of_other_pixels_is_left_out():
     base = regions({("first", "lit"): [10] * 20, ("first", "shadow"): [10] * 20})
     more = base["TN"] + (base["region"] == "shadow")
@@ -137,43 +104,6 @@ def test_a_region_of_other_pixels_is_left_out():
     run = a_run([10] * 20, [20] * 20, regions=base)
     found = compare([run, a_run([10] * 20, [20] * 20, regions=other)], SETTINGS)
     assert [row.region for row in found.regions] == ["lit"]
-
-
-def shaded(name, shares):
-    """Rows of a region whose pixels are these shares of 100, none of them wrong."""
-    rows = regions({("first", name): [0] * len(shares)})
-    cells = zip(*(counted(0, share) for share in shares), strict=True)
-    names = ("TP", "TN", "FP", "FN", "N")
-    return rows.replace(**{n: np.array(own) for n, own in zip(names, cells, strict=True)})
-
-
-@pytest.mark.parametrize("name", ["shadow", "true_shadow"])
-def test_frames_with_most_shadow_are_told_from_the_others(name):
-    shares = [5, 8, 10, 70, 0, 65] * 10
-    much = np.array(shares) > 50
-    rows = shaded(name, shares)
-    base = a_run([10] * 60, [20] * 60, regions=rows)
-    new = a_run(np.where(much, 2 + np.arange(60) % 3, 18).tolist(), [20] * 60, regions=rows)
-    found = {row.region: row for row in compare([base, new], SETTINGS).regions}
-    shadow, others = found["frames_with_shadow"], found["other_frames"]
-    assert (shadow.frames, others.frames) == (20, 40)
-    assert (shadow.base, shadow.new) == (pytest.approx(0.1), pytest.approx(0.03, abs=1e-3))
-    assert shadow.difference.high < 0 < others.difference.low
-    assert others.difference.mean == pytest.approx(0.08)
-    assert shadow.difference.comparisons == 2
-
-
-def test_true_shadow_counts_before_what_was_detected():
-    true, detected = shaded("true_shadow", [80] * 20 + [1] * 40), shaded("shadow", [9] * 60)
-    both = Rows({n: np.concatenate([detected[n], true[n]]) for n in true.columns})
-    run = a_run([10] * 60, [20] * 60, regions=both)
-    found = {row.region: row.frames for row in compare([run, run], SETTINGS).regions}
-    assert (found["frames_with_shadow"], found["other_frames"]) == (20, 40)
-
-
-def test_without_shadow_no_frames_are_told_apart():
-    run = a_run([10] * 30, [20] * 30, regions=shaded("shadow", [0] * 30))
-    assert not compare([run, run], SETTINGS).regions
 
 
 def test_bands_keep_their_place_where_one_is_left_out():

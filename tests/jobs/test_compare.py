@@ -37,9 +37,9 @@ def test_the_drives_that_are_worse_are_found_and_no_others(compared):
     assert {change.drives for change in found.changes} == {8}
     changed = {(row.variant, row.drive) for row in found.drives if row.changed}
     assert changed == {("filtered", f"drive_000{place}") for place in (0, 3, 6)}
-    assert compared.warnings == [
-        "2 drives are left out of base (not scored in both): drive_0007, drive_0009"
-    ]
+    assert found.warnings == (
+        "2 drives are left out of base (not scored in both): drive_0007, drive_0009",
+    )
     assert compared.sides == ()
 
 
@@ -73,7 +73,9 @@ def test_drives_that_have_moved_are_known_by_their_logs(fleets, tmp_path):
     _rename_drives(moved / "drives.parquet")
     found = compare([base, moved])
     assert {change.drives for change in found.comparison.changes} == {8}
-    assert any("8 drives have other names in base and moved" in w for w in found.warnings)
+    assert any(
+        "8 drives have other names in base and moved" in w for w in found.comparison.warnings
+    )
 
 
 def _rename_drives(path):
@@ -99,7 +101,7 @@ def test_settings_that_differ_are_told(fleets, tmp_path):
     assert found.content["changed"] == [
         "Changed settings: preset paper to gated; frames.every 1 to 2."
     ]
-    (warning,) = (each for each in found.warnings if "every" in each)
+    (warning,) = (each for each in found.comparison.warnings if "every" in each)
     assert "`frames.every` 1 and 2" in warning
     assert "preset" not in warning
 

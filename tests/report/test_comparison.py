@@ -6,18 +6,15 @@ import numpy as np
 
 from roadeval.evaluation.comparison import (
     Condition,
-    Disagreement,
-    Kind,
     MovedFrame,
-    Note,
     Side,
     compare,
     judge,
 )
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table
+from roadeval.report.blocks import BulletList, Figure, Heading, Table
 from roadeval.report.chart import Chart, ChartKind, Series, looks
-from roadeval.report.comparison import LONGEST, comment, document, markdown
+from roadeval.report.comparison import LONGEST, document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
 from tests.evaluation import making
@@ -37,7 +34,7 @@ def a_comparison(change=CHANGE, **more):
     known = {
         "changes": (change,),
         "moved": (MovedFrame("new|er", "filtered", 7, 0, 0.1, 0.4, 0.3),),
-        "notes": (Note(Kind.LOG_UNKNOWN, "the <gap>"),),
+        "warnings": ("the <gap> is left out",),
     }
     return making.a_comparison(CHANGE, **known | more)
 
@@ -54,14 +51,14 @@ def over_drive():
 
 
 def test_a_comment_of_a_thousand_masks_still_fits_and_says_that_it_was_cut():
-    whole = comment(a_comparison(), LIMITS)
-    assert whole.startswith("## roadeval: failed, 1 of 2 limits exceeded\n")
+    whole = markdown(a_comparison(), LIMITS, LONGEST)
+    assert whole.startswith("# roadeval: failed, 1 of 2 limits exceeded\n")
     assert "left out here" not in whole
     masks = tuple(replace(CHANGE, variant=f"variant_{number}") for number in range(1_000))
-    cut = comment(making.a_comparison(*masks), LIMITS)
+    cut = markdown(making.a_comparison(*masks), LIMITS, LONGEST)
     assert 65_000 < len(cut) <= LONGEST == 65_536
     assert cut.endswith("writes all of it.\n")
-    assert FAILED.replace("|", "\\|").replace(">", "\\>") in comment(a_comparison(), LIMITS)
+    assert FAILED.replace("|", "\\|").replace(">", "\\>") in cut
 
 
 def test_markdown_has_exceeded_limits_first_and_names_do_not_break_its_tables():
@@ -72,7 +69,7 @@ def test_markdown_has_exceeded_limits_first_and_names_do_not_break_its_tables():
     assert "| filtered | post | ERR | 10.00 | 11.20 | +1.20 | +0.50 to +2.00 |" in lines
     assert "| filtered | 7 | 0.000 s | 10.00 | 40.00 | +30.00 |" in lines
     assert "| --- | ---: | --- | ---: | ---: | ---: |" in lines
-    assert "- the \\<gap\\> does not say which log it is of: nothing is subtracted" in lines
+    assert "- the \\<gap\\> is left out" in lines
 
 
 def test_a_variant_of_which_no_stage_changed_has_no_rows():
@@ -102,22 +99,6 @@ def test_different_drives_are_laid_side_by_side():
     words = text(pdf(document(comparison, (), [])))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words
-
-
-def test_of_a_frame_of_disagreement_the_sum_of_both_shares_is_bold():
-    rows = (
-        Disagreement("new|er", "filtered", 7, 0, base_right=0.1, new_right=0.25),
-        Disagreement("newest", "filtered", 8, 100_000_000, base_right=0.2, new_right=0.0),
-    )
-    tables = blocks(Table, a_comparison(disagreements=rows))
-    (table,) = (table for table in tables if "disagree" in table.columns)
-    assert table.columns[4:] == ["disagree", "base right", "new right"]
-    assert table.rows == [
-        ["new|er", "filtered", "7", "0.000 s", Cell("35.00", bold=True), "10.00", "25.00"],
-        ["newest", "filtered", "8", "0.100 s", Cell("20.00", bold=True), "20.00", "0.00"],
-    ]
-    assert table.text_columns == [0, 1, 3]
-    assert table.breaks == [1]
 
 
 def test_its_contents_lead_to_its_parts():

@@ -4,21 +4,19 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import Condition, DriveChange, Kind, Note
+from roadeval.evaluation.comparison import Condition, DriveChange
 from roadeval.results.comparison import (
     as_dict,
     changed_settings,
     headline,
     judged,
     verdict,
-    warnings,
     where,
 )
 from roadeval.results.sentences import sentence
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 WORSE = a_difference(1.2, 0.5, 2)
-OF_THE_LOG = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
 
 
 def test_the_verdict_is_the_sentence_on_the_final_mask_and_leaves_the_baseline_out():
@@ -60,7 +58,7 @@ def test_of_different_drives_there_is_no_difference_to_tell():
 def test_changed_settings_are_told_of_each_result_and_some_of_many():
     chains = ["svm"], ["trees", "post"]
     settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}
-    changed = (Note(Kind.SETTINGS, "base", "new", settings=settings),)
+    changed = {"new": settings}
     found = a_comparison(a_change(WORSE), changed_settings=changed)
     assert changed_settings(found) == [
         "Changed settings: preset paper to gated; chain svm to trees, post; svm.c 1 to 2."
@@ -98,65 +96,6 @@ def test_drives_that_changed_are_counted_by_direction():
 
 
 @pytest.mark.parametrize(
-    ("note", "told"),
-    [
-        (
-            Note(Kind.FRAMES, "a", "b", 2),
-            "2 frames that a evaluated are left out against b, which lacks them or trained on them",
-        ),
-        (
-            Note(Kind.SETTINGS, "a", "b", settings=OF_THE_LOG),
-            "a and b were replayed with different settings (`frames.scale` 1 and 0.5, "
-            "`labels.road` not given and 3): part of the change may be theirs",
-        ),
-        (
-            Note(Kind.TRUTH, "a", "b", 2),
-            "the truth differs on 2 frames between a and b (other labels or topics?): part of the "
-            "change may be the truth's",
-        ),
-        (
-            Note(Kind.TRUTH, "a", "b", 2, settings=OF_THE_LOG),
-            "the truth differs on 2 frames between a and b: part of the change may be the truth's",
-        ),
-        (
-            Note(Kind.VARIANT, "a", "b", names=("net",)),
-            "net is left out: a and b share no frame of it",
-        ),
-        (
-            Note(Kind.SAME_LOGS, "a", "b", 3),
-            "3 drives have other names in a and b, and are taken for the same by the digests of "
-            "their logs",
-        ),
-        (
-            Note(Kind.ABSENT, "a", "b", 1, ("street",)),
-            "1 drive is left out of a (not in b): street",
-        ),
-        (Note(Kind.LOG_UNKNOWN, "a"), "a does not say which log it is of: nothing is subtracted"),
-        (
-            Note(Kind.OTHER_DRIVES, "a", "b"),
-            "a and b are of different drives: side by side only, for a difference would mix the "
-            "scene with the method",
-        ),
-    ],
-)
-def test_each_note_is_told(note, told):
-    assert warnings(a_comparison(notes=(note,))) == [told]
-
-
-def test_five_of_the_drives_left_out_for_a_reason_are_named():
-    note = Note(Kind.UNSCORED, "a", "b", 7, tuple(f"d{place}" for place in range(7)))
-    assert warnings(a_comparison(notes=(note,))) == [
-        "7 drives are left out of a (not scored in both): d0, d1, d2, d3, d4 and 2 more"
-    ]
-
-
-@pytest.mark.parametrize("kind", Kind)
-def test_every_kind_of_note_has_its_sentence(kind):
-    (told,) = warnings(a_comparison(notes=(Note(kind, "one", "other", 1, ("name",)),)))
-    assert "one" in told
-
-
-@pytest.mark.parametrize(
     ("text", "told"),
     [
         ("post.filtered.ERR > 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} holds"),
@@ -176,13 +115,11 @@ def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told
 
 def test_the_file_holds_the_facts_beside_the_sentences():
     change = a_change(WORSE)
-    found = a_comparison(change, notes=(Note(Kind.FRAMES, "base", "new", 2),))
+    found = a_comparison(change, warnings=("2 frames are left out",))
     judgements = [Condition.parse("post.filtered.ERR > 1pp surely").judge(change)]
     content = as_dict(found, judgements)
     assert content["verdict"] == verdict(found)
-    (note,) = content["notes"]
-    assert (note["kind"], note["result"], note["other"]) == ("frames", "base", "new")
-    assert content["warnings"] == warnings(found)
+    assert content["warnings"] == ("2 frames are left out",)
     (condition,) = content["conditions"]
     assert condition.pop("sentence") == judged(judgements[0])
     assert condition.pop("after") == pytest.approx(0.112)

@@ -65,8 +65,8 @@ def compare(
     out. One drive is judged over its frames, several over drives. Results of different drives are
     put side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one
     cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
-    of the smaller one. Where $GITHUB_STEP_SUMMARY names a file, verdict, table and changed drives
-    are appended to it as Markdown.
+    of the smaller one. Where $GITHUB_STEP_SUMMARY names a file, the comparison is appended to it
+    as Markdown.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
@@ -85,7 +85,7 @@ def compare(
     elif not quiet:
         judged = [each for each in compared.judgements if each.holds is not None]
         screen.show(compared.comparison, judged, console.results())
-    for warning in compared.warnings:
+    for warning in compared.comparison.warnings:
         messages.warning(warning)
     return messages.conditions(compared.held, compared.unjudged)
 

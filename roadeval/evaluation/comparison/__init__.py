@@ -19,9 +19,7 @@ from roadeval.evaluation.comparison.conditions import (
 )
 from roadeval.evaluation.comparison.pairing import (
     Disagreement,
-    Kind,
     MovedFrame,
-    Note,
     Part,
     Side,
     common_masks,
@@ -29,6 +27,5 @@ from roadeval.evaluation.comparison.pairing import (
     match_drives,
     matched,
     one_drive,
-    parts_of,
     region_counts,
 )

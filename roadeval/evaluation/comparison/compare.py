@@ -18,26 +18,26 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
+from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison.pairing import (
     Disagreement,
-    Kind,
     MaskPair,
     MovedFrame,
-    Note,
     Pair,
     Part,
     Side,
     common_masks,
+    common_regions,
     disagreements,
+    left_out,
     match_drives,
     moved_frames,
-    parts_of,
     region_counts,
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS
-from roadeval.evaluation.regions import ALL, titles
+from roadeval.evaluation.regions import titles
 from roadeval.evaluation.score import TESTED, FourCounts, Name, counts_of, means, stages_of
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
@@ -133,7 +133,7 @@ class DriveChange:
 
 @dataclass(frozen=True, slots=True)
 class RegionChange:
-    """What changed in the ERR of a final mask within a region, or on the frames of a shade.
+    """What changed in the ERR of a final mask within a region.
 
     ``base`` and ``new`` are means over the ``frames`` on which both have labelled pixels there.
     """
@@ -157,8 +157,8 @@ class Comparison:
     ``changes`` are ``levels``."""
     results: tuple[ComparedResult, ...]
     """The base first."""
-    changed_settings: tuple[Note, ...]
-    """All settings that a new result does not share with the base."""
+    changed_settings: Mapping[str, Mapping[str, tuple[Any, Any]]]
+    """By new result the settings that it does not share with the base: both values by name."""
     changes: tuple[Change, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
     levels: tuple[Change, ...]
@@ -166,13 +166,13 @@ class Comparison:
     drives: tuple[DriveChange, ...]
     """Where several drives are compared: each, mask by mask, the surest first."""
     regions: tuple[RegionChange, ...]
-    """The final masks of each new result, region by region."""
+    """Where one drive is compared: the final masks of each new result, region by region."""
     moved: tuple[MovedFrame, ...]
     """The frames of one drive that changed most."""
     disagreements: tuple[Disagreement, ...]
     """The frames of one drive on which final masks of one run disagree most."""
-    notes: tuple[Note, ...]
-    """Warnings: what was left out, and why results are less comparable than they look."""
+    warnings: tuple[str, ...]
+    """What was left out, and why results are less comparable than they look."""
     settings: EvaluationSettings
     """The confidence of the intervals, and what is negligible."""
 
@@ -221,7 +221,7 @@ def compare(
             raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
     base, *others = sides
     if across_variants:
-        matches: list[tuple[list[Pair], list[Note]]] = [
+        matches: list[tuple[list[Pair], list[str]]] = [
             ([(part, part) for part in base.scored], []) for _ in others
         ]
     else:
@@ -240,14 +240,14 @@ def compare(
     return Comparison(
         paired=True,
         results=tuple(_result(*each) for each in zip(sides, frames, strict=True)),
-        changed_settings=tuple(each.changed for each in found if each.changed.settings),
+        changed_settings={each.label: each.changed for each in found if each.changed},
         changes=tuple(_corrected(changes)),
         levels=tuple(row for each in found for row in _changes(each.label, each.levels)),
         drives=tuple(row for each in found for row in each.drives()),
         regions=tuple(replace(r, difference=d) for r, d in zip(regions, corrected, strict=True)),
         moved=tuple(frame for each in found for frame in each.moved),
         disagreements=tuple(frame for each in found for frame in each.disagreements),
-        notes=tuple(note for each in found for note in each.notes()),
+        warnings=tuple(sentence for each in found for sentence in each.warnings()),
         settings=settings,
     )
 
@@ -263,12 +263,15 @@ def _side_by_side(sides: Sequence[Side], other: Side, settings: EvaluationSettin
             frames += _add_levels(masks, part, part.group or part.drive, table)
         rows += _changes(side.label, masks)
         results.append(_result(side, frames))
-    note = Note(Kind.OTHER_DRIVES, sides[0].label, other.label)
+    why = (
+        f"{sides[0].label} and {other.label} are of different drives: side by side only, for a "
+        "difference would mix the scene with the method"
+    )
     for side in (other, sides[0]):
         if any(part.digest is None for part in side.scored):
-            note = Note(Kind.LOG_UNKNOWN, side.label)
+            why = f"{side.label} does not say which log it is of: nothing is subtracted"
     made, levels = tuple(results), tuple(rows)
-    return Comparison(False, made, (), levels, levels, (), (), (), (), (note,), settings)
+    return Comparison(False, made, {}, levels, levels, (), (), (), (), (why,), settings)
 
 
 def _result(side: Side, frames: int) -> ComparedResult:
@@ -325,7 +328,6 @@ class _OnDrive:
     within: Difference | None = None
     """Of a final mask on one of several drives: what changed in `TESTED`."""
     final: bool = True
-    title: str = ""
 
     def mean(self, means: Mapping[str, float], rate: str) -> DriveMean:
         """Return one of its means as a drive of its group."""
@@ -401,7 +403,7 @@ class _Against:
         base: Side,
         new: Side,
         pairs: Sequence[Pair],
-        left_out: Sequence[Note],
+        left_out: Sequence[str],
         settings: EvaluationSettings,
         *,
         across: bool,
@@ -413,10 +415,7 @@ class _Against:
         """Whether it is one camera of one drive, whose frames have numbers of their own."""
         self._left_out: Final = left_out
         self._same_logs: Final = sum(one.drive != other.drive for one, other in pairs)
-        self.changed: Final = Note(
-            Kind.SETTINGS, base.label, new.label, settings=_changed_settings(pairs)
-        )
-        """All settings that are others in the new result."""
+        self.changed: Final = _changed_settings(pairs)
         self.base_frames = self.new_frames = 0
         self._lost = [0, 0]
         self._relabelled = 0
@@ -425,6 +424,7 @@ class _Against:
         self.levels: Final = _Masks(list)
         self._masks: Final = _Masks(list)
         self._regions: Final = _Masks(list)
+        self._titles: Final[dict[str, str]] = {}
         self.moved: list[MovedFrame] = []
         self.disagreements: list[Disagreement] = []
         firsts: dict[str | None, str] = {}
@@ -462,16 +462,13 @@ class _Against:
             self._uncommon.update(
                 dict.fromkeys(v for v in before.distinct("variant") if v in theirs)
             )
-        name = "scores" if self._several else "regions"
-        regions = self._base.rows(base, name), self._new.rows(new, name)
         for mask in masks:
             chosen = mask.final and mask.variant != BASELINE
             stamps = mask.after["stamp_ns"]
             made = self._on_drive(new, group, mask.counts, stamps, tested=chosen)
             self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
-            if chosen and self._several:
-                self._add_region_sums(new, group, mask, *regions)
-            elif chosen:
+            if chosen and not self._several:
+                regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
                 self._add_regions(new, group, mask, *regions)
         if self._alone:
             first = next((mask for mask in masks if mask.final), masks[-1])
@@ -498,36 +495,15 @@ class _Against:
         return replace(made, within=_within([whole], TESTED, self._settings) if tested else None)
 
     def _add_regions(self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows) -> None:
-        """Add what changed by region and shade in a final mask that looks at the image."""
+        """Add what changed by region in a final mask that looks at the image."""
         called = self._base.label if self._across else mask.variant
         before = region_counts(base, called, mask.base_stage, mask.before)
         after = region_counts(new, mask.variant, mask.stage, mask.after)
-        for region, title, known, *counts in parts_of(before, after, mask):
-            stamps = mask.after["stamp_ns"][known]
-            made = self._on_drive(part, group, (counts[0], counts[1]), stamps, tested=True)
-            self._regions[mask.variant, region].append(replace(made, title=title))
-
-    def _add_region_sums(
-        self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows
-    ) -> None:
-        """Add a final mask's regions on one of several drives, from the sums over its frames.
-
-        Only where both have scored the same frames, and of a region as many pixels and as much
-        road: else they may be other places.
-        """
-        called = self._base.label if self._across else mask.variant
-        before = _region_sums(base, called, mask.base_stage)
-        after = _region_sums(new, mask.variant, mask.stage)
-        if {len(mask.before)} != {known[ALL][0] for known in (before, after) if ALL in known}:
-            return
-        for region, title in titles([name for name in before if name != ALL]).items():
-            (frames, own), (others, theirs) = before[region], after.get(region, before[ALL])
-            pixels, other_pixels = own.counts.sum(), theirs.counts.sum()
-            road, other_road = (each.counts[[0, 3]].sum() for each in (own, theirs))
-            if pixels and (frames, pixels, road) == (others, other_pixels, other_road):
-                change = {TESTED: theirs.means[TESTED] - own.means[TESTED]}
-                made = _OnDrive(part, group, frames, theirs, own, change, title=title)
-                self._regions[mask.variant, region].append(made)
+        self._titles.update(titles([*before]))
+        for region, known in common_regions(before, after):
+            counts, stamps = (own[region][known] for own in (before, after)), mask.after["stamp_ns"]
+            made = self._on_drive(part, group, tuple(counts), stamps[known], tested=True)
+            self._regions[mask.variant, region].append(made)
 
     def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
         """Return the difference within the one drive, or over several."""
@@ -546,13 +522,13 @@ class _Against:
         )
 
     def regions(self) -> Iterator[RegionChange]:
-        """Yield what changed by region and shade."""
+        """Yield what changed by region."""
         for (variant, region), own in self._regions.items():
             yield RegionChange(
                 result=self.label,
                 variant=variant,
                 region=region,
-                title=own[0].title,
+                title=self._titles[region],
                 frames=sum(each.frames for each in own),
                 base=_mean(own, [each.base for each in own if each.base], TESTED),
                 new=_mean(own, [each.new for each in own], TESTED),
@@ -579,36 +555,42 @@ class _Against:
                 ),
             )
 
-    def notes(self) -> Iterator[Note]:
+    def warnings(self) -> Iterator[str]:
         """Yield what was left out, and what makes the two less comparable than they look."""
         base, new = self._base.label, self.label
         yield from self._left_out
         if apart := self._apart:
-            yield Note(Kind.NO_FRAME, new, base, len(apart), tuple(apart))
+            yield left_out(apart, new, f"no evaluated frame in common with {base}")
         if self._several and self._same_logs:
-            yield Note(Kind.SAME_LOGS, base, new, self._same_logs)
+            yield (
+                f"{self._same_logs} drives have other names in {base} and {new}, and are taken for "
+                "the same by the digests of their logs"
+            )
         for label, other, frames in zip((base, new), (new, base), self._lost, strict=True):
             if frames:
-                yield Note(Kind.FRAMES, label, other, frames)
+                yield (
+                    f"{frames} frames that {label} evaluated are left out against {other}, which "
+                    "lacks them or trained on them"
+                )
         for variant in self._uncommon:
             if all(variant != mask[0] for mask in self._masks):
-                yield Note(Kind.VARIANT, base, new, names=(variant,))
-        changed = self.changed.settings
-        of_the_log = {name: both for name, both in changed.items() if name.startswith(_OF_THE_LOG)}
+                yield f"{variant} is left out: {base} and {new} share no frame of it"
+        of_the_log = [
+            f"`{name}` {setting(own)} and {setting(other)}"
+            for name, (own, other) in self.changed.items()
+            if name.startswith(_OF_THE_LOG)
+        ]
         if of_the_log:
-            yield replace(self.changed, settings=of_the_log)
+            yield (
+                f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
+                " part of the change may be theirs"
+            )
         if self._relabelled:
-            yield Note(Kind.TRUTH, base, new, self._relabelled, settings=of_the_log)
-
-
-def _region_sums(rows: Rows, variant: str, stage: str) -> dict[str, tuple[int, _Sum]]:
-    """Return a mask's frames and sums by region, from rows of ``scores``."""
-    own = rows.take((rows["variant"] == variant) & (rows["stage"] == stage))
-    columns = (own[name].tolist() for name in ("region", "frames", TESTED))
-    return {
-        region: (frames, _Sum({TESTED: error}, counts))
-        for region, frames, error, counts in zip(*columns, counts_of(own), strict=True)
-    }
+            guess = "" if of_the_log else " (other labels or topics?)"
+            yield (
+                f"the truth differs on {self._relabelled} frames between {base} and {new}{guess}: "
+                "part of the change may be the truth's"
+            )
 
 
 def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:

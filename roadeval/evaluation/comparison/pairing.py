@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rows
+from roadeval.data.words import first_of
 from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.regions import titles
@@ -36,7 +36,7 @@ class Part:
     asked: Mapping[str, Any]
     """Settings that may change its numbers, by names as ``frames.scale``, where known."""
     rows: Callable[[str], Rows]
-    """Returns its rows of ``frames``, ``regions``, ``disagreements`` or ``scores``."""
+    """Returns its rows of ``frames``, ``regions`` or ``disagreements``."""
     group: str | None = None
     """A name shared with other drives of the result, as of a day or a route."""
     camera: str = ""
@@ -82,55 +82,22 @@ class Side:
         return [part for part in self.parts if part.scored]
 
 
-class Kind(StrEnum):
-    """The subject of a note on a comparison."""
-
-    ABSENT = "absent"
-    """Drives that the other result does not have."""
-    UNSCORED = "unscored"
-    """Drives that are not scored in both."""
-    OTHER_LOG = "other_log"
-    """Drives whose name belongs to another log in the other result."""
-    NO_FRAME = "no_frame"
-    """Drives that both have evaluated, but on no frame both."""
-    LOG_UNKNOWN = "log_unknown"
-    """Drives of unknown logs, or a result of one: nothing is subtracted."""
-    OTHER_DRIVES = "other_drives"
-    """Two results without a drive in common: nothing is subtracted."""
-    SAME_LOGS = "same_logs"
-    """Drives that have other names, and are the same by their logs."""
-    FRAMES = "frames"
-    """Frames that a result evaluated, and that the other lacks or trained on."""
-    VARIANT = "variant"
-    """A variant that both have, but on no frame both."""
-    SETTINGS = "settings"
-    """Settings that both results do not share."""
-    TRUTH = "truth"
-    """Frames whose truth differs; ``settings`` may explain that."""
-    END_MISSING = "end_missing"
-    """A result whose run was stopped: it holds a part of the drive."""
+NAMED: Final = 5
+"""Drives that are named of those left out; frames of those that changed most, either way, and of
+those on which masks disagree."""
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
-    """What was left out of a comparison, or makes results less comparable than they look."""
-
-    kind: Kind
-    result: str
-    other: str = ""
-    count: int = 0
-    """Frames or drives that it is about."""
-    names: tuple[str, ...] = ()
-    """Drives, or the variant, that it is about."""
-    settings: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
-    """Both values by the setting's name."""
+def left_out(names: Sequence[str], of: str, why: str) -> str:
+    """Return that drives are left out of a result, and why, in a sentence."""
+    drives = "1 drive is" if len(names) == 1 else f"{len(names)} drives are"
+    return f"{drives} left out of {of} ({why}): {first_of(names, NAMED)}"
 
 
-def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[Note]]:
+def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
     """Match the drives of two results, each camera by the drive's name, else by its log.
 
     One name with two different logs is no match: the difference would be the scene's. Returned are
-    the drives that both have scored, in the base's order, and notes on all others, one for each
+    the drives that both have scored, in the base's order, and a sentence on all others for each
     result and reason.
     """
     there = {part.key: part for part in new.parts}
@@ -141,21 +108,21 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[Note]]:
         if part.key not in names:
             logs[part.digest, part.camera].append(part)
     pairs, taken = [], set()
-    left: defaultdict[tuple[Kind, str, str], list[str]] = defaultdict(list)
+    left: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for part in base.parts:
         other = there.get(part.key)
         if other is None and part.digest and logs[part.digest, part.camera]:
             other = logs[part.digest, part.camera].popleft()
         if other is not None:
             taken.add(other.key)
-        if reason := _why_not(part, other):
-            left[reason, base.label, new.label].append(part.name)
+        if reason := _why_not(part, other, new.label):
+            left[base.label, reason].append(part.name)
         elif other is not None:
             pairs.append((part, other))
     for part in new.parts:
         if part.key not in taken:
-            left[Kind.ABSENT, new.label, base.label].append(part.name)
-    return pairs, [Note(*key, len(names), tuple(names)) for key, names in left.items()]
+            left[new.label, f"not in {base.label}"].append(part.name)
+    return pairs, [left_out(names, *about) for about, names in left.items()]
 
 
 def one_drive(sides: Sequence[Side]) -> list[Side] | None:
@@ -169,14 +136,14 @@ def one_drive(sides: Sequence[Side]) -> list[Side] | None:
     return [replace(side, parts=[part]) for side, part in zip(sides, parts, strict=True)]
 
 
-def _why_not(base: Part, new: Part | None) -> Kind | None:
+def _why_not(base: Part, new: Part | None, label: str) -> str:
     if new is None:
-        return Kind.ABSENT
+        return f"not in {label}"
     if not (base.scored and new.scored):
-        return Kind.UNSCORED
+        return "not scored in both"
     if base.digest is None or new.digest is None:
-        return Kind.LOG_UNKNOWN
-    return Kind.OTHER_LOG if base.digest != new.digest else None
+        return "log unknown"
+    return "" if base.digest == new.digest else f"of another log in {label}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,14 +218,6 @@ def matched(base: npt.NDArray[np.int64], new: npt.NDArray[np.int64]) -> tuple[Pl
     return mine, theirs
 
 
-NAMED: Final = 5
-"""Frames that are named of those that changed most, in each direction, and of those on which masks
-disagree."""
-SHADOWS: Final = ("true_shadow", "shadow")
-SHADED: Final = 1 / 3
-"""The share of the frames that are called those with most shadow."""
-
-
 @dataclass(frozen=True, slots=True)
 class MovedFrame:
     """A frame whose final ERR changed much: that of the base and of the new result."""
@@ -331,30 +290,18 @@ def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict
     return found
 
 
-def parts_of(
-    base: Mapping[str, FourCounts], new: Mapping[str, FourCounts], mask: MaskPair
-) -> Iterator[tuple[str, str, npt.NDArray[np.bool_], FourCounts, FourCounts]]:
-    """Yield a mask's regions and shades: name, title, its frames, and the counts of both there.
+def common_regions(
+    base: Mapping[str, FourCounts], new: Mapping[str, FourCounts]
+) -> Iterator[tuple[str, npt.NDArray[np.bool_]]]:
+    """Yield the regions that are the same pixels in both, with the frames that label any, ``(n,)``.
 
-    A region that is not the same pixels in both, as the shadow that another filter found, is left
-    out: its ERR would describe other places. So is one without a labelled pixel.
+    Any other, as the shadow that another filter found, is left out: its ERR would describe other
+    places.
     """
-    alike = [name for name in base if name in new and _same_pixels(base[name], new[name])]
-    for name, title in titles([*base]).items():
+    for name in titles([*base]):
         known = np.asarray(base[name].any(axis=1))
-        if name in alike and known.any():
-            yield name, title, known, base[name][known], new[name][known]
-    # True shadow counts where the log has it, else what both results detected alike.
-    shadows = [name for name in SHADOWS if name in alike]
-    if not shadows:
-        return
-    share = base[shadows[0]].sum(axis=1) / np.maximum(mask.before["N"], 1)
-    most = np.sort(share)[-max(round(SHADED * len(share)), 1)]
-    much = np.asarray(share >= max(most, 1e-9))
-    if much.any() and not much.all():
-        before, after = mask.counts
-        yield "frames_with_shadow", "frames with most shadow", much, before[much], after[much]
-        yield "other_frames", "the other frames", ~much, before[~much], after[~much]
+        if name in new and known.any() and _same_pixels(base[name], new[name]):
+            yield name, known
 
 
 def _same_pixels(base: FourCounts, new: FourCounts) -> bool:

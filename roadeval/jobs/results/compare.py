@@ -18,8 +18,6 @@ from roadeval.evaluation.comparison import (
     Condition,
     ConditionError,
     Judgement,
-    Kind,
-    Note,
     Side,
     judge,
     one_drive,
@@ -35,7 +33,7 @@ from roadeval.report.charts.standard import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.report.sections.frames import FrameBrowser, FrameRow, browser, strip
-from roadeval.results.comparison import as_dict, comparison_cases, judged, junit_xml, warnings
+from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.runtime.files import Paths, listed
@@ -60,11 +58,6 @@ class Compared:
     def content(self) -> dict[str, Any]:
         """The content of the JSON file."""
         return as_dict(self.comparison, self.judgements)
-
-    @property
-    def warnings(self) -> list[str]:
-        """Warnings: what was left out, and why results are less comparable than they look."""
-        return warnings(self.comparison)
 
     @property
     def held(self) -> list[str]:
@@ -122,7 +115,8 @@ def attempt(
     cut = dict.fromkeys(
         each.name if across else side.label for side, each in labelled if not each.complete
     )
-    found = replace(found, notes=(*(Note(Kind.END_MISSING, name) for name in cut), *found.notes))
+    partial = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
+    found = replace(found, warnings=(*partial, *found.warnings))
     alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: each.drive for side, each in labelled if each.drive and each.drive.recording
@@ -223,16 +217,14 @@ def write_junit(compared: Compared, path: Path) -> Path:
 
     A `RoadevalError` if the file cannot be written.
     """
-    found = compared.comparison
-    name = ", ".join(each.label for each in found.results)
-    return write_file(path, junit_xml(name, comparison_cases(found, compared.judgements)))
+    return write_file(path, junit_xml(compared.comparison, compared.judgements))
 
 
 def comment(compared: Compared) -> str:
     """Return a comparison as Markdown that fits into one comment on a pull request."""
-    from roadeval.report.comparison import comment
+    from roadeval.report.comparison import LONGEST, markdown
 
-    return comment(compared.comparison, compared.judgements)
+    return markdown(compared.comparison, compared.judgements, LONGEST)
 
 
 def as_json(compared: Compared) -> str:
