@@ -5,7 +5,7 @@ import io
 from rich.console import Console
 
 from roadeval.cli.screens.compare import show
-from roadeval.evaluation.comparison import Condition, DriveChange, Kind, Note
+from roadeval.evaluation.comparison import Condition, DriveChange
 from roadeval.report.comparison import NAMED
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
@@ -19,8 +19,7 @@ def shown(*changes, judgements=(), **more):
 
 
 def test_the_screen_begins_with_the_verdict_and_the_changed_settings():
-    changed = (Note(Kind.SETTINGS, "base", "new", settings={"preset": ("paper", "gated")}),)
-    told = shown(a_change(SURE), changed_settings=changed)
+    told = shown(a_change(SURE), changed_settings={"new": {"preset": ("paper", "gated")}})
     assert told.startswith("On these 12 frames new ")
     assert told.split("\n\n")[1] == "Changed settings: preset paper to gated."
     assert "+1.00 to +2.00 *" in told
