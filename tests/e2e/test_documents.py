@@ -249,7 +249,7 @@ def test_the_action_judges_every_condition_and_leaves_a_comment(
     assert len(suite) == 1 + len(conditions.splitlines())
     assert suite.get("failures") == str(failures)
     assert summary.read_text() == (tmp_path / "roadeval.md").read_text()
-    assert summary.read_text().startswith("## roadeval")
+    assert summary.read_text().startswith("# roadeval")
 
 
 def test_every_page_of_the_site_begins_with_an_example():
