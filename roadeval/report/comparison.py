@@ -52,7 +52,10 @@ _CUT: Final = "\nThe rest is left out here: `roadeval compare -o changes.md` wri
 _COMMAND: Final = "in the viewer"
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp")
 """The columns that hold words, beside the commands."""
-_REGIONS: Final = "ERR of the final masks, percent: means over the frames that label any of it."
+_REGIONS: Final = (
+    "ERR of the final masks, percent: means over the frames that label any of it, and over drives "
+    "where there are several."
+)
 _SAME: Final = "Regions without any change are left out."
 _LEFT_OUT: Final = (
     "A region that is not the same pixels in both, as the shadow that another filter found, is "

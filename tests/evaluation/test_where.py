@@ -97,6 +97,24 @@ def test_of_two_results_the_same_variant_is_compared():
     ]
 
 
+def test_over_drives_a_region_is_the_mean_of_the_drives_that_have_it():
+    wrong = {"one": {"lit": 10, "shadow": 10}, "two": {"lit": 20}}
+
+    def run(more):
+        drives = []
+        for name, own in wrong.items():
+            rows = {("first", region): [errors + more] * 20 for region, errors in own.items()}
+            tables = {"frames": rows_of(a_table({("first", "post"): [10] * 20}))}
+            drives.append(
+                compared_drive({**tables, "regions": regions(rows)}, drive=name, digest=name)
+            )
+        return Side(f"{more} more", drives)
+
+    shadow, lit = compare([run(0), run(5)], SETTINGS).regions
+    assert (lit.frames, lit.base, lit.new) == (40, pytest.approx(0.15), pytest.approx(0.2))
+    assert (shadow.frames, shadow.base, shadow.new) == (20, pytest.approx(0.1), pytest.approx(0.15))
+
+
 def test_a_region_of_other_pixels_is_left_out():
     base = regions({("first", "lit"): [10] * 20, ("first", "shadow"): [10] * 20})
     more = base["TN"] + (base["region"] == "shadow")

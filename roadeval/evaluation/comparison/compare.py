@@ -166,7 +166,7 @@ class Comparison:
     drives: tuple[DriveChange, ...]
     """Where several drives are compared: each, mask by mask, the surest first."""
     regions: tuple[RegionChange, ...]
-    """Where one drive is compared: the final masks of each new result, region by region."""
+    """The final masks of each new result, region by region."""
     moved: tuple[MovedFrame, ...]
     """The frames of one drive that changed most."""
     disagreements: tuple[Disagreement, ...]
@@ -467,7 +467,7 @@ class _Against:
             stamps = mask.after["stamp_ns"]
             made = self._on_drive(new, group, mask.counts, stamps, tested=chosen)
             self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
-            if chosen and not self._several:
+            if chosen:
                 regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
                 self._add_regions(new, group, mask, *regions)
         if self._alone:

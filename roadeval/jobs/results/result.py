@@ -32,7 +32,7 @@ from roadeval.results.facts import (
 )
 from roadeval.results.fleet import FleetFolder, frames_path
 from roadeval.results.folder import RUN, ResultsFolder
-from roadeval.results.rows import Key, cells, drive_row, effect_rows, score_rows
+from roadeval.results.rows import Key, as_arrays, cells, drive_row, effect_rows, score_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.sentences import verdict
 from roadeval.results.tables import AGAIN, ResultsError, parquet_rows
@@ -459,7 +459,8 @@ def _members(fleet: FleetFolder) -> Iterator[Part]:
 def _rows_of_member(fleet: FleetFolder, drive: str, table: str) -> Rows:
     """Return the rows of a fleet's drive: of its frames, else of its results folder."""
     if table != "frames":
-        return ResultsFolder(fleet.results(drive)).rows(table)
+        folder = fleet.results(drive)
+        return ResultsFolder(folder).rows(table) if folder.exists() else as_arrays(table, ())
     try:
         return parquet_rows(fleet.frames(drive), table)
     except FileNotFoundError:
