@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
@@ -424,7 +425,7 @@ class _Against:
         self.levels: Final = _Masks(list)
         self._masks: Final = _Masks(list)
         self._regions: Final = _Masks(list)
-        self._titles: Final[dict[str, str]] = {}
+        self._known: Final[dict[str, None]] = {}  # the regions of all drives
         self.moved: list[MovedFrame] = []
         self.disagreements: list[Disagreement] = []
         firsts: dict[str | None, str] = {}
@@ -499,7 +500,7 @@ class _Against:
         called = self._base.label if self._across else mask.variant
         before = region_counts(base, called, mask.base_stage, mask.before)
         after = region_counts(new, mask.variant, mask.stage, mask.after)
-        self._titles.update(titles([*before]))
+        self._known.update(dict.fromkeys(before))
         for region, known in common_regions(before, after):
             counts, stamps = (own[region][known] for own in (before, after)), mask.after["stamp_ns"]
             made = self._on_drive(part, group, tuple(counts), stamps[known], tested=True)
@@ -523,12 +524,15 @@ class _Against:
 
     def regions(self) -> Iterator[RegionChange]:
         """Yield what changed by region."""
-        for (variant, region), own in self._regions.items():
+        named, variants = titles([*self._known]), dict.fromkeys(each for each, _ in self._regions)
+        for variant, (region, title) in product(variants, named.items()):
+            if not (own := self._regions.get((variant, region))):
+                continue
             yield RegionChange(
                 result=self.label,
                 variant=variant,
                 region=region,
-                title=self._titles[region],
+                title=title,
                 frames=sum(each.frames for each in own),
                 base=_mean(own, [each.base for each in own if each.base], TESTED),
                 new=_mean(own, [each.new for each in own], TESTED),
