@@ -42,9 +42,6 @@ class EvaluationSettings:
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
     """Frames that an interval needs. Fewer say almost nothing of how alike neighbours are, so
     none is given."""
-    negligible: Annotated[float, Field(gt=0, le=1)] = 0.01
-    """A change of a drive's mean rate by no more than this does not matter: an interval that ends
-    within it is the answer that there is no larger effect."""
     distances: Annotated[tuple[Metres, ...], Field(min_length=2, max_length=20)] = (
         0,
         10,

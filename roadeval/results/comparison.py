@@ -65,7 +65,7 @@ def verdict(comparison: Comparison) -> str:
     base = comparison.results[0].label
     several = len({change.variant for change in finals}) > 1
     changed = [change for change in finals if not change.unchanged] or finals[:1]
-    parts = [_sentence(change, base, comparison, several=several) for change in changed]
+    parts = [_sentence(change, base, several=several) for change in changed]
     return " ".join([*parts, *unchanged(comparison, [c for c in finals if c not in changed])])
 
 
@@ -78,12 +78,12 @@ def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
         yield f"{listing([*names])}{of}: every frame as in {base}."
 
 
-def _sentence(change: Change, base: str, comparison: Comparison, *, several: bool) -> str:
+def _sentence(change: Change, base: str, *, several: bool) -> str:
     what = f"{change.result} instead of {base}"
     rate = f"{TESTED} of {change.stage}"
     found = change.difference[TESTED]
     ends = levels(found, change.base, change.new)
-    told = sentence(found, what, rate, comparison.settings, levels=ends)
+    told = sentence(found, what, rate, levels=ends)
     if change.result == change.variant or not several:
         return told
     return f"{change.variant}: {told[0].lower()}{told[1:]}"
@@ -103,7 +103,7 @@ def where(comparison: Comparison) -> list[str]:
 
 def _by_region(comparison: Comparison, result: str, variant: str) -> str:
     rows = [r for r in comparison.regions if (r.result, r.variant) == (result, variant)]
-    sure = [r for r in rows if is_significant(r.difference.p_holm, r.difference.confidence)]
+    sure = [r for r in rows if is_significant(r.difference)]
     parts = []
     for word, sign in (("better", -1), ("worse", 1)):
         names = [r.title for r in sure if sign * r.difference.mean > 0]

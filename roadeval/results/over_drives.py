@@ -50,7 +50,7 @@ def summarise(
     groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
     effects, totals = _effects(rows, groups, settings), _totals(folder)
     return FleetFacts(
-        verdict=verdict(totals, effects, settings),
+        verdict=verdict(totals, effects),
         version=VERSION,
         drives=[*members],
         counts=dict(Counter(drive["status"] for drive in drives)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from enum import Enum, auto
 from operator import itemgetter
 from statistics import median
 from typing import Any, Final
@@ -22,15 +21,10 @@ from roadeval.data.words import (
     percent,
 )
 from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
-from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
+from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats import Difference
 from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
 
-PROBABLY: Final = 0.2
-"""The greatest p-value of a difference that is called probable: without an effect, one drive in ten
-shows so large a difference in that direction."""
-WIDE: Final = 0.2
-"""Where an interval is wider and holds 0, the reason is given instead of its ends."""
 FINE: Final = 0.005
 """Levels that differ by less are given with two digits."""
 ROUNDING: Final = 5e-4
@@ -45,46 +39,10 @@ _OF_FILTER: Final = "The filter "
 BLIND: Final = f"{BASELINE}, which never looks at the image"
 
 
-class Degree(Enum):
-    """How sure a difference is."""
-
-    UNDEFINED = auto()
-    """No frame, or drive, has it."""
-    FEW = auto()
-    """Too few have it for an interval."""
-    SAME = auto()
-    """It is 0 on every one."""
-    SURE = auto()
-    """It is there, and its direction is known."""
-    LITTLE = auto()
-    """If it is there, it is negligible."""
-    PROBABLE = auto()
-    """It is probably there, in its direction."""
-    UNKNOWN = auto()
-    """It may be there or not, in either direction."""
-
-
-def degree(found: Difference, settings: EvaluationSettings) -> Degree:
-    """Return what is known of a difference, by its corrected p-value where it has one."""
-    p = found.p if found.p_holm is None else found.p_holm
-    if not found.units:
-        return Degree.UNDEFINED
-    if found.is_zero:
-        return Degree.SAME
-    if found.low is None or found.high is None or p is None:
-        return Degree.FEW
-    if p < 1 - found.confidence:
-        return Degree.SURE
-    if max(-found.low, found.high) <= settings.negligible:
-        return Degree.LITTLE
-    return Degree.PROBABLE if p <= PROBABLY else Degree.UNKNOWN
-
-
 def sentence(
     found: Difference,
     what: str,
     rate: str,
-    settings: EvaluationSettings,
     *,
     levels: tuple[float, float] | None = None,
     windows: str = "",
@@ -98,23 +56,20 @@ def sentence(
     brackets; ``said`` is what a sentence before has said of others like them.
 
     >>> found = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
-    >>> sentence(found, "the filter", "ERR", EvaluationSettings())
+    >>> sentence(found, "the filter", "ERR")
     'On these 91 frames the filter lowers ERR by 2.0 pp; on frames like these by 1.0 to 3.0 pp.'
     """
     unit = found.unit[:-1]
     if not found.units:
         return f"Nothing to compare: {rate} is undefined on every {unit}."
     here = _here(found)
-    if degree(found, settings) is Degree.SAME:
+    if found.is_zero:
         return f"{here} {what} leaves {rate} of every {unit} as it is."
     by = f"by {_size(found.mean, _digits(found))} pp"
     if levels is not None:
         before, after = (_size(level, 1 if abs(found.mean) >= FINE else 2) for level in levels)
         by = f"from {before} to {after} %"
-    doubt = f"; {_doubt(found, settings)}"
-    if doubt == f"; {said}":
-        again = {Degree.UNKNOWN: "; on others that is unclear, too", Degree.FEW: ""}
-        doubt = again.get(degree(found, settings), doubt)
+    doubt = "" if _doubt(found) == said else f"; {_doubt(found)}"
     verb = "raises" if found.mean > 0 else "lowers"
     return f"{here} {what} {verb} {rate} {by}{windows or _counted(found)}{doubt}."
 
@@ -131,22 +86,18 @@ def levels(
     return (before, after) if same else None
 
 
-def _doubt(found: Difference, settings: EvaluationSettings) -> str:
+def _doubt(found: Difference) -> str:
     """Return what a difference says of other frames or drives, as a clause."""
+    if found.low is None or found.high is None:
+        return found.none_because
     like, digits = f"on {found.unit} like these", _digits(found)
-    low, high = found.low or 0.0, found.high or 0.0
-    ends = _ends(low, high, digits)
-    why = ends
-    if high - low > WIDE and found.effective is not None:
-        alike = max(round(found.effective), 1)
-        why = f"frames in a row are alike, so these {found.units} count as {alike}"
-    least, most = (low, high) if found.mean > 0 else (-high, -low)
-    return {
-        Degree.SURE: f"{like} by {_size(least, digits)} to {_size(most, digits)} pp",
-        Degree.LITTLE: f"{like} by no more than {_size(max(-low, high), digits)} pp either way",
-        Degree.PROBABLE: f"probably also {like}: {ends}",
-        Degree.UNKNOWN: f"{like} the effect is unclear: {why}",
-    }.get(degree(found, settings), found.none_because) + _family(found, settings)
+    if is_sure(found):
+        least, most = sorted((abs(found.low), abs(found.high)))
+        return f"{like} by {_size(least, digits)} to {_size(most, digits)} pp"
+    family = ""
+    if is_sure(replace(found, p_holm=None)):
+        family = f" (corrected for {found.comparisons} comparisons)"
+    return f"{like} the effect is unclear: {_ends(found.low, found.high, digits)}{family}"
 
 
 def _ends(low: float, high: float, digits: int) -> str:
@@ -187,12 +138,6 @@ def _counted(found: Difference) -> str:
     return f" (worse on {found.worse}, better on {found.better})"
 
 
-def _family(found: Difference, settings: EvaluationSettings) -> str:
-    """Return how many differences a p-value was corrected for, where that decided."""
-    decided = degree(replace(found, p_holm=None), settings) is not degree(found, settings)
-    return f" (corrected for {found.comparisons} comparisons)" if decided else ""
-
-
 _WHY: Final = {
     "trained on": "to train on",
     "unlabelled": "without truth",
@@ -220,14 +165,20 @@ def account(frames: FrameAccount, windows: int | None = None) -> str:
     return f"{told} Left out: {', '.join(why)}." if why else told
 
 
-def is_significant(p_holm: float | None, confidence: float) -> bool:
-    """Return whether a difference is significant after Holm's correction."""
-    return p_holm is not None and p_holm < 1 - confidence
+def is_sure(found: Difference) -> bool:
+    """Return whether a difference is there, by its corrected p-value where it has one."""
+    p = found.p if found.p_holm is None else found.p_holm
+    return p is not None and p < 1 - found.confidence
+
+
+def is_significant(found: Difference) -> bool:
+    """Return whether a difference is there after Holm's correction."""
+    return found.p_holm is not None and is_sure(found)
 
 
 def marked_interval(found: Difference) -> str:
     """Return the interval of a difference, with a mark where it excludes 0 after correction."""
-    mark = f" {MARK}" if is_significant(found.p_holm, found.confidence) else ""
+    mark = f" {MARK}" if is_significant(found) else ""
     return interval(found.low, found.high) + mark
 
 
@@ -235,7 +186,7 @@ def correction(differences: Iterable[Difference]) -> str:
     """Return what a mark on differences of ERR means; empty where none has one."""
     shown = list(differences)
     counts = sorted({each.comparisons for each in shown if each.comparisons})
-    if not any(is_significant(each.p_holm, each.confidence) for each in shown):
+    if not any(map(is_significant, shown)):
         return ""
     if counts == [1]:
         return f"{MARK} excludes 0; it is the only one, so nothing is corrected."
@@ -250,7 +201,6 @@ def correction(differences: Iterable[Difference]) -> str:
 def verdict(
     totals: Mapping[str, Mapping[str, Any]],
     effects: Sequence[Effect],
-    settings: EvaluationSettings,
     claims: Mapping[str, Mapping[str, int]] | None = None,
     thresholds: Mapping[str, Mapping[str, float]] | None = None,
     *,
@@ -278,21 +228,21 @@ def verdict(
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     against = finals.get((BASELINE, best))
     blind = None if against is None else against.rates[TESTED]
-    parts = [_best(best, rates, blind, settings)]
+    parts = [_best(best, rates, blind)]
     if whole := [*from_labels(estimated, best)]:
         parts = [*whole, f"On these alone: {parts[0]}"]
     parts += at_thresholds(thresholds or {}, rates)
     for base, variant in (pair for pair in finals if pair[1] == pair[0] + TUNED):
         found = finals[base, variant].rates[TESTED]
         ends, rate = levels(found, rates[base], rates[variant]), f"{TESTED} of {stages[variant]}"
-        parts.append(sentence(found, f"tuning {base}", rate, settings, levels=ends))
+        parts.append(sentence(found, f"tuning {base}", rate, levels=ends))
     of_filter = finals.get((UNFILTERED, FILTERED))
     if of_filter is not None and of_filter.rates[TESTED].units:
         found = of_filter.rates[TESTED]
         ends = levels(found, rates[UNFILTERED], rates[FILTERED])
-        more = {"windows": _in_windows(claims), "said": _doubt(blind, settings) if blind else ""}
+        more = {"windows": _in_windows(claims), "said": _doubt(blind) if blind else ""}
         rate = f"{TESTED} of {of_filter.stage}"
-        parts.append(sentence(found, "the filter", rate, settings, levels=ends, **more))
+        parts.append(sentence(found, "the filter", rate, levels=ends, **more))
     return " ".join(filter(None, [*parts, _costs_most(totals)]))
 
 
@@ -379,12 +329,7 @@ def lowest(rates: Mapping[str, Mapping[str, Any]]) -> str | None:
     return min(full, key=full.__getitem__, default=None)
 
 
-def _best(
-    best: str,
-    rates: Mapping[str, Mapping[str, Any]],
-    blind: Difference | None,
-    settings: EvaluationSettings,
-) -> str:
+def _best(best: str, rates: Mapping[str, Mapping[str, Any]], blind: Difference | None) -> str:
     """Return how wrong the best variant is, and whether it is better than the baseline."""
     several, wrong = len({*rates} - {BASELINE}) > 1, f"{in_percent(rates[best][TESTED]):.1f} %"
     if blind is not None and blind.mean > 0:
@@ -394,7 +339,7 @@ def _best(
             else (f"{best} does not beat {BLIND}: it")
         )
         more = f"{_size(blind.mean, _digits(blind))} pp more{_counted(blind)}"
-        return f"{name} gets {wrong} of the pixels wrong, {more}; {_doubt(blind, settings)}."
+        return f"{name} gets {wrong} of the pixels wrong, {more}; {_doubt(blind)}."
     lead = f"Best here is {best}: " if several else f"{best}: "
     lead += f"{wrong} of the pixels are wrong"
     if blind is None:
@@ -402,7 +347,7 @@ def _best(
     if not blind.units or blind.is_zero:
         return f"{lead}, as many as with {BLIND}."
     by = f"That is {_size(blind.mean, _digits(blind))} pp better than {BLIND}{_counted(blind)}"
-    return f"{lead}. {by}; {_doubt(blind, settings)}."
+    return f"{lead}. {by}; {_doubt(blind)}."
 
 
 def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:

@@ -27,7 +27,7 @@ def test_the_verdict_is_the_sentence_on_the_final_mask_and_leaves_the_baseline_o
     )
     found = a_comparison(*rows)
     ends = 0.1, 0.1 + WORSE.mean
-    told = sentence(WORSE, "new instead of base", "ERR of post", found.settings, levels=ends)
+    told = sentence(WORSE, "new instead of base", "ERR of post", levels=ends)
     assert verdict(found) == told
 
 

@@ -175,7 +175,7 @@ class Comparison:
     warnings: tuple[str, ...]
     """What was left out, and why results are less comparable than they look."""
     settings: EvaluationSettings
-    """The confidence of the intervals, and what is negligible."""
+    """The confidence of the intervals, and the frames that they need."""
 
     def finals(self) -> list[Change]:
         """Return the final masks; without the baseline's, which says nothing of a method."""

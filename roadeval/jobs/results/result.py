@@ -125,7 +125,7 @@ class DriveResult:
             effects = drive_effects([score.camera_masks(self.rows)], settings)
             totals = score.totals(self.rows)
             return Facts(
-                verdict(totals, effects, settings),
+                verdict(totals, effects),
                 DriveFacts(
                     layout.drive,
                     str(layout.properties.get("image_topic", "")),

@@ -60,7 +60,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         **found,
         **as_parts(effects),
         verdict=verdict(
-            *(found["totals"], effects, run.config.evaluation, found["claims"], thresholds),
+            *(found["totals"], effects, found["claims"], thresholds),
             unlabelled=unlabelled,
             estimated=estimated,
         ),
@@ -196,7 +196,7 @@ def of_cameras(
     return replace(
         first,
         **as_parts(effects),
-        verdict=verdict(totals, effects, settings, claims),
+        verdict=verdict(totals, effects, claims),
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
         totals=totals,

@@ -250,7 +250,7 @@ def _part_cells(row: StratumFacts, *, first: bool) -> list[Cell | str]:
         row.tag if first else "",
         row.value,
         number(found.units),
-        Cell(points(found.mean), bold=is_significant(found.p_holm, found.confidence)),
+        Cell(points(found.mean), bold=is_significant(found)),
         marked_interval(found),
         number(found.worse or 0),
         number(found.better or 0),

@@ -54,8 +54,6 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [PARTIAL], "warning")
     yield Text(findings.facts.verdict, "verdict")
-    if "probably" in findings.facts.verdict:
-        yield Text("Probably: by chance alone, one drive in ten would show as much.", "note")
     yield from _next(findings)
     if findings.totals:
         yield rates_table(findings.facts)
