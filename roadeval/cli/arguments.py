@@ -84,7 +84,6 @@ def configuration(given: Given) -> RunConfig:
     """
     from roadeval.config import (
         ConfigError,
-        DriveSettings,
         configure,
         in_file,
         network_variant,
@@ -116,10 +115,6 @@ def configuration(given: Given) -> RunConfig:
         ground = read_tables(path)
         with in_file(str(path)):
             config = config.override({"ground": ground})
-    config = config.with_drives(
-        DriveSettings.of({**read_tables(file), "path": drive}, file)
-        for drive, file in given.get("drives", ())
-    )
     chosen = {"training.frames", "training.placement", "training.gap"}
     if config.training.model and not config.training.adapt and chosen & given.keys():
         raise typer.BadParameter(

@@ -69,11 +69,6 @@ class MethodSettings:
     ground: Annotated[Path | None, Flag("--camera", "FILE.toml", "Input")] = None
     """Where the camera is over the ground, as its height and pitch, where the log does not say so:
     with it errors are counted in metres, too."""
-    drives: Annotated[Mapping[str, str], Flag("--drive", "DRIVE=FILE.toml", "Input")] = (
-        dataclasses.field(default_factory=dict)
-    )
-    """A file with the [topics], [labels], [frames] or [ground] of one drive, by its path or its
-    file's name, or of several, as 'monday*.mcap'."""
 
 
 GROUPS: Final = ("Output", "Methods", "Training", "Truth", "Range", "Input", "Execution", "Fleet")

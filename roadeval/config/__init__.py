@@ -10,7 +10,6 @@ from roadeval.runtime.imports import on_demand
 if TYPE_CHECKING:
     from roadeval.config.run import (
         OF_A_LOG,
-        DriveSettings,
         RunConfig,
         config_toml,
         configure,

@@ -19,10 +19,6 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
     [[cameras]]             # several cameras of a log: the topics of each
     name = "front"
     image = "/front/image"
-
-    [[drives]]              # what differs in some drives: [topics], [frames], [ground], ...
-    path = "monday/*.mcap"
-    labels = { road = [3], ignore = [11] }
 """
 
 from __future__ import annotations
@@ -61,49 +57,11 @@ from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
 from roadeval.runtime.settings import meanings
-from roadeval.runtime.text import public_url, visible, visible_lines
+from roadeval.runtime.text import visible, visible_lines
 from roadeval.training.settings import TrainingSettings
 
 OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks", "ground")
 """The tables that may differ from drive to drive."""
-
-
-@dataclass(frozen=True, slots=True)
-class DriveSettings:
-    """Settings of some drives, in place of those of all drives."""
-
-    path: str
-    """A path, or the end of one, as a file's name; ``*`` and ``?`` match any text in a name."""
-    tables: Mapping[str, Mapping[str, Any]]
-    """Those of `OF_A_LOG` in the shape of a TOML file. Labels replace
-    the run's as a whole, the others key by key."""
-    where: str = field(default="", compare=False)
-    """Begins a message about them."""
-
-    @classmethod
-    def of(cls, tables: Mapping[str, Any], where: str) -> DriveSettings:
-        """Make the settings from an entry of ``[[drives]]``; `RunConfig` validates its tables.
-
-        A `ConfigError` if the entry has no path, or a table that holds for the whole run.
-        """
-        path = tables.get("path")
-        if not isinstance(path, str) or not path or "\0" in path:
-            raise ConfigError(f"{where}: path must name a log, or several as *.mcap")
-        rest = {key: value for key, value in tables.items() if key != "path"}
-        path = public_url(path)
-        with in_file(f"{where} {path}"):
-            check_tables(rest, OF_A_LOG)
-        return cls(path, rest, f"{where} {path}")
-
-    def holds_for(self, drive: str | os.PathLike[str]) -> bool:
-        """Whether a drive is one of these."""
-        wanted, typed = public_url(self.path), Path(public_url(os.fspath(drive)))
-        real = typed.resolve()
-        return real == Path(wanted).resolve() or typed.match(wanted) or real.match(wanted)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry of ``[[drives]]``."""
-        return {"path": self.path, **self.tables}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +81,6 @@ class RunConfig(LogConfig):
     """The variants that run, masks of other methods included; all of them by default."""
     cameras: tuple[CameraSettings, ...] = ()
     """The cameras of a rig; none where one camera is replayed."""
-    drives: tuple[DriveSettings, ...] = ()
-    """Settings of some drives alone; later ones override earlier ones."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
     """How every variant is trained and scored."""
@@ -253,7 +209,7 @@ class RunConfig(LogConfig):
         check_tables(
             tables,
             (
-                *("chain", "only", *pipeline.settings, "variants", "masks", "cameras", "drives"),
+                *("chain", "only", *pipeline.settings, "variants", "masks", "cameras"),
                 *SECTIONS,
             ),
         )
@@ -272,10 +228,7 @@ class RunConfig(LogConfig):
         )
         if "cameras" in tables:
             config = replace(config, cameras=_cameras(tables["cameras"]))
-        drives = tables.get("drives", ())
-        if not isinstance(drives, list | tuple) or not all(isinstance(e, Mapping) for e in drives):
-            raise ConfigError("drives must be tables, each under [[drives]]")
-        return config.with_drives(DriveSettings.of(entry, "[[drives]]") for entry in drives)
+        return config
 
     def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
         """Return the configuration with further variants; one of a name that is there replaces it.
@@ -312,47 +265,32 @@ class RunConfig(LogConfig):
         masks = {name: own for name, own in self.masks.items() if name in self.given()}
         return replace(self, masks=masks, only=())
 
-    def with_drives(self, drives: Iterable[DriveSettings]) -> RunConfig:
-        """Return the configuration with further settings of single drives.
+    def of_drive(self, tables: Mapping[str, Any]) -> RunConfig:
+        """Return the configuration with the tables of `OF_A_LOG` that hold for one drive.
 
-        A `ConfigError` if one cannot be used.
+        Labels replace the run's as a whole, the others key by key. A `ConfigError` for a table that
+        holds for the whole run, or a value that cannot be used.
         """
-        made = tuple(drives)
-        for drive in made:
-            self._with_drive(drive)
-        return replace(self, drives=(*self.drives, *made))
+        check_tables(tables, OF_A_LOG)
+        labels = LabelSettings() if "labels" in tables else self.labels
+        return replace(self, labels=labels).override(tables)
 
     def for_drive(self, path: str | os.PathLike[str]) -> RunConfig:
-        """Return the configuration of one drive, with its own settings in place."""
-        config = replace(self, drives=())
-        for drive in self.drives:
-            if drive.holds_for(path):
-                config = config._with_drive(drive)
-        for own, each in config.masks.items():
+        """Return the configuration with the drive's name in the paths of masks and truth."""
+        for own, each in self.masks.items():
             if not each.path:
                 raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
-        only = {*config.masks, *config.topics.masks}
-        if config.only:
-            only &= {*config.only, *config.given()}
-        masks = {own: in_drive(each, path) for own, each in config.masks.items() if own in only}
-        topics = {own: topic for own, topic in config.topics.masks.items() if own in only}
+        only = {*self.masks, *self.topics.masks}
+        if self.only:
+            only &= {*self.only, *self.given()}
+        masks = {own: in_drive(each, path) for own, each in self.masks.items() if own in only}
+        topics = {own: topic for own, topic in self.topics.masks.items() if own in only}
         return replace(
-            config,
+            self,
             masks=masks,
-            topics=replace(config.topics, masks=topics),
-            truth=in_drive(config.truth, path),
+            topics=replace(self.topics, masks=topics),
+            truth=in_drive(self.truth, path),
         )
-
-    def _with_drive(self, drive: DriveSettings) -> RunConfig:
-        labels = LabelSettings() if "labels" in drive.tables else self.labels
-        base = replace(self, labels=labels)
-        with in_file(drive.where):
-            return base.override(drive.tables)
-
-    def unused(self, drives: Iterable[str | os.PathLike[str]]) -> list[str]:
-        """Return the paths of the settings of single drives that match none of these drives."""
-        there = [*drives]
-        return [own.path for own in self.drives if not any(map(own.holds_for, there))]
 
     def ignored(self) -> tuple[str, ...]:
         """Return a note for each setting of a variant's preset that the run does not follow."""
@@ -381,7 +319,6 @@ class RunConfig(LogConfig):
             **({"masks": masks} if masks else {}),
             **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
             **({"cameras": [*map(dataclasses.asdict, self.cameras)]} if self.cameras else {}),
-            **({"drives": [drive.as_dict() for drive in self.drives]} if self.drives else {}),
         }
 
     def _with_variants(self, tables: Any) -> tuple[Variant, ...]:
@@ -515,7 +452,6 @@ def config_toml(config: RunConfig | None = None) -> str:
     parts += [_table(name, getattr(config, name)) for name in SECTIONS]
     cameras = [_without_none(dataclasses.asdict(each)) for each in config.cameras]
     parts += [tomlkit.dumps({"cameras": [each]}).strip() for each in cameras]
-    parts += [tomlkit.dumps({"drives": [drive.as_dict()]}).strip() for drive in config.drives]
     return "\n\n".join(parts) + "\n"
 
 

@@ -12,9 +12,8 @@ from hashlib import blake2b
 from pathlib import Path, PurePath
 from typing import Any, Final
 from urllib.parse import unquote, urlsplit
-from urllib.request import url2pathname
 
-from roadeval.config import DriveSettings
+from roadeval.config import RunConfig, in_file
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
@@ -24,7 +23,7 @@ from roadeval.runtime.text import public_url, visible, without_secrets
 
 BUCKETS: Final = ("s3", "gs")
 """Schemes of stores that keep objects in buckets, and can list them."""
-SCHEMES: Final = (*BUCKETS, "https", "http", "file")
+SCHEMES: Final = (*BUCKETS, "https", "http")
 
 _URL: Final = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 
@@ -68,14 +67,6 @@ def shown(source: str) -> str:
     return visible(public_url(source) if is_url(source) else without_secrets(source))
 
 
-def file_of(url: str) -> Path:
-    """Return the path of a ``file://`` URL; a `FleetError` if it names another machine."""
-    parts = urlsplit(url)
-    if parts.netloc not in ("", "localhost"):
-        raise FleetError(f"{shown(url)}: a file of another machine; write file:///PATH")
-    return Path(url2pathname(parts.path))
-
-
 def bucket_and_key(url: str) -> tuple[str, str]:
     """Split the URL of an object, or of a folder in a bucket.
 
@@ -98,7 +89,7 @@ def last_part(url: str) -> str:
     return name.rpartition("/")[2]
 
 
-DIGEST: Final = 4
+DIGEST: Final = 6
 """Bytes of the digest in an identity."""
 LONGEST: Final = 40
 """Letters of a name in an identity, which is part of the names of files and folders."""
@@ -124,8 +115,8 @@ class DriveEntry:
     """The same for drives that share a day or a route; None for a single drive."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Facts about it, as ``{"weather": "rain"}``."""
-    settings: DriveSettings | None = field(default=None, repr=False)
-    """Settings of it alone, in place of those of all drives."""
+    settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    """Settings of it alone, in place of those of all drives, see `RunConfig.of_drive`."""
 
     @property
     def path(self) -> Path | None:
@@ -140,13 +131,17 @@ class DriveEntry:
     @property
     def camera(self) -> str:
         """The topic of its images, where that is given for it alone."""
-        topics = self.settings.tables.get("topics", {}) if self.settings else {}
-        return str(topics.get("image", ""))
+        return str(self.settings.get("topics", {}).get("image", ""))
 
     @property
     def known(self) -> tuple[str | None, Mapping[str, str], Mapping[str, Any]]:
-        """Group, tags and tables of settings that were given for it."""
-        return self.group, self.tags, self.settings.tables if self.settings else {}
+        """Group, tags and settings that were given for it."""
+        return self.group, self.tags, self.settings
+
+    def config(self, config: RunConfig) -> RunConfig:
+        """Return a run's configuration with what holds for this drive alone."""
+        with in_file(self.shown):
+            return config.of_drive(self.settings).for_drive(self.source)
 
 
 def stem_of(source: str) -> str:
@@ -158,14 +153,14 @@ def stem_of(source: str) -> str:
     return path.name if path.is_dir() else path.stem
 
 
-def identity(source: str, size: int = DIGEST) -> str:
+def identity(source: str) -> str:
     """Return the identity of a drive: a word of its name, and a digest of its source.
 
     >>> identity("s3://bucket/monday, rain.mcap")
     'monday_rain-39c9a6a7'
     """
     word = as_plain(stem_of(source))[:LONGEST].strip("-_")
-    digest = blake2b(source.encode(errors="surrogateescape"), digest_size=size)
+    digest = blake2b(source.encode(errors="surrogateescape"), digest_size=DIGEST)
     return f"{word or 'drive'}-{digest.hexdigest()}"
 
 
@@ -173,11 +168,11 @@ def entry_of(
     source: str,
     group: str | None = None,
     tags: Mapping[str, str] | None = None,
-    settings: DriveSettings | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> DriveEntry:
     """Make the entry of a drive."""
     name = visible(stem_of(source)) or "drive"
-    return DriveEntry(source, identity(source), name, group, dict(tags or {}), settings)
+    return DriveEntry(source, identity(source), name, group, dict(tags or {}), settings or {})
 
 
 def counts(name: str) -> bool:
@@ -220,15 +215,13 @@ def with_cameras(
     """Return an entry for each camera of each drive, with what is its own as settings of it."""
     found = []
     for entry in entries:
-        tables = entry.settings.tables if entry.settings else {}
         for camera in cameras:
             given = {**vars(camera), "name": None, "ground": None}
             known = {name: value for name, value in given.items() if value}
-            own = {**tables, "topics": {**tables.get("topics", {}), **known}}
+            own = {**entry.settings, "topics": {**entry.settings.get("topics", {}), **known}}
             if camera.ground.given:
                 own["ground"] = asdict(camera.ground)
-            settings = DriveSettings(entry.source, own, "[[cameras]]")
-            found.append(replace(entry, settings=settings))
+            found.append(replace(entry, settings=own))
     return cameras_apart(found)
 
 

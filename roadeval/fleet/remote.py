@@ -30,7 +30,6 @@ from roadeval.fleet.entry import (
     HEAD,
     FleetError,
     bucket_and_key,
-    file_of,
     in_order,
     is_heading,
     is_log,
@@ -88,8 +87,6 @@ def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
     source = os.fspath(drive)
     if not is_url(source):
         return Path(source)
-    if scheme_of(source) == "file":
-        return file_of(source)
     files = {Path(_file_name(each)): _opened(each) for each in _files(source)}
     return RemoteLog(shown(source), Path(_file_name(source)), files)
 

@@ -1,31 +1,23 @@
 """From logs, folders, globs, URLs and manifests to a list of drives.
 
-A manifest lists drives with their groups, tags and settings. A TOML file has a ``[[drives]]`` for
-each::
+A manifest is a TOML file that lists drives with their groups, tags and settings::
 
     [[drives]]
     path = "monday/*.mcap"              # relative to the manifest; or a URL
     group = "2026-11-16"
     tags = { weather = "rain", vehicle = 7 }
     labels = { road = [3] }             # and topics, frames: in place of the run's
-
-A CSV file has a row for each, with the columns ``path``, ``group``, ``tag.weather``,
-``topics.image``, ``labels.road`` and so on; empty cells are ignored.
 """
 
 from __future__ import annotations
 
-import csv
 import glob
 import os
-import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.config import OF_A_LOG, DriveSettings, RunConfig, read_tables
+from roadeval.config import OF_A_LOG, RunConfig, in_file, read_tables
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import (
@@ -34,8 +26,6 @@ from roadeval.fleet.entry import (
     cameras_apart,
     counts,
     entry_of,
-    file_of,
-    identity,
     in_order,
     is_bag,
     is_log,
@@ -46,67 +36,46 @@ from roadeval.fleet.entry import (
 )
 from roadeval.fleet.remote import drives_below
 from roadeval.logs import files_of
-from roadeval.runtime.documents import read_toml
-from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
 
-_LONGER: Final = 8
-"""Bytes of a digest where shorter ones are equal."""
+MANIFEST: Final = ".toml"
+"""The ending of a manifest's name."""
+_KEYS: Final = ("path", "group", "tags", *OF_A_LOG)
 
 
 def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     """Find the drives that some words name, in their order.
 
     A word is a log (a file of any name), a rosbag2 folder, a folder that is searched through for
-    logs and rosbag2 folders, a glob, a URL, or a manifest (``.toml``, ``.csv``). A folder's drives
-    come in natural order, without hidden and incomplete files. All files of a rosbag2 folder
-    together mean the folder. A drive that is named twice counts once, with what a manifest says of
-    it, unless that names two of its cameras. A `RoadevalError` if a word leads to no drive, a
-    manifest cannot be used, or a drive is described in two ways.
+    logs and rosbag2 folders, a glob, a URL, or a manifest (``.toml``). A folder's drives come in
+    natural order, without hidden and incomplete files. A file of a rosbag2 folder means the folder.
+    A drive that is named twice counts once, with what a manifest says of it, unless that names two
+    of its cameras. A `RoadevalError` if a word leads to no drive, a manifest cannot be used, or a
+    drive is described in two ways.
     """
-    found = [entry for word in words for entry in _named(word)]
-    if not found:
+    entries = _once(entry for word in words for entry in _named(word))
+    if not entries:
         raise FleetError("no drive found: name logs, folders of logs, URLs or a manifest")
-    entries = _once(_whole_bags(found))
-    times = Counter(each.id for each in {entry.source: entry for entry in entries}.values())
-    return cameras_apart(
-        [
-            replace(entry, id=identity(entry.source, _LONGER)) if times[entry.id] > 1 else entry
-            for entry in entries
-        ]
-    )
+    return cameras_apart(entries)
 
 
 def _named(word: str) -> Iterator[DriveEntry]:
     try:
         path = Path(word)
-        if is_url(word) or not is_manifest(path) or not path.is_file():
+        if is_url(word) or path.suffix != MANIFEST or not path.is_file():
             yield from map(entry_of, _sources(word, Path()))
-            return
-        for entry in read_manifest(path):
-            yield from _listed(entry, path.parent)
+        else:
+            yield from read_manifest(path)
     except OSError as error:
         raise FleetError(f"{visible(word)}: {error.strerror or error}") from error
-
-
-def _listed(entry: ManifestEntry, folder: Path) -> Iterator[DriveEntry]:
-    """Yield the drives of an entry of a manifest."""
-    try:
-        sources = _sources(entry.path, folder)
-    except RoadevalError as error:
-        raise FleetError(f"{entry.where}: {error}") from error
-    for source in sources:
-        settings = entry.settings and replace(entry.settings, path=source)
-        yield entry_of(source, entry.group, entry.tags, settings)
 
 
 def _sources(word: str, base: Path) -> list[str]:
     """Return the sources of the drives that a word names; a path is relative to a folder."""
     if is_url(word):
-        if scheme_of(word) != "file":
-            _no_manifest(Path(last_part(word)))
-            return drives_below(word) if word.endswith("/") else [word]
-        word = str(file_of(word))
+        scheme_of(word)
+        _no_manifest(Path(last_part(word)))
+        return drives_below(word) if word.endswith("/") else [word]
     path = base / Path(word).expanduser()
     if path.is_dir():
         found = _below(path) or _none_below(path)
@@ -120,7 +89,7 @@ def _sources(word: str, base: Path) -> list[str]:
 
 
 def _no_manifest(path: Path) -> Path:
-    if is_manifest(path):
+    if path.suffix == MANIFEST:
         raise FleetError(f"{visible(str(path))}: a manifest is named by itself, by its path")
     return path
 
@@ -163,32 +132,10 @@ def _refuse(error: OSError) -> None:
 
 
 def _absolute(path: Path) -> Path:
-    """Return the absolute path of a file or folder; a link keeps its own name."""
-    return path.resolve() if path.name in ("", "..") else path.parent.resolve() / path.name
-
-
-def _whole_bags(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
-    """Replace the files of a rosbag2 folder by the folder, where all of them, or it, are named.
-
-    Its files would be several drives that share a day, a road and a camera.
-    """
-    named = {entry.source for entry in entries}
-    folders = {path.parent for entry in entries if (path := entry.path) and not path.is_dir()}
-    bags = {
-        folder
-        for folder in folders
-        if is_bag(folder)
-        and (str(folder) in named or named.issuperset(map(str, folder.glob("*.mcap"))))
-    }
-    return [_in_bag(entry, bags) for entry in entries]
-
-
-def _in_bag(entry: DriveEntry, bags: set[Path]) -> DriveEntry:
-    if entry.path is None or entry.path.parent not in bags or not is_log(entry.path.name):
-        return entry
-    folder = str(entry.path.parent)
-    settings = entry.settings and replace(entry.settings, path=folder)
-    return entry_of(folder, entry.group, entry.tags, settings)
+    """Return the absolute path of a drive; a link keeps its own name."""
+    whole = path.resolve() if path.name in ("", "..") else path.parent.resolve() / path.name
+    # The files of a rosbag2 folder would be several drives that share a day, a road and a camera.
+    return whole.parent if is_log(whole.name) and is_bag(whole.parent) else whole
 
 
 def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
@@ -205,49 +152,12 @@ def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
     return list(kept.values())
 
 
-_KEYS: Final = ("path", "group", "tags", *OF_A_LOG)
-_COLUMNS: Final = ("path", "group", "tag.KEY", *(f"{table}.KEY" for table in OF_A_LOG))
-_TEXTS: Final = (
-    *("topics.image", "topics.truth", "topics.shadow", "topics.masks"),
-    *("truth.path", "truth.images"),
-)
-"""Columns whose cells are text, even if they look like numbers."""
-_LISTS: Final = ("labels.road", "labels.ignore")
-"""Columns whose cells are numbers, with spaces, commas or semicolons between them, or names."""
-
-
-@dataclass(frozen=True, slots=True)
-class ManifestEntry:
-    """An entry of a manifest."""
-
-    path: str
-    """Of one drive or several, as in the file."""
-    group: str | None
-    tags: Mapping[str, str]
-    settings: DriveSettings | None
-    """Settings of them alone, in place of those of all drives."""
-    where: str
-
-
-def is_manifest(path: Path) -> bool:
-    """Return whether a file is a manifest, by its name."""
-    return path.suffix.lower() in (".toml", ".csv")
-
-
-def read_manifest(path: Path) -> list[ManifestEntry]:
-    """Read the entries of a manifest.
+def read_manifest(path: Path) -> Iterator[DriveEntry]:
+    """Yield the drives of a manifest.
 
     A `RoadevalError` if it cannot be read, names no drive, or has a key, a tag or a setting that
     cannot be used.
     """
-    rows = list(_rows_of_csv(path) if path.suffix.lower() == ".csv" else _rows_of_toml(path))
-    if not rows:
-        raise FleetError(f"{path}: names no drive; it needs a [[drives]], or a row, for each")
-    base = RunConfig()
-    return [_entry(row, where, base) for where, row in rows]
-
-
-def _rows_of_toml(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     tables = read_tables(path)
     for key in tables:
         if key != "drives":
@@ -255,85 +165,35 @@ def _rows_of_toml(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     rows = tables.get("drives", [])
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise FleetError(f"{path}: drives must be tables, each under [[drives]]")
+    if not rows:
+        raise FleetError(f"{path}: names no drive; it needs a [[drives]] for each")
     for number, row in enumerate(rows, 1):
-        yield f"{path}: [[drives]] number {number}", row
+        yield from _described(row, f"{path}: [[drives]] number {number}", path.parent)
 
 
-def _rows_of_csv(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    try:
-        check_input(path)
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            # Spreadsheets write semicolons where the comma is a decimal point.
-            header = file.readline()
-            file.seek(0)
-            delimiter = ";" if ";" in header and "," not in header else ","
-            reader = csv.reader(file, delimiter=delimiter, strict=True)
-            columns = [name.strip() for name in next(reader, [])]
-            _check_columns(columns, path)
-            for cells in reader:
-                where = f"{path}: line {reader.line_num}"
-                if any(cells):
-                    yield where, _row(columns, cells, where)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        problem = getattr(error, "strerror", None) or error
-        raise FleetError(f"{path}: cannot be read as CSV in UTF-8: {problem}") from error
-
-
-def _check_columns(columns: Sequence[str], path: Path) -> None:
-    for column in columns:
-        table, _, key = column.partition(".")
-        known = column in ("path", "group") if not key else table in ("tag", *OF_A_LOG)
-        if not known:
-            raise FleetError(f"{path}: no column can be called {column!r}; {_choose(_COLUMNS)}")
-        if columns.count(column) > 1:
-            raise FleetError(f"{path}: two columns are called {column!r}")
-    if "path" not in columns:
-        raise FleetError(f"{path}: no column is called 'path'; {_choose(_COLUMNS)}")
-
-
-def _row(columns: Sequence[str], cells: Sequence[str], where: str) -> dict[str, Any]:
-    if len(cells) != len(columns):
-        raise FleetError(f"{where}: {len(cells)} cells below {len(columns)} columns")
-    row: dict[str, Any] = {}
-    for column, cell in zip(columns, map(str.strip, cells), strict=True):
-        if cell:
-            *tables, key = ["tags" if part == "tag" else part for part in column.split(".", 2)]
-            table = row
-            for name in tables:
-                table = table.setdefault(name, {})
-            table[key] = cell if column.startswith(("tag.", *_TEXTS)) else _value(column, cell)
-    return row
-
-
-def _value(column: str, cell: str) -> Any:
-    """Return a cell as in a TOML file: a number, true or false, a list, or else text."""
-    if column in _LISTS and re.fullmatch(r"[\d\s,;]+", cell):
-        return [int(number) for number in re.findall(r"\d+", cell)]
-    if column in _LISTS and not cell.startswith("["):
-        return [name.strip() for name in re.split("[,;]", cell)]
-    if column in ("path", "group"):
-        return cell
-    try:
-        value = read_toml(f"value = {cell}")["value"]
-    except ValueError:
-        return cell
-    return value if isinstance(value, bool | int | float | list) else cell
-
-
-def _entry(row: Mapping[str, Any], where: str, base: RunConfig) -> ManifestEntry:
+def _described(row: Mapping[str, Any], where: str, folder: Path) -> Iterator[DriveEntry]:
+    """Yield the drives of an entry of a manifest."""
     path = row.get("path")
     if not isinstance(path, str) or not path:
         raise FleetError(f"{where}: path must name a log, or several as *.mcap")
     where = f"{where}, {shown(path)}"
     for key in row:
         if key not in _KEYS:
-            raise FleetError(f"{where}: {key}: there is no such key; {_choose(_KEYS)}")
+            raise FleetError(f"{where}: {key}: there is no such key; choose {', '.join(_KEYS)}")
     group = _word(row["group"], f"{where}: group") if "group" in row else None
-    return ManifestEntry(path, group, _tags(row, where), _settings(row, where, base), where)
+    tags = _tags(row.get("tags", {}), where)
+    settings = {name: row[name] for name in OF_A_LOG if name in row}
+    with in_file(where):
+        RunConfig().of_drive(settings)  # checked before the first drive is replayed
+    try:
+        sources = _sources(path, folder)
+    except RoadevalError as error:
+        raise FleetError(f"{where}: {error}") from error
+    for source in sources:
+        yield entry_of(source, group, tags, settings)
 
 
-def _tags(row: Mapping[str, Any], where: str) -> dict[str, str]:
-    tags = row.get("tags", {})
+def _tags(tags: Any, where: str) -> dict[str, str]:
     if not isinstance(tags, Mapping):
         raise FleetError(f'{where}: tags must be a table, as {{ weather = "rain" }}')
     for key in tags:
@@ -350,16 +210,3 @@ def _word(value: Any, where: str) -> str:
     if not isinstance(value, str | int | float) or value == "":
         raise FleetError(f"{where}: must be text, a number, true or false")
     return str(value)
-
-
-def _settings(row: Mapping[str, Any], where: str, base: RunConfig) -> DriveSettings | None:
-    tables = {name: row[name] for name in OF_A_LOG if name in row}
-    if not tables:
-        return None
-    settings = DriveSettings(row["path"], tables, where)
-    base.with_drives([settings])  # checked before the first drive is replayed
-    return settings
-
-
-def _choose(names: Sequence[str]) -> str:
-    return f"choose {', '.join(names)}"

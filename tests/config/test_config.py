@@ -174,7 +174,6 @@ def test_a_chain_without_a_mask_cannot_run(chain):
         {"training": {"model": "a\0b"}},
         {"output": {"save": "\0"}},
         {"masks": {"m": {"path": "a\0"}}},
-        {"drives": [{"path": "a\0"}]},
     ],
 )
 def test_a_path_with_a_zero_byte_is_refused(tables):

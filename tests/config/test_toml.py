@@ -27,10 +27,6 @@ OTHER = {
     "preset": "gated",
     "variants": {"wide": {"preset": "printed", "shadow": {"ring_width": 3}}},
     "cameras": [{"image": "/left/image", "name": "left", "masks": {"net": "/net"}}],
-    "drives": [
-        {"path": "a.mcap", "labels": {"road": [3]}, "frames": {"start": 5}},
-        {"path": "*/b*.mcap", "topics": {"masks": {"net": "/net"}}},
-    ],
     "training.model": "city.model",
     "training.adapt": True,
     "training.frames": 4,

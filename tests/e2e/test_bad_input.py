@@ -118,7 +118,6 @@ def test_a_table_cut_at_the_end_of_a_line_gives_one_line_and_no_numbers(words, s
         "replay pipe",
         "info pipe",
         "train pipe -o m.model",
-        "train drive.mcap -o m.model --drive drive.mcap=pipe",
         "replay drive.mcap --model pipe",
         "replay drive.mcap --config pipe",
         "replay drive.mcap --variant other=pipe",

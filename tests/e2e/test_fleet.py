@@ -15,7 +15,6 @@ import pytest
 import roadeval
 from roadeval import logs
 from roadeval.cli.app import main
-from roadeval.cli.screens.fleet import problems
 from roadeval.errors import RoadevalError
 from roadeval.jobs.run.fleet_work import train_fold
 from roadeval.logs import LogWriter
@@ -369,16 +368,3 @@ def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
     assert (effect["units"], effect["groups"]) == (4, 1)
     assert "in 1 group " in outcome.summary["verdict"]
     assert re.search("copy0-.* is a copy of a-.*, and 2 more are", outcome.summary["warnings"][0])
-
-
-def test_settings_that_hold_for_no_drive_are_told(tmp_path):
-    log = write(tmp_path / "logs" / "a.mcap", 0)
-    config = roadeval.configure(
-        {
-            **OPTIONS,
-            "drives": [{"path": path, "frames": {"every": 2}} for path in ("a.mcap", "b.mcap")],
-        }
-    )
-    outcome = roadeval.replay_fleet(log, tmp_path / "f", config, executor=Here())
-    assert outcome.unused == ["b.mcap"]
-    assert next(problems(outcome)) == "the settings for b.mcap hold for none of these drives"

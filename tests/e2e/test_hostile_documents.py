@@ -26,7 +26,6 @@ LINE = "word " * 20
         ("config", "--net", "n=it.toml"),
         ("config", "--masks", "m=it.toml"),
         ("fleet", "it.toml", "-o", "f"),
-        ("fleet", "a.mcap", "-o", "f", "--drive", "a=it.toml"),
     ],
 )
 def test_toml_that_nests_too_deep_is_one_line(tmp_path, words):

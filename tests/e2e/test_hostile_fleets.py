@@ -265,8 +265,6 @@ def test_a_password_is_told_nowhere(fleet, source):
 
 @pytest.mark.parametrize("word", ["http://me:geheim@127.0.0.1:9/a.mcap", "no://me:geheim@host/a"])
 def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word):
-    settings = tmp_path / "fleet.toml"
-    settings.write_text(f'[[drives]]\npath = "{word}"\nlabels = {{ road = [3] }}\n')
     manifest = tmp_path / "drives.toml"
     manifest.write_text(f'[[drives]]\npath = "{word}"\nlabels = {{ road = [3] }}\n')
     folder = tmp_path / "f"
@@ -274,7 +272,7 @@ def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word):
         ("replay", word),
         ("info", word),
         ("report", word),
-        ("fleet", word, "-o", folder, "--config", settings, "--workers", 1),
+        ("fleet", word, "-o", folder, "--workers", 1),
         ("fleet", manifest, "-o", folder, "--workers", 1),
     ):
         done = here(*words, cwd=tmp_path)

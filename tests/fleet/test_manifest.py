@@ -1,10 +1,10 @@
-"""Manifests in TOML and CSV, and what is wrong with some."""
+"""Manifests, and what is wrong with some."""
 
 import pytest
 
-from roadeval.config import RunConfig
+from roadeval.config import configure
 from roadeval.errors import RoadevalError
-from roadeval.fleet.sources import read_manifest
+from roadeval.fleet import find_drives
 
 TOML = """\
 [[drives]]
@@ -18,54 +18,43 @@ frames = { start = "10", every = 5 }
 [[drives]]
 path = "b.mcap"
 """
-CSV = """\
-path,group,tag.weather,tag.lanes,tag.wet,tag.slope,topics.image,topics.masks.net,labels.road,\
-frames.start,frames.every
-a.mcap,7,rain,2,true,0.5,/left,/net,3 7,10,5
-b.mcap,,,,,,,,,,
-"""
 
 
 @pytest.fixture
 def entries(tmp_path):
-    """Read a manifest from its text."""
+    """Find the drives of a manifest from its text."""
+    for name in "ab":
+        (tmp_path / f"{name}.mcap").touch()
 
-    def read(text, suffix=".toml", encoding="utf-8"):
-        path = tmp_path / f"fleet{suffix}"
-        path.write_text(text, encoding=encoding)
-        return read_manifest(path)
+    def read(text):
+        path = tmp_path / "fleet.toml"
+        path.write_text(text)
+        return find_drives([str(path)])
 
     return read
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
-@pytest.mark.parametrize(
-    ("text", "suffix"),
-    [(TOML, ".toml"), (CSV, ".csv"), (CSV.replace(",", ";"), ".csv"), (CSV, ".CSV")],
-)
-def test_both_forms_say_the_same(entries, text, suffix, encoding):
-    first, second = entries(text, suffix, encoding)
-    assert (first.path, first.group) == ("a.mcap", "7")
+def test_a_manifest_says_more_of_each_drive(entries, tmp_path):
+    first, second = entries(TOML)
+    assert (first.path, first.group) == (tmp_path / "a.mcap", "7")
     assert first.tags == {"weather": "rain", "lanes": "2", "wet": "true", "slope": "0.5"}
-    config = RunConfig().with_drives([first.settings]).for_drive("a.mcap")
-    assert (config.topics.image, config.topics.masks) == ("/left", {"net": "/net"})
-    assert config.labels.road == (3, 7)
-    assert (config.frames.start, config.frames.every) == ("10", 5)
-    assert (second.path, second.group, second.tags, second.settings) == ("b.mcap", None, {}, None)
+    assert (second.path, second.known) == (tmp_path / "b.mcap", (None, {}, {}))
 
 
-def test_a_cell_is_a_number_only_where_one_can_be(entries):
-    text = "path,group,tag.id,topics.image,topics.truth,topics.resize_truth,labels.road_colors\n"
-    (entry,) = entries(f'{text}12,7.50,0012,true,5,true,"[[1, 2, 3]]"\n', ".csv")
-    assert (entry.path, entry.group, entry.tags) == ("12", "7.50", {"id": "0012"})
-    tables = entry.settings.tables
-    assert tables["topics"] == {"image": "true", "truth": "5", "resize_truth": True}
-    assert tables["labels"]["road_colors"] == [[1, 2, 3]]
-
-
-def test_quoted_cells_and_empty_lines_are_read(entries):
-    (entry,) = entries('path,tag.place\n\n"a, b.mcap","Berlin, ""Mitte"""\n,\n', ".csv")
-    assert (entry.path, entry.tags) == ("a, b.mcap", {"place": 'Berlin, "Mitte"'})
+def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_a_whole(entries):
+    run = configure(
+        {
+            "topics": {"truth": "/truth"},
+            "labels": {"road": [1], "ignore": [2]},
+            "frames": {"every": 2, "end": "20"},
+        }
+    )
+    first, second = (each.config(run) for each in entries(TOML))
+    assert (first.topics.image, first.topics.masks) == ("/left", {"net": "/net"})
+    assert first.topics.truth == "/truth"
+    assert (first.labels.road, first.labels.ignore) == ((3, 7), ())
+    assert (first.frames.start, first.frames.every, first.frames.end) == ("10", 5, "20")
+    assert second == run
 
 
 @pytest.mark.parametrize(
@@ -85,32 +74,14 @@ def test_quoted_cells_and_empty_lines_are_read(entries):
         ("[[drives]]\npath = 'a'\ntags = { 'b c' = 1 }", "tag 'b c': a tag's name is made of"),
         ("[[drives]]\npath = 'a'\nframes = { evry = 3 }", r"frames\.evry: there is no such"),
         ("[[drives]]\npath = 'a'\nframes = { every = 0 }", r"frames\.every: must be at least 1"),
+        ("[[drives]]\npath = 'a'\nlabels = 3", r"labels: must be a table"),
+        ("[[drives]]\npath = 'a'\nlabels = {ignore = [3]}", r"labels\.ignore needs labels\.road"),
         ("[[drives]]\npath = 'a'\ntraining = {}", "training: there is no such key"),
+        ('[[drives]]\npath = "a\\u0000"', "there is no such file"),
     ],
 )
-def test_a_wrong_manifest_in_toml_is_named_in_one_line(entries, text, message):
+def test_a_wrong_manifest_is_named_in_one_line(entries, text, message):
     with pytest.raises(RoadevalError, match=message) as error:
         entries(text)
     assert "\n" not in str(error.value)
     assert "fleet.toml" in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "no column is called 'path'; choose path, group, tag.KEY, topics.KEY"),
-        ("path\n", "names no drive"),
-        ("path,weather\na,rain", "no column can be called 'weather'; choose path, group, tag.KEY"),
-        ("path,training.seed\na,1", "no column can be called 'training.seed'"),
-        ("path,path\na,b", "two columns are called 'path'"),
-        ("path,group\na", "line 2: 1 cells below 2 columns"),
-        ("path,group\n,b", "line 2: path must name a log"),
-        ("path,frames.every\na,often", r"line 2, a: frames\.every: must be a whole number"),
-        ('path\n"a', "cannot be read as CSV"),
-    ],
-)
-def test_a_wrong_manifest_in_csv_is_named_in_one_line(entries, text, message):
-    with pytest.raises(RoadevalError, match=message) as error:
-        entries(text, ".csv")
-    assert "\n" not in str(error.value)
-    assert "fleet.csv" in str(error.value)

@@ -116,4 +116,3 @@ def test_a_wrong_scheme_is_named(tmp_path):
     with pytest.raises(FleetError, match=r"^ftp://host/a\.mcap: no scheme that is known; choose"):
         readable("ftp://host/a.mcap")
     assert readable(tmp_path / "a.mcap") == tmp_path / "a.mcap"
-    assert readable("file:///a.mcap") == Path("/a.mcap")

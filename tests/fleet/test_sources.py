@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import DriveSettings
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.fleet import find_drives
@@ -35,6 +34,11 @@ def put_bag(folder: Path) -> None:
         put(folder / name, content=content)
 
 
+def manifest(name: str, *drives: str) -> None:
+    """Write a manifest of drives, each by its lines."""
+    Path(f"{name}.toml").write_text("".join(f"[[drives]]\n{lines}\n" for lines in drives))
+
+
 def found(*words: str | Path) -> list[str]:
     """The paths of the drives that words name, below the current folder."""
     return [os.path.relpath(entry.source) for entry in find_drives([str(w) for w in words])]
@@ -50,9 +54,9 @@ def test_an_entry_has_an_absolute_path_a_name_and_an_identity(folder):
     (entry,) = find_drives(["Monday, rain.mcap"])
     assert entry.path == folder / "Monday, rain.mcap"
     assert entry.source == str(entry.path)
-    assert (entry.name, entry.group, entry.tags, entry.settings) == ("Monday, rain", None, {}, None)
+    assert (entry.name, entry.known) == ("Monday, rain", (None, {}, {}))
     assert entry.id.startswith("Monday_rain-")
-    assert len(entry.id) == len("Monday_rain-") + 8
+    assert len(entry.id) == len("Monday_rain-") + 12
 
 
 def test_two_drives_of_one_name_stay_two(folder):
@@ -68,16 +72,8 @@ def test_an_identity_is_plain_and_short_whatever_the_name(folder, name):
     (entry,) = find_drives([f"{name}.mcap"])
     assert is_plain(entry.id)
     assert entry.id[0] not in "-_"
-    assert len(entry.id) <= 49
+    assert len(entry.id) <= 53
     assert entry.name.isprintable()
-
-
-def test_identities_that_are_equal_by_chance_become_longer():
-    clash = ["https://host/1884/a.mcap", "https://host/14768/a.mcap"]
-    first, second, third = find_drives([*clash, "https://host/a.mcap"])
-    assert first.id != second.id
-    assert identity(first.source) == identity(second.source)
-    assert (len(first.id), len(second.id), len(third.id)) == (18, 18, 10)
 
 
 def test_a_folder_is_searched_through_in_natural_order(folder):
@@ -109,7 +105,7 @@ def test_a_bag_that_cannot_be_read_is_still_a_drive(folder):
 @pytest.mark.parametrize(
     "words", [["d/run/*.mcap"], ["d/**/*.mcap"], ["d/run", "d/run/bag_1.mcap"]]
 )
-def test_all_files_of_a_bag_are_the_bag(folder, words):
+def test_files_of_a_bag_are_the_bag(folder, words):
     put_bag(folder / "d/run")
     assert found(*words) == ["d/run"]
 
@@ -145,48 +141,48 @@ def test_a_glob_matches_files_and_folders(folder):
 
 def test_a_drive_that_is_named_twice_counts_once_at_its_first_place(folder):
     put("a.mcap", "b.mcap")
-    assert found("b.mcap", ".", "../drives/b.mcap", folder.as_uri()) == ["b.mcap", "a.mcap"]
+    assert found("b.mcap", ".", "../drives/b.mcap") == ["b.mcap", "a.mcap"]
 
 
 def test_a_manifest_says_more_of_a_drive_that_is_named_beside_it(folder):
     put("a.mcap", "b.mcap")
-    Path("fleet.csv").write_text("path,group,frames.every\nb.mcap,tuesday,5\n")
-    for words in (["a.mcap", "b.mcap", "fleet.csv"], ["a.mcap", "fleet.csv", "b.mcap"]):
+    manifest("fleet", 'path = "b.mcap"\ngroup = "tuesday"\nframes = { every = 5 }')
+    for words in (["a.mcap", "b.mcap", "fleet.toml"], ["a.mcap", "fleet.toml", "b.mcap"]):
         first, second = find_drives(words)
         assert (first.group, second.group) == (None, "tuesday")
-        assert second.settings == DriveSettings(second.source, {"frames": {"every": 5}})
+        assert second.settings == {"frames": {"every": 5}}
 
 
 def test_a_log_may_be_named_once_for_each_of_its_cameras(folder):
     put("a.mcap")
     put("b.mcap")
-    Path("rig.csv").write_text(
-        "path,topics.image\na.mcap,/front/image\na.mcap,/rear/image\nb.mcap,\n"
-    )
-    front, rear, other = find_drives(["rig.csv"])
+    cameras = [f'path = "a.mcap"\ntopics.image = "/{side}/image"' for side in ("front", "rear")]
+    manifest("rig", *cameras, 'path = "b.mcap"')
+    front, rear, other = find_drives(["rig.toml"])
     assert (front.camera, rear.camera, other.camera) == ("/front/image", "/rear/image", "")
     assert (front.name, rear.name, other.name) == ("a front", "a rear", "b")
     assert front.id.startswith(f"{identity(front.source)}-front-")
     assert is_plain(front.id)
     assert front.id != rear.id
-    assert find_drives(["rig.csv", "rig.csv"]) == [front, rear, other]
+    assert find_drives(["rig.toml", "rig.toml"]) == [front, rear, other]
 
 
 def test_cameras_whose_names_look_alike_have_identities_of_their_own(folder):
     put("a.mcap")
-    Path("rig.csv").write_text("path,topics.image\na.mcap,/cam 1\na.mcap,/cam_1\na.mcap,/\n")
-    assert len({entry.id for entry in find_drives(["rig.csv"])}) == 3
+    names = ("/cam 1", "/cam_1", "/")
+    manifest("rig", *(f'path = "a.mcap"\ntopics.image = "{name}"' for name in names))
+    assert len({entry.id for entry in find_drives(["rig.toml"])}) == 3
 
 
 def test_two_descriptions_of_one_drive_are_refused(folder):
     put("a.mcap")
-    Path("1.csv").write_text("path,tag.weather\na.mcap,rain\n")
-    Path("2.csv").write_text("path,tag.weather\na.mcap,sun\n")
-    assert len(find_drives(["1.csv", "1.csv"])) == 1
+    for name, weather in (("1", "rain"), ("2", "sun")):
+        manifest(name, f'path = "a.mcap"\ntags.weather = "{weather}"')
+    assert len(find_drives(["1.toml", "1.toml"])) == 1
     with pytest.raises(
         RoadevalError, match=r"a\.mcap: is named twice, with different groups, tags"
     ):
-        find_drives(["1.csv", "2.csv"])
+        find_drives(["1.toml", "2.toml"])
 
 
 def test_paths_of_a_manifest_are_relative_to_it(folder):
@@ -223,8 +219,7 @@ def test_what_shows_an_entry_shows_no_secret():
         ("bags", r"bags: no \*\.mcap file in it; a folder of ROS 1 bags"),
         ("unfinished", "unfinished: no log that is complete"),
         ("ftp://host/a.mcap", r"ftp://host/a\.mcap: no scheme that is known; choose s3://, gs://"),
-        ("file://host/a.mcap", "a file of another machine"),
-        ("file:///gone.mcap", r"/gone\.mcap: there is no such file or folder"),
+        ("file:///a.mcap", r"file:///a\.mcap: no scheme that is known"),
         ("s3://bucket/fleet.toml", "a manifest is named by itself"),
         ("*.toml", "a manifest is named by itself"),
         ("gone.toml", "there is no such file or folder"),

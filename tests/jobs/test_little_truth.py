@@ -214,18 +214,13 @@ def test_a_label_that_only_looks_changed_replays_nothing(fleet, tmp_path):
 def test_a_manifest_says_where_the_truth_of_a_drive_lies(fleet, tmp_path, monkeypatch):
     (tmp_path / "labels" / "two").rename(tmp_path / "labels" / "2024")
     monkeypatch.chdir(tmp_path / "labels")
-    manifest = tmp_path / "fleet.csv"
-    manifest.write_text("path,truth.path\none.mcap,one\ntwo.mcap,2024\n")
-    assert fleet(drives=[manifest])[0].counts == {"scored": 2}
-    written = tmp_path / "fleet.toml"
+    manifest = tmp_path / "fleet.toml"
     entries = [
         f'[[drives]]\npath = "{name}.mcap"\ntruth = {{ path = "{own}" }}\n'
         for name, own in (("one", "one"), ("two", "2024"))
     ]
-    written.write_text("\n".join(entries))
-    done, submitted = fleet(drives=[written])
-    assert done.counts == {"scored": 2}
-    assert submitted == []
+    manifest.write_text("\n".join(entries))
+    assert fleet(drives=[manifest])[0].counts == {"scored": 2}
 
 
 def test_a_manifest_names_the_classes_of_a_drive(fleet, tmp_path):
@@ -236,11 +231,14 @@ def test_a_manifest_names_the_classes_of_a_drive(fleet, tmp_path):
         shape = {"label": label, "points": ring, "shape_type": "polygon"}
         text = json.dumps({"shapes": [shape], "imageWidth": 32, "imageHeight": 24})
         (tmp_path / "labels" / "two" / f"{number}.json").write_text(text)
-    manifest = tmp_path / "fleet.csv"
+    manifest = tmp_path / "fleet.toml"
+    labels = {"one": "road = [255]", "two": 'road = ["road", "lane marking"], ignore = ["kerb"]'}
     manifest.write_text(
-        "path,truth.path,labels.road,labels.ignore\n"
-        f"one.mcap,{tmp_path}/labels/one,255,\n"
-        f'two.mcap,{tmp_path}/labels/two,"road, lane marking",kerb\n'
+        "".join(
+            f'[[drives]]\npath = "{name}.mcap"\ntruth.path = "{tmp_path}/labels/{name}"\n'
+            f"labels = {{ {own} }}\n"
+            for name, own in labels.items()
+        )
     )
     done, _ = fleet(drives=[manifest])
     assert done.counts == {"scored": 2}, done.problems

@@ -1,7 +1,6 @@
 """The page of fleets: its queries answer what they say, its manifests can be read."""
 
 import re
-import tomllib
 from pathlib import Path
 
 import duckdb
@@ -57,14 +56,16 @@ def test_err_by_weather_in_duckdb_and_in_pandas(asked, fleets):
         assert row.pooled_ERR == pytest.approx((own.FP + own.FN).sum() / own.N.sum())
 
 
-def test_the_manifests_say_the_same_of_a_drive_and_can_be_read(tmp_path):
-    (toml,), (csv,) = blocks("toml"), blocks("csv")
+def test_the_manifest_can_be_read(tmp_path):
+    (toml,) = blocks("toml")
+    for name in ("monday/a", "monday/b", "tuesday/street"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / f"{name}.mcap").touch()
     (tmp_path / "m.toml").write_text(toml)
-    (tmp_path / "m.csv").write_text(csv)
-    told = [read_manifest(tmp_path / name) for name in ("m.toml", "m.csv")]
-    for one, other in zip(*told, strict=True):
-        assert (one.path, one.group, one.tags) == (other.path, other.group, other.tags)
-    assert tomllib.loads(toml)["drives"][1]["labels"]["road"] == [3]
+    *monday, tuesday = read_manifest(tmp_path / "m.toml")
+    assert [each.group for each in monday] == ["2026-11-16"] * 2
+    assert (tuesday.group, tuesday.tags) == (None, {"weather": "sun"})
+    assert tuesday.settings["labels"]["road"] == [3]
 
 
 def test_the_folder_is_what_the_page_says(fleets):

@@ -10,7 +10,7 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("preset", "config", "variants", "nets", "masks", "cameras", "drives"),
+    *("preset", "config", "variants", "nets", "masks", "cameras"),
     *("output", "training", "truth", "topics", "labels", "frames", "run"),
 )
 def config(*, given: Given) -> int:

@@ -13,14 +13,13 @@ Drives = Annotated[
     list[str],
     arguments.argument(
         "DRIVE...",
-        "Logs, rosbag2 folders, folders to search, patterns, URLs, or manifests (.toml, .csv).",
+        "Logs, rosbag2 folders, folders to search, patterns, URLs, or manifests (.toml).",
     ),
 ]
 
 
 @takes(
     *("preset", "config", "variants", "nets", "masks", "tunes", "only", "cameras", "ground"),
-    *("drives",),
     *("training", "truth", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )

@@ -10,7 +10,7 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("preset", "config", "variants", "nets", "masks", "tunes", "drives", "training.frames"),
+    *("preset", "config", "variants", "nets", "masks", "tunes", "training.frames"),
     *("truth", "cameras", "topics.truth", "topics.masks", "labels"),
     *("topics.sync_tolerance_ms", "topics.resize_truth"),
     *("frames.scale", "frames.max_pixels"),
@@ -18,7 +18,10 @@ from roadeval.cli.options import Given, takes
 )
 def train(
     paths: Annotated[
-        list[Path], arguments.argument("DRIVE", "Camera logs (MCAP), mostly with truth.")
+        list[str],
+        arguments.argument(
+            "DRIVE", "Camera logs (MCAP), mostly with truth, folders, URLs, or manifests (.toml)."
+        ),
     ],
     *,
     output: Annotated[Path, arguments.option("-o --output", "Where the model lands.", "MODEL")],

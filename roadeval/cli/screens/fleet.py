@@ -50,8 +50,6 @@ def show(outcome: FleetOutcome, out: Console) -> None:
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
     """Yield what to know first, and why drives failed, with the first drives of each reason."""
-    for path in outcome.unused:
-        yield f"the settings for {path} hold for none of these drives"
     yield from outcome.facts.warnings
     fleet = FleetFolder(outcome.folder)
     failed = (fleet.drives[drive] for drive in outcome.problems)

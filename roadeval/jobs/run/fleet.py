@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from roadeval.config import RunConfig, run_toml
+from roadeval.config import FleetSettings, RunConfig, run_toml
 from roadeval.errors import RoadevalError
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import (
@@ -78,8 +78,6 @@ class FleetOutcome:
     problems: Mapping[str, str]
     """Why drives failed, by the drives' names in the fleet."""
     facts: FleetFacts
-    unused: Sequence[str] = ()
-    """Settings of single drives (`RunConfig.drives`) that hold for none of these: their paths."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -152,8 +150,7 @@ def replay_fleet(
             )
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not each.repeated for each in run.done.values())
-    unused = config.unused(entry.source for entry in entries)
-    return FleetOutcome(writer.folder, counts, replayed, problems, facts, unused)
+    return FleetOutcome(writer.folder, counts, replayed, problems, facts)
 
 
 @dataclass(slots=True)
@@ -213,11 +210,8 @@ class FleetRun:
         )
 
     def _of(self, entry: DriveEntry) -> RunConfig:
-        """Return the configuration of a drive: what the manifest says of it comes last."""
-        own = self.config.for_drive(entry.source)
-        if entry.settings is not None:
-            own = own.with_drives([entry.settings]).for_drive(entry.source)
-        return replace(own, fleet=type(own.fleet)())
+        """Return the configuration of a drive."""
+        return replace(entry.config(self.config), fleet=FleetSettings())
 
     def _task(self, entry: DriveEntry, own: RunConfig, model: str, fold: int | None) -> DriveTask:
         keep = self.config.fleet.keep

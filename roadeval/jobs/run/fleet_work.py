@@ -12,7 +12,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,9 +24,10 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import final_stages
 from roadeval.fleet.entry import DriveEntry, FleetError
-from roadeval.fleet.remote import readable, stamp
+from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import asked, content_of, software
 from roadeval.jobs.run.replay import replay
+from roadeval.jobs.run.train import draw
 from roadeval.logs import METADATA
 from roadeval.recording import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
@@ -260,7 +260,7 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
         record=record,
         figures=False,
     )
-    own_config = replace(task.config, drives=(), output=output, run=ExecutionSettings(jobs=1))
+    own_config = replace(task.config, output=output, run=ExecutionSettings(jobs=1))
     with FrameGatherer(folder, drive) as gatherer:
         outcome = replay(task.entry.source, own_config, on_frame=gatherer.add)
         _remove(task, PICTURES, *(() if task.recorded else (RECORDINGS,)))
@@ -445,7 +445,7 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
         if len(drawn) == TRAINING_DRIVES:
             break
         try:
-            frames = list(_frames_of(entry, own, held))
+            frames, _ = draw(entry, own, held, labelled=True)
         except RoadevalError as error:
             if _disk_failure(error):
                 raise
@@ -456,20 +456,6 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
         else:
             passed[entry.id] = "no frame with truth"
     return drawn, passed
-
-
-def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[Frame]:
-    """Decode the training frames of a drive, and hold them."""
-    with logs.open_log(readable(entry.source), own.for_training()) as log:
-        selection = log.select()
-        if selection.truth is None:
-            return
-        begin = partial(log.frames, selection)
-        for frame in learning.spread(begin, own.training.frames, labelled=True):
-            if frame.truth is None:
-                return
-            held.add(frame)
-            yield frame
 
 
 WORST: Final = 3

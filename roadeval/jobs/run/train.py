@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from roadeval import logs
-from roadeval.config import ConfigError, RunConfig
+from roadeval.config import RunConfig
 from roadeval.data import Frame
+from roadeval.fleet import DriveEntry, find_drives, readable
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.runtime.files import AnyPath, Paths, listed
@@ -25,66 +26,73 @@ def train(
 ) -> Model:
     """Train every variant on one drive or some, and write the model file.
 
-    From each drive ``training.frames`` labelled frames are taken, spread evenly over the selected
-    range. Frames without truth are taken where ``training.source`` is ``patch``, or ``auto`` and no
-    drive has truth. The labels hold for every drive without its own (`RunConfig.drives`). Frames
-    that cannot be decoded are left out, and listed in `Model.losses`. A `RoadevalError` if some
-    drives have truth and others none, or there is nothing to learn.
+    ``drives`` are named as for `roadeval.replay_fleet`. From each of them ``training.frames``
+    labelled frames are taken, spread evenly over the selected range. Frames without truth are taken
+    where ``training.source`` is ``patch``, or ``auto`` and no drive has truth. The labels hold for
+    every drive without its own in a manifest. Frames that cannot be decoded are left out, and
+    listed in `Model.losses`. A `RoadevalError` if some drives have truth and others none, or there
+    is nothing to learn.
     """
-    config, paths = (config or RunConfig()).resolved(), listed(drives)
-    settings = config.training
-    for path in config.unused(paths):
-        names = ", ".join(map(str, paths))
-        raise ConfigError(f"`drives` {path}: is none of the drives {names}")
+    config = (config or RunConfig()).resolved()
+    settings, entries = config.training, find_drives([str(drive) for drive in listed(drives)])
     if settings.seeds > 1:
         raise TrainingError(
             "`training.seeds`: a model file holds one training; set training.seed for another"
         )
-    held, total = HeldFrames(), settings.frames * len(paths)
+    held, total = HeldFrames(), settings.frames * len(entries)
 
     def show() -> None:
         on_progress(Progress(len(held.frames), total, "training"))
 
-    with holding(output, inputs=paths):
-        drawn = [_draw(path, config, held, show) for path in paths]
-        frames = {each.path: each.frames for each in drawn}
+    with holding(output, inputs=[each.path for each in entries]):
+        drawn = {
+            Path(f"{each.shown} {each.camera}".rstrip()): draw(
+                each, each.config(config), held, show
+            )
+            for each in entries
+        }
+        frames = {path: own for path, (own, _) in drawn.items()}
         model = learning.from_drives(frames, config.pipelines(), settings)
         losses = [
             sentence if len(drawn) == 1 or sentence.startswith(start) else f"{start}{sentence}"
-            for each in drawn
-            for start in [f"{each.path.name}: "]
-            for sentence in each.losses
+            for path, (_, own) in drawn.items()
+            for start in [f"{path.name}: "]
+            for sentence in own
         ]
         model = replace(model, losses=tuple(losses))
         save_model(model, Path(output))
         return model
 
 
-@dataclass(frozen=True, slots=True)
-class _Drawn:
-    """The training frames of a drive."""
+def draw(
+    drive: DriveEntry,
+    own: RunConfig,
+    held: HeldFrames,
+    on_frame: Callable[[], None] = lambda: None,
+    *,
+    labelled: bool = False,
+) -> tuple[list[Frame], list[str]]:
+    """Decode the training frames of a drive and hold them; return also what of it was lost.
 
-    path: Path
-    frames: Sequence[Frame]
-    losses: Sequence[str]
-    """What of the drive could not be read."""
-
-
-def _draw(drive: AnyPath, config: RunConfig, held: HeldFrames, show: Callable[[], None]) -> _Drawn:
-    """Decode the training frames of a drive and hold them."""
-    own, frames, streams = config.for_drive(drive), list[Frame](), list[logs.FrameStream]()
-    with logs.open_log(drive, own.for_training()) as log:
+    Where they must be ``labelled``, a drive without road truth gives none.
+    """
+    frames, streams = list[Frame](), list[logs.FrameStream]()
+    with logs.open_log(readable(drive.source), own.for_training()) as log:
         selection = log.select()
+        if labelled and selection.truth is None:
+            return [], []
 
         def begin() -> logs.FrameStream:
             streams.append(log.frames(selection))
             return streams[-1]
 
-        labelled = own.training.source != "patch"
-        for frame in learning.spread(begin, own.training.frames, labelled=labelled):
+        by_truth = labelled or own.training.source != "patch"
+        for frame in learning.spread(begin, own.training.frames, labelled=by_truth):
+            if labelled and frame.truth is None:
+                return [], []
             held.add(frame)
             frames.append(frame)
-            show()
+            on_frame()
         account = streams[-1].accounting
         losses = [*log.losses, *account.losses]
         if missing := len(account.undecodable):
@@ -92,4 +100,4 @@ def _draw(drive: AnyPath, config: RunConfig, held: HeldFrames, show: Callable[[]
             losses.append(f"{missing} of {total} training frames could not be decoded")
         if losses and not frames:
             raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
-        return _Drawn(log.path, frames, losses)
+        return frames, losses
