@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.results.pick import pick
     from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result
-    from roadeval.jobs.run.fleet import FleetOutcome, FleetProgress, replay_fleet
+    from roadeval.jobs.run.fleet import FleetOutcome, replay_fleet
     from roadeval.jobs.run.frame import run_frame
     from roadeval.jobs.run.replay import Outcome, replay
     from roadeval.jobs.run.train import train
@@ -42,7 +42,6 @@ __version__ = VERSION
 
 __all__ = [
     "FleetOutcome",
-    "FleetProgress",
     "Model",
     "Outcome",
     "Progress",

@@ -5,20 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from roadeval.cli import console, messages
 from roadeval.jobs.progress import Progress
-
-if TYPE_CHECKING:
-    from roadeval.jobs.run.fleet import FleetProgress
 
 LINE_PERIOD_S: Final = 10.0
 """At most one plain line in this time, so that a log file of a long run stays short."""
 
 
 @contextmanager
-def watched(quiet: bool = False) -> Iterator[Callable[[Progress | FleetProgress], None]]:
+def watched(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
     """Yield the function that a job calls with its progress; the display ends with the block."""
     if quiet:
         yield lambda _progress: None
@@ -47,10 +44,10 @@ class Watch:
         self._stage = ""
         self._written = 0.0
 
-    def __call__(self, progress: Progress | FleetProgress) -> None:
+    def __call__(self, progress: Progress) -> None:
         """Show how far a job is."""
         begins = progress.stage != self._stage
-        if isinstance(progress, Progress) and progress.note:
+        if progress.note:
             messages.note(progress.note)
         if begins:
             self._stage = progress.stage
@@ -58,15 +55,15 @@ class Watch:
         # Before the first item nothing is known; the bar shows that something moves.
         total = progress.total if progress.done else None
         self._display.update(self._task, completed=progress.done, total=total)
-        text = self._frames(progress) if isinstance(progress, Progress) else drives_line(progress)
+        text = self._words(progress)
         self._display.update(self._task, description=text)
         due = time.monotonic() - self._written >= LINE_PERIOD_S
         if self._lines and (begins or due or progress.done == progress.total):
             self._written = time.monotonic()
             self._write(text)
 
-    def _frames(self, progress: Progress) -> str:
-        """Describe a job on one drive: ``replaying: 4 of 10 frames, 23.4 frames/s, 12 s left``."""
+    def _words(self, progress: Progress) -> str:
+        """Describe it: ``replaying: 4 of 10 frames, 23.4 frames/s, 12 s left``."""
         if not progress.done:
             return progress.stage
         of = f" of {progress.total}" if progress.total is not None else ""
@@ -75,26 +72,9 @@ class Watch:
         if task.speed:
             parts.append(f"{task.speed:.1f} {progress.unit}/s")
             if task.time_remaining is not None:
-                parts.append(f"{task.time_remaining:.0f} s left")
+                parts.append(f"{duration(task.time_remaining)} left")
+        parts += [progress.detail] if progress.detail else []
         return f"{progress.stage}: {', '.join(parts)}"
-
-
-def drives_line(progress: FleetProgress) -> str:
-    """Describe the progress of a fleet."""
-    if progress.stage != "replaying":
-        return progress.stage
-    parts = [f"{progress.done} of {progress.total} drives"]
-    if progress.failed:
-        parts.append(f"{progress.failed} failed")
-    if progress.running:
-        parts.append(f"{progress.running} running")
-    if progress.frames:
-        parts.append(f"{progress.frames / progress.seconds:.1f} frames/s")
-    own = progress.done - progress.kept
-    if own and progress.done < progress.total:
-        left = progress.seconds / own * (progress.total - progress.done)
-        parts.append(f"{duration(left)} left")
-    return ", ".join(parts)
 
 
 def duration(seconds: float) -> str:

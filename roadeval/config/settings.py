@@ -24,13 +24,6 @@ def _keep(value: object) -> object:
     return value
 
 
-def _failures(value: object) -> object:
-    shares = r"\d{1,9}|\d{1,2}(\.\d+)?%|100%"
-    if isinstance(value, str) and not re.fullmatch(shares, value):
-        raise ValueError("must be a number of drives, as 3, or a share of them up to 100%, as 10%")
-    return value
-
-
 @dataclass(frozen=True)
 class OutputSettings:
     """Where the results of a run are written, and which images are recorded."""
@@ -75,5 +68,3 @@ class FleetSettings:
     """What each process may take. Default: its share of the machine's."""
     scheduler: Annotated[str | None, Flag("--scheduler", "ADDRESS")] = None
     """A Dask scheduler, as ``tcp://host:8786``, or its file: its workers replay the drives."""
-    max_failures: Annotated[str | None, Checked(_failures), Flag("--max-failures", "N|P%")] = None
-    """Exit with code 1 if more drives fail. Default: however many."""

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 class Progress:
     """How far a job is: ``done`` of ``total`` frames of ``stage``.
 
-    ``stage`` is ``training``, ``replaying``, ``writing``, ``reading``, ``rendering`` or
-    ``verifying``; ``total``
-    is None where it is not known.
+    ``stage`` is ``looking``, ``training``, ``replaying``, ``writing``, ``reading``, ``rendering``
+    or ``verifying``; ``total`` is None where it is not known.
     """
 
     done: int
@@ -21,6 +20,8 @@ class Progress:
     note: str = ""
     """A sentence that the user should read now, not at the end."""
     unit: str = "frames"
+    detail: str = ""
+    """A few words more, as how many drives have failed."""
 
 
 OnProgress = Callable[[Progress], None]

@@ -142,11 +142,6 @@ class Log:
         """Bytes of all its files."""
         return sum(len(container.source) for container in self._containers)
 
-    @property
-    def is_covered(self) -> bool:
-        """Whether all messages lie in chunks that have a checksum of their own."""
-        return all(container.is_covered for container in self._containers)
-
     def _kept(self, topic: TopicInfo) -> str:
         reader = self._readers[topic.name]
         total = max(reader.expected(), len(reader))

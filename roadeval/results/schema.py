@@ -275,7 +275,6 @@ _OF_DRIVES: Final = (
             ),
             Column("exit_code", Kind.COUNT, "that `replay` of this drive alone ends with"),
             Column("reason", Kind.TEXT, "why it was not scored"),
-            Column("attempts", Kind.COUNT, "how often it was begun"),
             Column("seconds", Kind.NUMBER, "that the last attempt took"),
             Column("peak_memory_mib", Kind.NUMBER, "the most memory that its process held"),
             Column(

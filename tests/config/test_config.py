@@ -98,8 +98,8 @@ def test_a_nested_table_overrides_a_part(tmp_path):
         ("ring_width = 3", "ring_width is in no table; put it below one of .*shadow"),
         ("[output]\nsave = 'g.toml'", r"output.save g.toml: name a file that ends in .rrd"),
         (
-            "[fleet]\nmax_failures = '101%'",
-            r"fleet\.max_failures: must be a number .*100%",
+            "[fleet]\nkeep = 'best:3'",
+            r"fleet\.keep: must be all, none or worst:N",
         ),
         (
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = ['a', -1]",

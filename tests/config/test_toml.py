@@ -63,7 +63,6 @@ OTHER = {
     "fleet.workers": 2,
     "fleet.memory_gib": 1.5,
     "fleet.scheduler": "tcp://host:8786",
-    "fleet.max_failures": "2.5%",
 }
 """A value other than the default for every option of the command line."""
 

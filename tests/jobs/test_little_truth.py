@@ -203,14 +203,6 @@ def test_a_label_that_has_changed_replays_its_drive_of_a_fleet(fleet, tmp_path):
     assert (done.replayed, submitted) == (1, ["one"])
 
 
-def test_a_label_that_only_looks_changed_replays_nothing(fleet, tmp_path):
-    tables = {"truth": {"path": str(tmp_path / "labels" / "{drive}")}, "training": {"frames": 3}}
-    assert fleet(**tables, masks={}, only=["unfiltered"])[0].counts == {"scored": 2}
-    os.utime(tmp_path / "labels" / "two" / "5.png")
-    done, submitted = fleet(**tables, masks={}, only=["unfiltered"])
-    assert (done.replayed, submitted) == (0, ["two"])
-
-
 def test_a_manifest_says_where_the_truth_of_a_drive_lies(fleet, tmp_path, monkeypatch):
     (tmp_path / "labels" / "two").rename(tmp_path / "labels" / "2024")
     monkeypatch.chdir(tmp_path / "labels")

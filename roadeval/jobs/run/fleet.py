@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, as_completed
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,12 +22,12 @@ from roadeval.fleet.entry import (
     with_cameras,
 )
 from roadeval.fleet.sources import find_drives
+from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
     Done,
     DriveTask,
     FoldModel,
     FoldTask,
-    attempts,
     done,
     ending_the_run,
     failed,
@@ -42,29 +41,6 @@ from roadeval.results.fleet import FleetWriter, recording_path
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
 from roadeval.version import VERSION
-
-
-@dataclass(frozen=True, slots=True)
-class FleetProgress:
-    """How far a fleet is."""
-
-    done: int
-    """Drives, those that failed among them."""
-    failed: int
-    total: int
-    running: int
-    """Drives that are being replayed now."""
-    kept: int
-    """Of those done, the drives that an earlier command has done."""
-    frames: int
-    """Evaluated frames of the drives that this command has replayed."""
-    seconds: float
-    """Since the command began."""
-    stage: str
-    """``looking``, ``training``, ``replaying`` or ``writing``."""
-
-
-OnFleetProgress = Callable[[FleetProgress], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +73,13 @@ def replay_fleet(
     *,
     executor: Executor | None = None,
     retry_failed: bool = False,
-    on_progress: OnFleetProgress = lambda _: None,
+    on_progress: OnProgress = ignore,
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
     The folder is the state: a drive whose record is there, made of the same log, settings, model
     and version, is not replayed again. A `RoadevalError` if there is no drive, or the folder or the
-    engine cannot be used, or more drives fail than ``fleet.max_failures`` allows: then all that was
-    done is kept.
+    engine cannot be used.
 
     Parameters
     ----------
@@ -133,21 +108,14 @@ def replay_fleet(
         )
     writer = FleetWriter(Path(output))
     writer.begin()
-    run = FleetRun(writer.folder, tuple(entries), config, on_progress, retry_failed)
-    run.replay_all(executor)
+    run = FleetRun(writer.folder, tuple(entries), config, on_progress, retry_failed, executor)
+    run.replay_all()
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
     asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
     facts = writer.finish(members, config.evaluation, config.as_dict(), text, asked=asked)
     counts = Counter(each.status for each in run.done.values())
-    if (allowed := config.fleet.max_failures) is not None:
-        most = float(allowed.removesuffix("%"))
-        if counts[FAILED] > (most * len(entries) / 100 if allowed.endswith("%") else most):
-            raise FleetError(
-                f"{run.folder}: {counts[FAILED]} of {len(entries)} drives failed, more than "
-                f"`fleet.max_failures` {allowed} allows; their reasons are in drives.parquet"
-            )
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not each.repeated for each in run.done.values())
     return FleetOutcome(writer.folder, counts, replayed, problems, facts)
@@ -160,61 +128,38 @@ class FleetRun:
     folder: Path
     entries: tuple[DriveEntry, ...]
     config: RunConfig
-    on_progress: OnFleetProgress
+    on_progress: OnProgress
     retry: bool
+    executor: Executor | None
+    """Who does the tasks; None until there is one, and Dask's workers are started then."""
+    workers: int = 1
     done: dict[str, Done] = field(default_factory=dict)
     """What is known of each drive that is done, by its ID."""
     pruned: set[str] = field(default_factory=set)
-    workers: int = 1
-    began: float = field(default_factory=time.monotonic)
+    stack: ExitStack = field(default_factory=ExitStack)
+    """What ends with the run."""
 
-    def replay_all(self, executor: Executor | None) -> None:
-        """Replay every drive that is not done."""
+    def replay_all(self) -> None:
+        """Replay every drive that is not done, and those whose recordings are to be kept."""
         self.show("looking")
-        configs = {entry.id: self._of(entry) for entry in self.entries}
-        if self.config.fleet.folds is None:
-            digest, model = "", self.config.training.model
-            if model:
-                try:
-                    digest = sha256_of(Path(model))
-                except OSError as error:
-                    raise FleetError(f"{model}: cannot read the model: {error.strerror}") from error
-            tasks = [self._task(e, configs[e.id], digest, None) for e in self.entries]
-            waiting = self._waiting(tasks) or self._unrecorded(tasks)
-            if waiting:
-                with self._engine(executor) as engine:
-                    self._replay(engine, waiting)
-                    self._replay(engine, self._unrecorded(tasks))
-        else:
-            with self._engine(executor) as engine:
-                tasks = self._by_fold(engine, configs)
-                self._replay(engine, self._waiting(tasks))
-                self._replay(engine, self._unrecorded(tasks))
+        with self.stack:
+            folds = self.config.fleet.folds
+            tasks = [*self._by_model()] if folds is None else self._by_fold(folds)
+            self._replay(self._waiting(tasks))
+            self._replay(self._unrecorded(tasks))
         self._prune()
 
     def show(self, stage: str) -> None:
         """Report the progress to the caller."""
-        done = self.done.values()
-        left = len(self.entries) - len(done)
-        self.on_progress(
-            FleetProgress(
-                done=len(done),
-                failed=sum(each.status == FAILED for each in done),
-                total=len(self.entries),
-                running=min(left, self.workers) if stage == "replaying" else 0,
-                kept=sum(each.repeated for each in done),
-                frames=sum(each.frames for each in done if not each.repeated),
-                seconds=time.monotonic() - self.began,
-                stage=stage,
-            )
-        )
-
-    def _of(self, entry: DriveEntry) -> RunConfig:
-        """Return the configuration of a drive."""
-        return replace(entry.config(self.config), fleet=FleetSettings())
+        done, detail = self.done.values(), []
+        if failed := sum(each.status == FAILED for each in done):
+            detail.append(f"{failed} failed")
+        if stage == "replaying" and (left := len(self.entries) - len(done)):
+            detail.append(f"{min(left, self.workers)} running")
+        progress = Progress(len(done), len(self.entries), stage, "", "drives", ", ".join(detail))
+        self.on_progress(progress)
 
     def _task(self, entry: DriveEntry, own: RunConfig, model: str, fold: int | None) -> DriveTask:
-        keep = self.config.fleet.keep
         return DriveTask(
             self.folder,
             entry,
@@ -222,71 +167,77 @@ class FleetRun:
             software(own),
             model,
             fold,
-            recorded=keep != "none",
-            required=keep == "all",
+            recorded=self.config.fleet.keep != "none",
             retry=self.retry,
         )
 
-    def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
-        """Return the tasks of drives that are not done, or whose worker ended before its end.
+    def _of(self, entry: DriveEntry) -> RunConfig:
+        """Return the configuration of a drive."""
+        return replace(entry.config(self.config), fleet=FleetSettings())
 
-        A URL is looked at by its worker.
-        """
+    def _by_model(self) -> Iterator[DriveTask]:
+        """Yield the tasks of drives that one model scores, or that train their own."""
+        digest, model = "", self.config.training.model
+        if model:
+            try:
+                digest = sha256_of(Path(model))
+            except OSError as error:
+                raise FleetError(f"{model}: cannot read the model: {error.strerror}") from error
+        for entry in self.entries:
+            yield self._task(entry, self._of(entry), digest, None)
+
+    def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
+        """Return the tasks of drives that are not done. A URL is looked at by its worker."""
         waiting = []
         for task in tasks:
-            ours = task.entry.path is not None and not attempts(task).exists()
-            record = valid_record(task) if ours else None
+            record = valid_record(task) if task.entry.path is not None else None
             if record is None:
                 waiting.append(task)
             else:
                 self.done[record.drive] = done(record, repeated=True)
         return waiting
 
-    def _worst(self) -> list[str] | None:
-        """Return the drives so far whose recordings are kept for their ERR; None if all or none."""
+    def _kept(self) -> list[str]:
+        """Return the drives so far whose recordings are kept: those with the highest ERR."""
         keep = self.config.fleet.keep
-        if not keep.startswith("worst:"):
-            return None
+        most = {"all": len(self.done), "none": 0}.get(keep)
         scored = [each for each in self.done.values() if each.err is not None]
         worst = sorted(scored, key=lambda each: (-(each.err or 0), each.drive))
-        return [each.drive for each in worst[: int(keep.removeprefix("worst:"))]]
+        most = int(keep.removeprefix("worst:")) if most is None else most
+        return [each.drive for each in worst[:most]]
 
     def _unrecorded(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
-        """Return the tasks of the worst drives whose recordings an earlier command has not kept."""
-        worst = self._worst()
-        if not worst or self.config.output.record == "none":
-            return []
+        """Return the tasks of drives whose recordings an earlier command has not kept."""
+        kept = {*self._kept()} if self.config.output.record != "none" else {}
         return [
             replace(task, required=True)
             for task in tasks
-            if task.entry.id in worst and not recording_path(self.folder, task.entry.id).exists()
+            if task.entry.id in kept and not recording_path(self.folder, task.entry.id).exists()
         ]
 
     def _prune(self) -> None:
         """Remove recordings that are not kept, as drives are done: they take the most room."""
-        worst = self._worst()
-        if worst is None:
+        if not self.config.fleet.keep.startswith("worst:"):
             return
         # Once dropped a drive stays so, for more are done and none fewer.
-        for drive in self.done.keys() - set(worst) - self.pruned:
+        for drive in self.done.keys() - set(self._kept()) - self.pruned:
             self.pruned.add(drive)
             with suppress(OSError):
                 recording_path(self.folder, drive).unlink(missing_ok=True)
 
-    @contextmanager
-    def _engine(self, executor: Executor | None) -> Iterator[Executor]:
-        if executor is not None:
-            yield executor
-            return
-        asked = self.config.fleet
-        with started(asked.workers, asked.memory_gib, asked.scheduler) as (workers, count):
+    def _engine(self) -> Executor:
+        """Return who does the tasks."""
+        if self.executor is None:
+            asked = self.config.fleet
+            starting = started(asked.workers, asked.memory_gib, asked.scheduler)
+            self.executor, count = self.stack.enter_context(starting)
             self.workers = max(count, 1)
-            yield workers
+        return self.executor
 
-    def _by_fold(self, engine: Executor, configs: Mapping[str, RunConfig]) -> list[DriveTask]:
+    def _by_fold(self, count: int) -> list[DriveTask]:
         """Train the folds' models, and return the tasks of the drives with them."""
-        settings, count = self.config, self.config.fleet.folds
-        assert count is not None
+        settings, engine = self.config, self._engine()
+        configs = {entry.id: self._of(entry) for entry in self.entries}
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
         asked = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
@@ -321,8 +272,11 @@ class FleetRun:
         except Exception as error:
             return FoldModel(fold, "", self._reason(error, f"the model of fold {fold} was trained"))
 
-    def _replay(self, engine: Executor, tasks: Sequence[DriveTask]) -> None:
+    def _replay(self, tasks: Sequence[DriveTask]) -> None:
         """Replay the tasks' drives, and take each result as it comes."""
+        if not tasks:
+            return
+        engine = self._engine()
         self.show("replaying")
         waiting = {engine.submit(replay_drive, task): task for task in tasks}
         try:

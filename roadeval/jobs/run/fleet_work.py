@@ -25,10 +25,9 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import final_stages
 from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.fleet.remote import stamp
-from roadeval.jobs.run.prepared import asked, content_of, software
+from roadeval.jobs.run.prepared import asked, software
 from roadeval.jobs.run.replay import replay
 from roadeval.jobs.run.train import draw
-from roadeval.logs import METADATA
 from roadeval.recording import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
 from roadeval.results.facts import json_text
@@ -94,7 +93,6 @@ class Done:
     drive: str
     status: str
     reason: str
-    frames: int
     asked: str
     """What its record was made for."""
     err: float | None
@@ -118,40 +116,32 @@ def replay_drive(task: DriveTask) -> Done:
     with ending_the_run(task.folder), alone(*own):
         record, repeated = valid_record(task), True
         if record is None:
-            record, repeated = _made(task)
+            record, repeated = _made(task), False
             record.write(task.folder)
-        attempts(task).unlink(missing_ok=True)
         return done(record, repeated=repeated)
 
 
 def valid_record(task: DriveTask) -> Record | None:
     """Return the record of a drive that needs not be replayed: it is whole, and nothing changed."""
-    record = _usable(task)
-    if record is None:
-        return None
-    now = seen(task.entry, task.config)
-    return record if record.stamp == now and (record.failed or now is not None) else None
-
-
-def _usable(task: DriveTask) -> Record | None:
-    """Return the record of a drive that needs not be replayed if its log is the same."""
     record = read_record(task.folder, task.entry.id)
     if record is None or record.asked != task.asked or not record.is_whole(task.folder):
         return None
     if record.failed and task.retry:
         return None
-    lacking = task.required and not recording_path(task.folder, record.drive).exists()
-    return None if lacking and record.value("evaluated") else record
+    if task.required and not recording_path(task.folder, record.drive).exists():
+        return None
+    now = seen(task.entry, task.config)
+    return record if record.stamp == now and (record.failed or now is not None) else None
 
 
 def done(record: Record, *, repeated: bool = False) -> Done:
     """Return what a record says to the fleet's command."""
-    status, reason, frames = (record.value(name) for name in ("status", "reason", "evaluated"))
     names = TABLES["scores"].names
     rows = (dict(zip(names, row, strict=True)) for row in record.rows["scores"])
     # The mean ERR of the first variant's final mask.
     err = next((row["ERR"] for row in rows if row["final"] and row["region"] == ALL), None)
-    return Done(record.drive, status, reason or "", frames or 0, record.asked, err, repeated)
+    status, reason = record.value("status"), record.value("reason") or ""
+    return Done(record.drive, status, reason, record.asked, err, repeated)
 
 
 def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
@@ -163,7 +153,6 @@ def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
         "status": FAILED,
         "exit_code": exit_code,
         "reason": reason,
-        "attempts": _begun(task),
         "fold": task.fold,
         "model": task.model or None,
     }
@@ -172,40 +161,22 @@ def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
     return Record(task.entry.id, task.asked, seen(task.entry, task.config), rows)
 
 
-def attempts(task: DriveTask) -> Path:
-    """Return the file that counts how often a drive was begun since it was last done."""
-    return record_path(task.folder, task.entry.id).with_suffix(".begun")
-
-
-def _begun(task: DriveTask) -> int:
-    try:
-        return int(attempts(task).read_text())
-    except (OSError, ValueError):
-        return 0
-
-
 def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
     """Return what shows at little cost that a drive's log, or masks beside it, did not change.
 
-    Plain data by file: what differs may have changed, and is read whole then. None where it cannot
-    be looked at: the error is reported where it is read.
+    Plain data by file: size and times, or of a URL size and tag. None where it cannot be looked at:
+    the error is reported where it is read.
     """
     beside = [own for own in (config.truth, *config.masks.values()) if own.path]
     try:
         files = [file for own in beside for file in logs.label_files(own)]
+        found: dict[str, Any] = {}
         if entry.path is None:
-            found: dict[str, Any] = {
-                # Without a tag nothing shows: it is equal to no other.
-                name: [size, tag or secrets.token_hex()]
-                for name, (size, tag) in stamp(entry.source).items()
-            }
-        elif entry.path.is_dir():
-            note = entry.path / METADATA
-            found = {METADATA: note.read_text(errors="replace") if note.exists() else None}
-            files += sorted(entry.path.glob("*.mcap"))
+            # Without a tag nothing shows: it is equal to no other.
+            for name, (size, tag) in stamp(entry.source).items():
+                found[name] = [size, tag or secrets.token_hex()]
         else:
-            found = {}
-            files.append(entry.path)
+            files += sorted(entry.path.iterdir()) if entry.path.is_dir() else [entry.path]
         facts = {str(file): file.stat() for file in files}
         return found | {n: [f.st_size, f.st_mtime_ns, f.st_ctime_ns] for n, f in facts.items()}
     except (OSError, RoadevalError):
@@ -224,29 +195,18 @@ def _check(asking: Mapping[str, str], config: RunConfig) -> None:
             )
 
 
-def _made(task: DriveTask) -> tuple[Record, bool]:
-    """Return a drive's record, and whether it is an earlier one: its log only looked changed.
-
-    Whatever is wrong with the drive becomes its record.
-    """
-    before, earlier = seen(task.entry, task.config), _usable(task)
-    attempts(task).write_text(str(_begun(task) + 1))
+def _made(task: DriveTask) -> Record:
+    """Return a drive's record; whatever is wrong with the drive stands in it."""
+    before = seen(task.entry, task.config)
     try:
-        if (
-            earlier is not None
-            and not earlier.failed
-            and (earlier.stamp or {}).get(METADATA) == (before or {}).get(METADATA)
-            and content_of(task.entry.source, task.config, task.model) == earlier.value("identity")
-        ):
-            return replace(earlier, stamp=before), True
-        return _replayed(task, before), False
+        return _replayed(task, before)
     except Exception as error:
         if _disk_failure(error):
             raise
         known = isinstance(error, RoadevalError) or memory.is_lacking(error)
         said = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
         reason = said if known else f"{type(error).__name__}: {said} (a defect of roadeval)"
-        return failed(task, reason, 1 if known else 70), False
+        return failed(task, reason, 1 if known else 70)
 
 
 def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
@@ -278,7 +238,6 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
                 task.config, task.model, of=outcome.facts.log_digest or "", masks=masks
             ),
             "size_bytes": _size_of(task.entry),
-            "attempts": _begun(task),
             "seconds": time.perf_counter() - started,
             "peak_memory_mib": memory.peak_mib(),
         }
@@ -509,10 +468,8 @@ class FrameGatherer:
         frame, err = result.frame, tally.rates["ERR"]
         near = [w for w in self._worst if abs(w[0]["stamp_ns"] - frame.stamp_ns) < APART_NS]
         rest = [w for w in self._worst if w not in near]
-        bound = max((row["ERR"] for row, _ in near), default=-1.0)
-        if len(rest) == WORST:
-            bound = max(bound, min(row["ERR"] for row, _ in rest))
-        if math.isnan(err) or err <= bound:
+        rivals = [*near, *(rest[-1:] if len(rest) == WORST else [])]
+        if math.isnan(err) or any(row["ERR"] >= err for row, _ in rivals):
             return
         # Painted when they are small: most are soon replaced by a worse frame's.
         image, errors = shrink(frame.image, WIDTH), result.errors[tally.variant].array

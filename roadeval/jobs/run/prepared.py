@@ -22,7 +22,6 @@ from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import BlindPrior, Scoreboard
-from roadeval.fleet import readable
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.pipeline.chain import Chain
@@ -345,23 +344,6 @@ def asked(
     parts = [settings.as_dict(), software(config), of, model, masks or {}]
     text = json.dumps(parts, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
-
-
-def content_of(drive: str, config: RunConfig, model: str) -> str | None:
-    """Return the `identity` of a replay of a drive, whose log is read whole.
-
-    None if it cannot be, is damaged, or has messages without a checksum, for its digest does not
-    show whether these have changed.
-    """
-    try:
-        with logs.open_log(readable(drive), config) as log:
-            log.verify()
-            if log.damage or not log.is_covered:
-                return None
-            masks = log.select().digests() if config.masks or config.truth.path else {}
-            return asked(config, model, of=log.digest, masks=masks)
-    except RoadevalError:
-        return None
 
 
 class Encoder(Protocol):

@@ -151,7 +151,7 @@ def test_a_report_of_any_number_of_drives_has_few_pages(tmp_path, count, most):
 
 
 def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path, monkeypatch):
-    reason = {"attempts": 1, "evaluated": 0, "status": "failed", "exit_code": 1, "reason": "no"}
+    reason = {"evaluated": 0, "status": "failed", "exit_code": 1, "reason": "no"}
     monkeypatch.setattr(
         making,
         "_broken",

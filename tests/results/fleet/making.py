@@ -74,7 +74,7 @@ def _member(i, *, grouped):
 
 def _broken(i, member):
     """Return the rows of a drive that failed or has no truth; None of the others."""
-    row = {"drive": member.drive, "attempts": 1, "evaluated": 0}
+    row = {"drive": member.drive, "evaluated": 0}
     if i % 10 == 7:
         reason = REASONS[i // 10 % 2].format(f"{member.name}.mcap")
         own = row | {"status": "failed", "exit_code": 1, "reason": reason}
@@ -97,7 +97,6 @@ def _scored(i, drive, masks, *, lost):
         "status": "damaged" if lost else "scored",
         "exit_code": 3 if lost else 0,
         "losses": f"frame {i} cannot be decoded\n3 records are cut off" if lost else None,
-        "attempts": 1,
         "seconds": 10.0 + i % 7,
         "log_digest": f"{i:064x}",
         "size_bytes": 10**6,
