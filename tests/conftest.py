@@ -24,7 +24,6 @@ if find_spec("roadeval.kernels._loops") is None:
     os.environ["ROADEVAL_PLAIN"] = "1"
 
 # On GitHub the comparisons of the tests would stand on the page of the job.
-os.environ.pop("GITHUB_STEP_SUMMARY", None)
 
 
 # What is imported and collected stays to the end: nothing of it is searched for again and again.

@@ -98,7 +98,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _run(arguments)
     streams.take_over(debug=debug())
-    streams.leave_word(f"{messages.PROGRAM}: error: {with_flags(memory.LACKING)}")
     gc.set_threshold(COLLECT_EVERY)
     # NumPy and SciPy bring an OpenBLAS each, whose threads spin for a twentieth of a second of a
     # core before they first sleep, and reserve 40 MB of addresses each. No matrix here needs them.

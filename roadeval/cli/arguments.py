@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from roadeval.config import RunConfig, Variant
     from roadeval.jobs.results.result import Result as Result_
     from roadeval.logs import LogConfig
-    from roadeval.report.pdf.typeset import Paper
 
 
 def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
@@ -34,16 +33,6 @@ Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
 Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
 Json = Annotated[bool, option("--json", "Print the result on stdout as JSON.")]
 Quiet = Annotated[bool, option("-q --quiet", "No progress and no table; warnings stay.")]
-PaperSize = Annotated[str, option("--paper", "Default: a4.", "a4|letter", show_default=False)]
-
-
-def paper_of(size: str) -> Paper:
-    """Return the size of paper; one that is not known is wrong usage."""
-    from roadeval.report.pdf.typeset import Paper
-
-    if size not in [*Paper]:
-        raise typer.BadParameter(f"{size!r} is none of {', '.join(Paper)}")
-    return Paper(size)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final, TextIO, cast
@@ -26,19 +26,8 @@ then."""
 _PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
-STEP_SUMMARY: Final = "GITHUB_STEP_SUMMARY"
-"""Names the file that GitHub shows on the page of a job."""
-
-
 class OutputError(RoadevalError):
     """Standard output cannot be written: it is closed, or on a full disk."""
-
-
-def to_step_summary(markdown: Callable[[], str]) -> None:
-    """Append Markdown to the file that GitHub shows on the page of a job, where there is one."""
-    if place := os.environ.get(STEP_SUMMARY):
-        with Path(place).open("a", encoding="utf-8") as file:
-            file.write(markdown())
 
 
 def diagnostics() -> Console:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import atexit
-import ctypes
 import faulthandler
 import logging
 import os
 import sys
 import warnings
-from contextlib import suppress
 from io import BufferedWriter, FileIO, TextIOWrapper
 from typing import Any, Final
 
@@ -33,21 +30,6 @@ def take_over(*, debug: bool) -> None:
         sys.stdout.reconfigure(errors=UNENCODABLE)
     for name in MISLEADING:
         os.environ.pop(name, None)
-
-
-def leave_word(sentence: str) -> None:
-    """Write a sentence if a C library ends the process: OpenBLAS does so where memory is short.
-
-    C itself writes at its `exit` what waits in its open files. No Python runs then.
-    """
-    with suppress(OSError, TypeError, AttributeError):  # Windows has no C library of no name
-        libc = ctypes.CDLL(None)
-        libc.fdopen.restype = ctypes.c_void_p
-        number = os.dup(sys.stderr.fileno())
-        file = ctypes.c_void_p(libc.fdopen(number, b"w"))
-        libc.setvbuf(file, None, 0, ctypes.c_size_t(4096))  # 0: whole buffers, not lines
-        libc.fputs(f"{sentence}\n".encode(), file)
-        atexit.register(os.close, number)
 
 
 def taken_over() -> bool:

@@ -157,7 +157,7 @@ def identity(source: str) -> str:
     """Return the identity of a drive: a word of its name, and a digest of its source.
 
     >>> identity("s3://bucket/monday, rain.mcap")
-    'monday_rain-39c9a6a7'
+    'monday_rain-0195e6ef61ad'
     """
     word = as_plain(stem_of(source))[:LONGEST].strip("-_")
     digest = blake2b(source.encode(errors="surrogateescape"), digest_size=DIGEST)

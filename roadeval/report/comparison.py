@@ -46,9 +46,6 @@ NAMED: Final = 20
 """Drives that a table of changed ones names, of each mask."""
 CHANGE: Final = ("base %", "new %", "change pp", "interval pp")
 """The titles of a change."""
-LONGEST: Final = 65_536
-"""Characters of a comment on GitHub."""
-_CUT: Final = "\nThe rest is left out here: `roadeval compare -o changes.md` writes all of it.\n"
 _COMMAND: Final = "in the viewer"
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp")
 """The columns that hold words, beside the commands."""
@@ -93,17 +90,10 @@ def document(
     )
 
 
-def markdown(
-    comparison: Comparison, judgements: Sequence[Judgement], longest: int | None = None
-) -> str:
-    """Return a comparison as Markdown, perhaps of so many characters at most."""
+def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
+    """Return a comparison as Markdown."""
     blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
-    text = f"# {_title(judgements)}\n\n{written(blocks)}"
-    if longest is None or len(text) <= longest:
-        return text
-    begin = text[: longest - len(_CUT)]
-    whole = begin.rfind("\n") + 1  # lines; a single long one is cut within
-    return (begin[:whole] if 2 * whole > longest else begin) + _CUT
+    return f"# {_title(judgements)}\n\n{written(blocks)}"
 
 
 def _title(judgements: Sequence[Judgement]) -> str:

@@ -72,14 +72,6 @@ def test_what_ends_the_process_is():
     assert b"Abort" in crashed.stderr
 
 
-def test_a_library_that_ends_the_process_leaves_one_line():
-    """So does OpenBLAS, where memory is short."""
-    ended = run("__import__('ctypes').CDLL(None).exit(1)")
-    assert ended.returncode == ExitCode.FAILED
-    assert ended.stderr.startswith(b"roadeval: error: not enough memory: give it more")
-    assert ended.stderr.count(b"\n") == 1
-
-
 def test_text_is_escaped_in_every_encoding_of_the_streams():
     assert run(SAYS).stdout.decode() == "größe \\udce9 \\u001b[2J\n"
     plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}

@@ -94,10 +94,7 @@ def test_ci_gets_a_case_a_condition_as_junit(demo, worse, tmp_path):
     assert limited.find("system-out").text.endswith("> 99% does not hold")
 
 
-def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(
-    demo, worse, tmp_path, monkeypatch
-):
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
+def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tmp_path):
     files = ("-o", tmp_path / "c.md", "--junit", tmp_path / "c.xml", "-q")
     words = ("--fail-if", "post.filterd.ERR > +0.5pp", "--fail-if", "post.filtered.ERR > 99%")
     run = here("compare", demo.recording, worse.reports, *words, *files)
@@ -110,28 +107,10 @@ def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(
     suite = ElementTree.parse(tmp_path / "c.xml").getroot()
     assert (suite.get("errors"), suite.get("failures")) == ("1", "0")
     assert suite.find("testcase/error").get("message") == why
-    for name in ("c.md", "summary.md"):
-        title, _, heading, _, reason, *_ = (tmp_path / name).read_text().splitlines()
-        assert title.lstrip("# ") == "roadeval: failed, 1 of 2 limits not judged"
-        assert (heading, why.partition(":")[0].replace(">", "\\>") in reason) == (
-            "**Not judged**",
-            True,
-        )
-
-
-def test_the_summary_of_a_job_on_github_is_appended(fleets, tmp_path, monkeypatch):
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
-    (tmp_path / "summary.md").write_text("before\n")
-    content = json.loads(here("compare", *fleets, "--json").stdout)
-    text = (tmp_path / "summary.md").read_text()
-    assert text.startswith("before\n# roadeval comparison\n")
-    assert content["verdict"].split(";")[0] in text
-    assert "| filtered | " in text
-    changed = [each["drive"] for each in content["drives"] if each["changed"]]
-    assert len(changed) == 3
-    assert all(drive.replace("_", "\\_") in text for drive in changed)
-    here("compare", *fleets, "-q")
-    assert (tmp_path / "summary.md").read_text().count("# roadeval comparison\n") == 2
+    title, _, heading, _, reason, *_ = (tmp_path / "c.md").read_text().splitlines()
+    assert title == "# roadeval: failed, 1 of 2 limits not judged"
+    assert heading == "**Not judged**"
+    assert why.partition(":")[0].replace(">", "\\>") in reason
 
 
 def test_the_variants_of_one_recording_are_compared_with_each_other(demo):

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -224,32 +223,6 @@ def test_the_commands_that_are_not_run_have_these_options(page):
         for line in re.findall(r"^\$ roadeval (.*)$", block["text"], re.MULTILINE):
             name, *words = shlex.split(line, comments=True)
             group.commands[name].make_context(name, words)
-
-
-@pytest.mark.parametrize(
-    ("conditions", "code", "failures"),
-    [("", 0, 0), ("post.filtered.ERR > 99%\npost.filtered.ERR > +9pp", 0, 0), (HOLDS, 4, 1)],
-)
-def test_the_action_judges_every_condition_and_leaves_a_comment(
-    conditions, code, failures, world, tmp_path
-):
-    action = yaml.safe_load((ROOT / ".github/actions/roadeval/action.yml").read_text())
-    install, compare = action["runs"]["steps"]
-    assert install["run"].endswith('"$GITHUB_ACTION_PATH/../../.."')
-    given = {name: about.get("default") for name, about in action["inputs"].items()}
-    given |= {"base": str(world / "old.rrd"), "new": str(world / "new.rrd"), "fail-if": conditions}
-    words = {
-        name: re.sub(r"\$\{\{ inputs\.([\w-]+) \}\}", lambda m: given[m[1]], value)
-        for name, value in compare["env"].items()
-    }
-    summary = tmp_path / "summary.md"
-    shell = ("bash", "--noprofile", "--norc", "-eo", "pipefail", "-c")
-    run(tmp_path, *shell, compare["run"], code=code, GITHUB_STEP_SUMMARY=str(summary), **words)
-    suite = ElementTree.parse(tmp_path / "roadeval.xml").getroot()
-    assert len(suite) == 1 + len(conditions.splitlines())
-    assert suite.get("failures") == str(failures)
-    assert summary.read_text() == (tmp_path / "roadeval.md").read_text()
-    assert summary.read_text().startswith("# roadeval")
 
 
 def test_every_page_of_the_site_begins_with_an_example():

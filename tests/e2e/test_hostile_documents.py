@@ -37,15 +37,6 @@ def test_toml_that_nests_too_deep_is_one_line(tmp_path, words):
     assert done.stderr.count("\n") == 1
 
 
-def test_a_cell_of_a_manifest_that_nests_too_deep_is_text(tmp_path):
-    (tmp_path / "it.csv").write_text(f"path,frames.every\na.mcap,{'[' * 1_000}\n")
-    (tmp_path / "a.mcap").write_text("none")
-    done = here("fleet", "it.csv", "-o", "f", cwd=tmp_path)
-    assert done.returncode == 1
-    assert "every" in done.stderr
-    assert done.stderr.count("\n") == 1
-
-
 @pytest.fixture
 def folder(street, tmp_path):
     """A drive's results, to be changed."""

@@ -39,7 +39,7 @@ COMMANDS: Final = {
     "compare_variants": "compare printed -o variants.md -o variants.pdf",
     "report": "report paper.rrd -o paper.pdf",
     "report_folder": "report printed",
-    "report_unlabelled": "report unlabelled.rrd -o unlabelled.pdf --paper letter",
+    "report_unlabelled": "report unlabelled.rrd -o unlabelled.pdf",
     "train": "train tiny.mcap -o tiny.model --train-frames 4",
     "replay_json": "replay tiny.mcap --save model.rrd --reports model --model tiny.model "
     "--end 2.0 --record none --json",

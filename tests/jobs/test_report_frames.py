@@ -7,8 +7,7 @@ import pytest
 
 import roadeval
 from roadeval.jobs.results import compare
-from roadeval.jobs.results import frames as report_frames
-from roadeval.jobs.results.frames import bytes_of, strips_of
+from roadeval.jobs.results.frames import BYTES, bytes_of, strips_of
 from roadeval.jobs.results.report import page_of
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.findings import Findings
@@ -50,19 +49,12 @@ def test_every_variants_errors_and_layers_are_shown(recording):
         assert names[2:] == [f"{each}: errors" for each in layered(strip)]
 
 
-def test_a_page_has_as_many_pictures_as_keep_it_small(recording, monkeypatch):
-    whole = strips_of(DriveResult(recording))
-    monkeypatch.setattr(report_frames, "BYTES", sum(map(bytes_of, whole)) - 1)
-    strips = strips_of(DriveResult(recording))
+def test_a_page_has_as_many_pictures_as_keep_it_small(recording):
+    whole = strips_of(DriveResult(recording), BYTES)
+    room = sum(map(bytes_of, whole)) - 1
+    strips = strips_of(DriveResult(recording), room)
     assert len(strips) == len(whole) - 1
-    assert sum(map(bytes_of, strips)) <= report_frames.BYTES
-
-
-def test_who_asks_for_a_number_gets_it_with_all_layers(recording, monkeypatch):
-    monkeypatch.setattr(report_frames, "BYTES", 0)
-    strips = strips_of(DriveResult(recording), 5)
-    assert len(strips) == 5
-    assert len(layered(strips[0])) == 4
+    assert sum(map(bytes_of, strips)) <= room
 
 
 def test_a_comparisons_page_has_as_many_pictures_as_keep_it_small(recording, monkeypatch, tmp_path):

@@ -14,7 +14,7 @@ from roadeval.evaluation.comparison import (
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.report.blocks import BulletList, Figure, Heading, Table
 from roadeval.report.chart import Chart, ChartKind, Series, looks
-from roadeval.report.comparison import LONGEST, document, markdown
+from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
 from tests.evaluation import making
@@ -48,17 +48,6 @@ def over_drive():
     drawn = looks(["base: filtered", "new|er: filtered"])
     series = [Series(name, look, [4.5], [10.0]) for name, look in drawn.items()]
     return [Chart("ERR", ChartKind.LINES, series)]
-
-
-def test_a_comment_of_a_thousand_masks_still_fits_and_says_that_it_was_cut():
-    whole = markdown(a_comparison(), LIMITS, LONGEST)
-    assert whole.startswith("# roadeval: failed, 1 of 2 limits exceeded\n")
-    assert "left out here" not in whole
-    masks = tuple(replace(CHANGE, variant=f"variant_{number}") for number in range(1_000))
-    cut = markdown(making.a_comparison(*masks), LIMITS, LONGEST)
-    assert 65_000 < len(cut) <= LONGEST == 65_536
-    assert cut.endswith("writes all of it.\n")
-    assert FAILED.replace("|", "\\|").replace(">", "\\>") in cut
 
 
 def test_markdown_has_exceeded_limits_first_and_names_do_not_break_its_tables():

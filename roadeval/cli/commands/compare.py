@@ -55,7 +55,6 @@ def compare(
     fail_if: arguments.Conditions = None,
     output: Outputs = None,
     junit: Junit = None,
-    paper: arguments.PaperSize = "a4",
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -65,21 +64,18 @@ def compare(
     out. One drive is judged over its frames, several over drives. Results of different drives are
     put side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one
     cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
-    of the smaller one. Where $GITHUB_STEP_SUMMARY names a file, the comparison is appended to it
-    as Markdown.
+    of the smaller one.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
     from roadeval.jobs.results import compare as comparing
 
-    size = arguments.paper_of(paper)
     with holding(*(output or ()), *filter(None, [junit]), inputs=results):
         compared = comparing.attempt(results, variants=variant, fail_if=fail_if or [])
         for path in output or []:
-            comparing.write(compared, path, paper=size)
+            comparing.write(compared, path)
         if junit:
             comparing.write_junit(compared, junit)
-    console.to_step_summary(lambda: comparing.comment(compared))
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:

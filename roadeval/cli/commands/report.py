@@ -30,16 +30,6 @@ def report(
             callback=_ending,
         ),
     ] = None,
-    paper: arguments.PaperSize = "a4",
-    pictures: Annotated[
-        int | None,
-        arguments.option(
-            "--pictures",
-            "Of a page: frames with pictures. Default: as many as keep it below 10 MB.",
-            "N",
-            min=0,
-        ),
-    ] = None,
     camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -47,17 +37,14 @@ def report(
 
     Does the filter help, where are the errors, which stage broke it, and the frames to look at;
     from the recording alone, or from a results folder, then without pictures. A page is one file
-    that needs no network and no server; of a fleet its pictures lie in a folder beside it.
+    that needs no network and no server.
     """
-    from roadeval.jobs.results.report import is_page, write_report
+    from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result
 
-    size = arguments.paper_of(paper)
-    if pictures is not None and not (output and is_page(output)):
-        raise typer.BadParameter("--pictures goes with a page alone: -o FILE.html")
     opened = arguments.of_camera(Result(result), camera)
     with progress.watched(quiet) as watch:
-        path = write_report(opened, output, paper=size, pictures=pictures, on_progress=watch)
+        path = write_report(opened, output, on_progress=watch)
     if not quiet:
         console.emit(str(path))
     for warning in opened.warnings:

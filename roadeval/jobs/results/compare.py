@@ -31,7 +31,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
-from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.report.pdf.typeset import pdf, write_file
 from roadeval.report.sections.frames import FrameBrowser, FrameRow, browser, strip
 from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
@@ -165,14 +165,14 @@ def _labels(paths: Sequence[Path]) -> list[str]:
     return labels
 
 
-def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
+def write(compared: Compared, path: Path) -> Path:
     """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
 
     A `RoadevalError` if the ending is another, or the file cannot be written.
     """
     match path.suffix.lower():
         case ".pdf":
-            content = pdf(_document(compared), paper)
+            content = pdf(_document(compared))
         case ".html":
             content = as_page(compared)
         case ".md":
@@ -218,13 +218,6 @@ def write_junit(compared: Compared, path: Path) -> Path:
     A `RoadevalError` if the file cannot be written.
     """
     return write_file(path, junit_xml(compared.comparison, compared.judgements))
-
-
-def comment(compared: Compared) -> str:
-    """Return a comparison as Markdown that fits into one comment on a pull request."""
-    from roadeval.report.comparison import LONGEST, markdown
-
-    return markdown(compared.comparison, compared.judgements, LONGEST)
 
 
 def as_json(compared: Compared) -> str:

@@ -46,9 +46,9 @@ OUTCOMES: Final = 6
 LAYERS: Final = 2
 """Variants of which such a frame shows the errors, and all layers, on paper."""
 PICTURED: Final = 24
-"""Frames of a page with pictures, by default."""
+"""Frames of a page with pictures, at most."""
 BYTES: Final = 9_900_000
-"""Of a page, at most, where the number of frames with pictures is not given."""
+"""Of a page, at most."""
 SHADOW: Final = 1 / 3
 """A frame with much shadow is among this share of the drive's."""
 
@@ -317,20 +317,14 @@ def _much_shadow(result: DriveResult) -> set[int]:
     return set(first["frame"][much].tolist()) if np.ptp(first["N"]) else set()
 
 
-def strips_of(
-    result: DriveResult,
-    count: int | None = None,
-    taken: int = 0,
-    on_progress: OnProgress = ignore,
-) -> list[Strip]:
+def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
     """Return frames with their pictures, in the drive's order: the worst, the best, and others.
 
-    ``count`` is how many; by default as many of `PICTURED` as keep the page below `BYTES`, of which
-    ``taken`` are used without them.
+    At most `PICTURED`, and as many as have room in so many bytes of a page.
     """
     if result.recording is None:
         return []
-    chosen = _chosen(result, PICTURED if count is None else count)
+    chosen = _chosen(result, PICTURED)
     picker = FramePicker(result, None, None)
 
     def each() -> Iterator[Strip]:
@@ -338,8 +332,7 @@ def strips_of(
             yield picker.strip(frame)
             on_progress(Progress(done, len(chosen), "reading"))
 
-    shown = each() if count is not None else fitting(each(), BYTES - taken)
-    return sorted(shown, key=lambda each: each.frame)
+    return sorted(fitting(each(), room), key=lambda each: each.frame)
 
 
 def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:

@@ -14,13 +14,13 @@ from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
-from roadeval.jobs.results.frames import FramePicker, browsed, evenly, strips_of
+from roadeval.jobs.results.frames import BYTES, FramePicker, browsed, evenly, strips_of
 from roadeval.jobs.results.result import DriveResult, Result, RigResult
 from roadeval.report.blocks import Document
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings
 from roadeval.report.page.render import page, write_page
-from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.report.pdf.typeset import pdf, write_file
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import leads_outside
 
@@ -34,8 +34,6 @@ def write_report(
     result: str | Path | Result,
     output: str | Path | None = None,
     *,
-    paper: Paper = Paper.A4,
-    pictures: int | None = None,
     on_progress: OnProgress = ignore,
 ) -> Path:
     """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
@@ -50,8 +48,6 @@ def write_report(
     output
         By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
         in ``.html`` gives a page.
-    pictures
-        Frames with pictures on a page; by default as many as keep that of a drive below 10 MB.
     on_progress
         Called with each pictured frame of a page.
     """
@@ -63,8 +59,8 @@ def write_report(
     path = Path(output or usual or _beside(source, camera))
     with holding(path, inputs=[source]):
         if not is_page(path):
-            return write_file(path, pdf(document(findings_of(opened)), paper))
-        return write_page(path, page_of(opened, pictures, on_progress))
+            return write_file(path, pdf(document(findings_of(opened))))
+        return write_page(path, page_of(opened, on_progress))
 
 
 def findings_of(result: Result) -> Findings | FleetFolder:
@@ -90,19 +86,14 @@ def is_page(path: Path) -> bool:
     return path.suffix.lower() in PAGES
 
 
-def page_of(
-    result: Result, pictures: int | None = None, on_progress: OnProgress = ignore
-) -> Document:
-    """Return the page of a result as a document, with so many pictured frames.
-
-    Of a drive by default as many as `roadeval.jobs.results.frames.strips_of` says.
-    """
+def page_of(result: Result, on_progress: OnProgress = ignore) -> Document:
+    """Return the page of a result as a document, with its most telling frames."""
     findings = findings_of(result)
     if result.drive is None:
-        return page_document(findings, None, pictures or PICTURED_OF_FLEET)
+        return page_document(findings, None, PICTURED_OF_FLEET)
     frames = browsed(result.drive)
-    taken = len(page(page_document(findings, frames))) if pictures is None else 0
-    strips = strips_of(result.drive, pictures, taken, on_progress)
+    room = BYTES - len(page(page_document(findings, frames)))
+    strips = strips_of(result.drive, room, on_progress)
     return page_document(findings, replace(frames, strips=strips))
 
 

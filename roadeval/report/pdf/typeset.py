@@ -14,7 +14,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
@@ -38,28 +37,18 @@ _FIGURE: Final = b"""
 """
 
 
-class Paper(StrEnum):
-    """Paper sizes."""
-
-    A4 = "a4"
-    LETTER = "letter"
-
-
-_TYPST_NAMES: Final = {Paper.A4: "a4", Paper.LETTER: "us-letter"}
-
-
 class ReportError(RoadevalError):
     """The document cannot be written."""
 
 
-def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
+def pdf(document: Document) -> bytes:
     """Return a document as PDF; equal documents give equal bytes.
 
     Fonts are Typst's own and, for the figures, DejaVu Sans; never the machine's, so that a document
     looks the same everywhere. A letter that none of them has is an empty box.
     """
     inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
-    data = _visible(document.as_json() | {"paper": _TYPST_NAMES[paper], "colours": inks})
+    data = _visible(document.as_json() | {"colours": inks})
     template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
     return _compiled(template, {"document.json": json.dumps(data).encode(), **document.files()})
 

@@ -22,7 +22,7 @@ from roadeval.report.blocks import (
     TwoColumns,
 )
 from roadeval.report.chart import Chart, ChartKind, Level, Look, Series, looks
-from roadeval.report.pdf.typeset import Paper, ReportError, pdf
+from roadeval.report.pdf.typeset import ReportError, pdf
 from tests.report.making import a_document, reader, text
 
 HOSTILE = '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw` [c] \\ // # = - "quoted" ${x}'
@@ -171,12 +171,6 @@ def parts(element):
     for each in inner if isinstance(inner, list) else [inner]:
         if hasattr(each.get_object(), "keys") and "/S" in each.get_object():
             yield from parts(each)
-
-
-@pytest.mark.parametrize(("paper", "width"), [(Paper.A4, 595), (Paper.LETTER, 612)])
-def test_paper_has_its_size(paper, width):
-    (page,) = reader(pdf(a_document(Text("x")), paper)).pages
-    assert int(page.mediabox.width) == width
 
 
 def test_every_font_is_embedded():
