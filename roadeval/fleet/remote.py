@@ -18,7 +18,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from datetime import timedelta
-from http import HTTPStatus
 from os import PathLike
 from pathlib import Path, PurePosixPath
 from threading import Thread
@@ -45,37 +44,26 @@ Answer = TypeVar("Answer")
 TIMES: Final[dict[str, str]] = {"connect_timeout": "10s", "read_timeout": "30s", "timeout": "1d"}
 """Limits: of connecting, of waiting for the next bytes, and of the whole answer."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4, "retry_timeout": timedelta(minutes=2)}
-_PREFIXES: Final = {"s3": "AWS_", "gs": "GOOGLE_"}
-_OPTIONS: Final = (
-    *("allow_http", "allow_invalid_certificates", "connect_timeout", "proxy_url", "read_timeout"),
-    *("proxy_ca_certificate", "proxy_excludes", "timeout", "user_agent"),
-)
-"""Options of connections in the environment, as AWS_PROXY_URL. obstore itself ignores them where
-any option is given."""
 _PART: Final = 64 << 10
 """Least bytes of a part that is read: a chunk's message indexes, and the next one's head."""
 _PATIENCE_S: Final = 0.2
 """Between two looks whether an answer has come."""
-_NAME: Final = 100
-"""Letters of a file's name that are kept."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
 _REASONS: Final = (
+    (r"169\.254\.169\.254|metadata\.google\.internal", "no credentials in the environment"),
+    (r"NotFound\b|status code: 404", "there is no such file"),
+    (r"PermissionDenied|status code: 403", "the server denies access"),
+    (r"Unauthenticated|status code: 401", "the server asks who you are"),
+    (r"Precondition", "it changed while it was read"),
+    (r"non-2xx status code: (\d+)", "the server cannot give it"),
     (r"dns error", "no host of this name is known"),
     (r"ConnectionRefused|kind: Connect\b", "the host cannot be reached"),
     (r"BadScheme", "the endpoint is without TLS, which only AWS_ALLOW_HTTP=true allows"),
     (r"TimedOut|kind: Timeout|timed out", "the server stopped answering"),
     (r"RangeNotSupported", NO_PARTS),
     (r"Content-Length", "the server does not state its length"),
-    (r"Precondition", "it changed while it was read"),
-    (r"kind: (Body|Decode|Interrupted)|IncompleteMessage|UnexpectedEof", "ended early"),
 )
-"""What obstore's messages mean."""
-_STATUSES: Final = {
-    401: "the server asks who you are",
-    403: "the server denies access",
-    404: "there is no such file",
-    412: "it changed while it was read",
-}
+"""What obstore's messages and errors mean; the first that is found."""
 
 
 def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
@@ -234,9 +222,7 @@ def _facts(place: _Place) -> tuple[int, str | None]:
 def _file_name(url: str) -> str:
     """Return the name of a file: as in the URL, as far as every system allows it."""
     name = re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|]', "_", last_part(url))
-    stem, dot, suffix = name.rpartition(".")
-    short = f"{stem[:_NAME]}{dot}{suffix[:_NAME]}" if stem else name[:_NAME]
-    return short if short.strip(".") else "drive"
+    return name if name.strip(".") else "drive"
 
 
 def _place(url: str) -> _Place:
@@ -251,12 +237,12 @@ def _place(url: str) -> _Place:
         raise FleetError(
             f"{shown(url)}: URLs are read by obstore: pip install 'roadeval[remote]'"
         ) from error
-    if scheme in _PREFIXES:
+    if scheme in BUCKETS:
         bucket, key = bucket_and_key(url)
-        named = {each: f"{_PREFIXES[scheme]}{each.upper()}" for each in _OPTIONS}
-        given = {each: os.environ[name] for each, name in named.items() if os.environ.get(name)}
         kind = stores.S3Store if scheme == "s3" else stores.GCSStore
-        store = _ask(url, kind, bucket, client_options={**TIMES, **given}, retry_config=RETRIES)
+        # obstore ignores this variable where any option is given.
+        allowed = {**TIMES, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
+        store = _ask(url, kind, bucket, client_options=allowed, retry_config=RETRIES)
         return _Place(url, store, key, f"{scheme}://{bucket}/")
     parts = urlsplit(url)
     user, at, host = parts.netloc.rpartition("@")
@@ -293,16 +279,6 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
 
 
 def _reason(error: Exception) -> str:
-    text = str(error)
-    if re.search(r"169\.254\.169\.254|metadata\.google\.internal", text):  # of cloud machines
-        return (
-            "no credentials: the environment has them, as AWS_ACCESS_KEY_ID and "
-            "AWS_SECRET_ACCESS_KEY; AWS_SKIP_SIGNATURE=true reads a public bucket"
-        )
-    if match := re.search(r"non-2xx status code: (\d{3})", text):
-        status = int(match[1])
-        known = {each.value: each.phrase for each in HTTPStatus}
-        words = _STATUSES.get(status, "the server cannot give it")
-        return f"{words} ({status} {known.get(status, '')})"
+    text = f"{type(error).__name__} {error}"
     found = (words for pattern, words in _REASONS if re.search(pattern, text))
     return next(found, f"cannot be read ({type(error).__name__})")

@@ -81,7 +81,6 @@ def test_what_is_behind_a_url_is_read(server):
         ("whole/..%5Cup.mcap", ".._up.mcap"),
         ("whole/%2E%2E", "drive"),
         ("whole/a%00b%3A.mcap", "a_b_.mcap"),
-        ("whole/" + "x" * 300 + ".mcap", "x" * 100 + ".mcap"),
         ("whole/", "whole"),
     ],
 )
@@ -96,7 +95,7 @@ def test_a_signed_url_is_asked_with_its_query_and_not_shown_with_it(server):
     assert (log.path, log.source) == (Path("a.mcap"), server.url("whole/a.mcap"))
     assert server.asked[0][1] == "/whole/a.mcap?sig=geheim%2F&x=1"
     message = refused(server.url("403/a.mcap?sig=geheim", user="me:geheim@"))
-    assert message == f"{server.url('403/a.mcap')}: the server denies access (403 Forbidden)"
+    assert message == f"{server.url('403/a.mcap')}: the server denies access"
 
 
 def test_user_and_password_of_a_url_are_sent(server):
@@ -108,10 +107,10 @@ def test_user_and_password_of_a_url_are_sent(server):
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("401/a.mcap", "the server asks who you are (401 Unauthorized)"),
-        ("404/a.mcap", "there is no such file (404 Not Found)"),
-        ("410/a.mcap", "the server cannot give it (410 Gone)"),
-        ("503/a.mcap", "the server cannot give it (503 Service Unavailable)"),
+        ("401/a.mcap", "the server asks who you are"),
+        ("404/a.mcap", "there is no such file"),
+        ("410/a.mcap", "the server cannot give it"),
+        ("503/a.mcap", "the server cannot give it"),
         ("unknown/a.mcap", "the server does not state its length"),
         ("early/a.mcap", "the server gives no parts of files: copy it here"),
     ],
