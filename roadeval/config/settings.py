@@ -64,7 +64,5 @@ class FleetSettings:
     means that none is made."""
     workers: Annotated[int | None, Interval(ge=1, le=1000), Flag("--workers", "N")] = None
     """Processes that replay drives. Default: one per CPU core."""
-    memory_gib: Annotated[float | None, Interval(gt=0, le=100_000), Flag("--memory", "GIB")] = None
-    """What each process may take. Default: its share of the machine's."""
     scheduler: Annotated[str | None, Flag("--scheduler", "ADDRESS")] = None
     """A Dask scheduler, as ``tcp://host:8786``, or its file: its workers replay the drives."""

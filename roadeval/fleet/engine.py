@@ -7,7 +7,6 @@ survive the death of a worker; Dask's does, and starts the task again on another
 from __future__ import annotations
 
 import logging
-import math
 import os
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -40,15 +39,15 @@ _LOCAL: Final = {
 
 @contextmanager
 def started(
-    workers: int | None = None, memory_gib: float | None = None, scheduler: str | None = None
+    workers: int | None = None, scheduler: str | None = None
 ) -> Iterator[tuple[Executor, int]]:
     """Start worker processes here, or connect to a scheduler; yield who does tasks, and how many.
 
     At the end of the block tasks that still run are cancelled, and workers that were started here
     end. A `FleetError` if the scheduler does not answer. There are ``workers`` processes here, one
-    a processor by default. ``memory_gib`` is the limit of each, by default its share of the
-    machine's: a process that takes more is ended, which costs its drive one attempt. ``scheduler``
-    is the address of a Dask scheduler, ``tcp://host:8786``, or the file that it has written.
+    a processor by default. One that takes more than its share of the machine's memory is ended,
+    which costs its drive one attempt. ``scheduler`` is the address of a Dask scheduler,
+    ``tcp://host:8786``, or the file that it has written.
     """
     import dask.system
     import distributed
@@ -58,7 +57,7 @@ def started(
             stack.enter_context(_safe_path())
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or dask.system.CPU_COUNT
-            client = stack.enter_context(_local(distributed, count, memory_gib))
+            client = stack.enter_context(_local(distributed, count))
         else:
             client = stack.enter_context(_connected(distributed, scheduler))
             count = len(client.scheduler_info(n_workers=-1)["workers"])
@@ -91,15 +90,13 @@ def _safe_path() -> Iterator[None]:
 
 
 @contextmanager
-def _local(distributed: Any, count: int, memory_gib: float | None) -> Iterator[Any]:
-    limit = "auto" if memory_gib is None else math.floor(memory_gib * 2**30)
+def _local(distributed: Any, count: int) -> Iterator[Any]:
     with ExitStack() as stack:
         try:
             cluster = distributed.LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 processes=True,
-                memory_limit=limit,
                 host="127.0.0.1",
                 dashboard_address=None,
                 worker_dashboard_address=None,

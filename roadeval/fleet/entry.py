@@ -46,15 +46,11 @@ def scheme_of(url: str) -> str:
         raise FleetError(f"{shown(url)}: no scheme that is known; choose {known}")
     if scheme in ("https", "http"):
         try:
-            parts = urlsplit(url)
-            whole = bool(parts.hostname) and parts.port != 0
+            has_host = bool(urlsplit(url).hostname)
         except ValueError:
-            whole = False
-        if not whole:
-            raise FleetError(
-                f"{shown(url)}: no host in it; in a user's name or password write / ? # @ as "
-                "%2F %3F %23 %40"
-            )
+            has_host = False
+        if not has_host:
+            raise FleetError(f"{shown(url)}: no host in it")
     return scheme
 
 

@@ -49,19 +49,14 @@ class Outputs:
         )
 
     @contextmanager
-    def holding(self, inputs: Iterable[AnyPath | None]) -> Iterator[Path | None]:
-        """Hold them all, as `holding` does; yield the newest partial recording of an earlier run.
-
-        The older ones are removed.
-        """
+    def holding(self, inputs: Iterable[AnyPath | None]) -> Iterator[None]:
+        """Hold them all, as `holding` does; at the end partial recordings of earlier runs go."""
         with holding(self.recording, self.mcap, folder=self.reports, inputs=inputs) as certain:
             ours = certain and self.recording
             there = own_names(target_of(ours), hidden=False) if ours else []
-            newest = [each for each in there if each.is_file() and each.stat().st_size][-1:]
+            yield
             for each in there:
-                if each not in newest:
-                    remove(each)
-            yield newest[0] if newest else None
+                remove(each)
 
 
 @contextmanager

@@ -276,7 +276,6 @@ _OF_DRIVES: Final = (
             Column("exit_code", Kind.COUNT, "that `replay` of this drive alone ends with"),
             Column("reason", Kind.TEXT, "why it was not scored"),
             Column("seconds", Kind.NUMBER, "that the last attempt took"),
-            Column("peak_memory_mib", Kind.NUMBER, "the most memory that its process held"),
             Column(
                 "log_digest", Kind.NAME, "tells the log from another: of its index and checksums"
             ),
@@ -296,7 +295,6 @@ _OF_DRIVES: Final = (
             Column("warnings", Kind.TEXT, "warnings, a sentence a line"),
             Column("verdict", Kind.TEXT, "the verdict on this drive alone"),
             Column("model", Kind.NAME, "SHA-256 of the model file; empty if it trained its own"),
-            Column("identity", Kind.NAME, "digest of log, settings, model and software"),
         ),
     ),
     TableSchema(

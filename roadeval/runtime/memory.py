@@ -5,8 +5,6 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
-from contextlib import suppress
-from pathlib import Path
 from typing import Final
 
 LACKING: Final = (
@@ -41,22 +39,3 @@ def is_lacking(error: BaseException) -> bool:
     """
     said = isinstance(error, ImportError | RuntimeError) or type(error).__module__ == "cv2"
     return isinstance(error, MemoryError) or (said and bool(_LACKING.search(str(error))))
-
-
-def forget_peak() -> None:
-    """Reset the peak that `peak_mib` returns, where the system can; Linux can."""
-    with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-
-
-def peak_mib() -> float | None:
-    """Return the most memory that the process has held since `forget_peak`, in MiB.
-
-    None where the system does not say.
-    """
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    found = re.search(r"VmHWM:\s*(\d+) kB", status)
-    return int(found[1]) / 1024 if found else None

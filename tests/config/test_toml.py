@@ -61,7 +61,6 @@ OTHER = {
     "fleet.folds": 5,
     "fleet.keep": "worst:3",
     "fleet.workers": 2,
-    "fleet.memory_gib": 1.5,
     "fleet.scheduler": "tcp://host:8786",
 }
 """A value other than the default for every option of the command line."""

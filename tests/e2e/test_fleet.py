@@ -78,7 +78,7 @@ def run(drives, folder, *, executor=None, retry_failed=False, **fleet):
 
 def tables(folder):
     """The tables without what differs from run to run."""
-    clock = ("seconds", "peak_memory_mib")
+    clock = ("seconds",)
     read = {path.name: pq.read_table(path) for path in sorted(folder.glob("*.parquet"))}
     return {
         name: table.drop_columns([c for c in clock if c in table.column_names]).to_pylist()

@@ -229,7 +229,7 @@ class FleetRun:
         """Return who does the tasks."""
         if self.executor is None:
             asked = self.config.fleet
-            starting = started(asked.workers, asked.memory_gib, asked.scheduler)
+            starting = started(asked.workers, asked.scheduler)
             self.executor, count = self.stack.enter_context(starting)
             self.workers = max(count, 1)
         return self.executor

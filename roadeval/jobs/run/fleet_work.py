@@ -83,7 +83,7 @@ class DriveTask:
     @property
     def asked(self) -> str:
         """Digest of settings, software and model."""
-        return asked(self.config, self.model, of=str(self.fold))
+        return asked(self.config, self.model, self.fold)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +210,6 @@ def _made(task: DriveTask) -> Record:
 
 
 def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
-    memory.forget_peak()
     started = time.perf_counter()
     drive, folder = task.entry.id, task.folder
     record = task.config.output.record if task.recorded else "none"
@@ -227,19 +226,14 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
         gatherer.finish()
     if not outcome.facts.frames.evaluated:
         _remove(task, FRAMES)
-    masks = {name: each["digest"] for name, each in outcome.facts.masks.items()}
     row = (
         drive_row(outcome.facts, task.entry.name, task.entry.shown)
         | gatherer.facts()
         | {
             "fold": task.fold,
             "model": task.model or None,
-            "identity": asked(
-                task.config, task.model, of=outcome.facts.log_digest or "", masks=masks
-            ),
             "size_bytes": _size_of(task.entry),
             "seconds": time.perf_counter() - started,
-            "peak_memory_mib": memory.peak_mib(),
         }
     )
     own = {"drives": [row], **outcome.rows, "worst": [*gatherer.worst_rows()]}

@@ -323,26 +323,18 @@ def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None =
     fails.
     """
     model = config.training.model
-    digest = sha256_of(Path(model)) if model else ""
-    return asked(config, digest, of=log.digest, masks=masks)
+    return asked(config, sha256_of(Path(model)) if model else "", log.digest, masks or {})
 
 
-def asked(
-    config: RunConfig, model: str, *, of: str = "", masks: Mapping[str, Any] | None = None
-) -> str:
-    """Return a digest of the settings, the software and the SHA-256 of a model, in hexadecimal.
-
-    With ``of``, the digest of a log, and those of masks that lie beside it, it is that of all that
-    decides what a run finds.
-    """
-    plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
+def asked(config: RunConfig, model: str, *more: Any) -> str:
+    """Return a digest of settings, software, the SHA-256 of a model, and more, in hexadecimal."""
+    masks = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
     truth = replace(config.truth, path="", images=None)
     nowhere = "" if config.training.adapt else None  # wherever the file lies
     training = replace(config.training, model=nowhere)
-    settings = replace(deciding(config).without_places(), training=training, masks=plain)
-    settings = replace(settings, truth=truth)
-    parts = [settings.as_dict(), software(config), of, model, masks or {}]
-    text = json.dumps(parts, sort_keys=True)
+    settings = deciding(config).without_places()
+    settings = replace(settings, training=training, masks=masks, truth=truth)
+    text = json.dumps([settings.as_dict(), software(config), model, *more], sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 

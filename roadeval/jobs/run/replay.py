@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -98,14 +97,9 @@ def replay(
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
     with logs.open_log(readable(drive), config) as log:
         to = Outputs.of(config.output, log.name)
-        with to.holding((drive, config.training.model)) as left:
+        with to.holding((drive, config.training.model)):
             outcome = _written(log, config, to, on_progress, on_frame)
             warnings = (*outcome.warnings, *_unwritten(config, to))
-            if left is not None:
-                with suppress(OSError):
-                    left.unlink()
-                removed = f"removed {left}, the partial recording of an earlier run"
-                warnings = (*warnings, f"{removed}: this one is whole")
     return replace(outcome, warnings=warnings)
 
 
