@@ -89,10 +89,8 @@ def test_of_a_drive_that_was_not_kept_the_command_that_makes_its_recording_is_sa
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (["--frame", 3], 2, "--frame of a fleet needs its drive: --drive ID"),
-        (["--worst", 1, "--drive", "a"], 2, "--worst counts over all drives"),
+        (["--frame", 3], 2, "--frame does not go with a fleet"),
         (["--variant", "filtered"], 2, "--variant does not go with a fleet"),
-        (["--drive", "c"], 1, "no drive c; by that name there is c-"),
         (["--worst", 99], 1, "only the worst "),
     ],
 )

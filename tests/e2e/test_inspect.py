@@ -65,7 +65,7 @@ def told(monkeypatch, tmp_path, capsys):
 
 
 def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
-    said = f"frame {worst(demo)}, the worst (--frame N or --worst K takes another)\n"
+    said = f"frame {worst(demo)}, the worst with pictures (--frame N or --worst K takes another)\n"
     assert told(demo.recording) == said
     assert told(demo.recording, "--frame", "12") == "frame 12\n"
 
@@ -78,7 +78,7 @@ def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse
         for row in sparse.table("frames")
         if (row["variant"], row["stage"]) == ("filtered", "post") and int(row["frame"]) in pictured
     ]
-    said = f"frame {max(rows)[1]}, the worst that has pictures (--frame N or --worst K takes"
+    said = f"frame {max(rows)[1]}, the worst with pictures (--frame N or --worst K takes"
     assert told(sparse.recording).startswith(said)
 
 
@@ -138,7 +138,7 @@ def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
     first = int(rows["frame"][rows["disagreement"].argmax()])
     assert inspecting.worst(opened).frame == first
     assert inspecting.worst(opened, "unfiltered").by == "disagreement"
-    again = "the first to look at (--frame N or --worst K takes another)"
+    again = "the first to look at with pictures (--frame N or --worst K takes another)"
     assert told(unlabelled.recording) == f"frame {first}, {again}\n"
 
 

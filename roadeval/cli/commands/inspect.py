@@ -26,9 +26,6 @@ Variant = Annotated[
     str | None,
     arguments.option("--variant", "Whose failures count. Default: the first variant's.", "NAME"),
 ]
-Drive = Annotated[
-    str | None, arguments.option("--drive", "Of a fleet: open this drive, at --frame.", "ID")
-]
 Screenshot = Annotated[
     Path | None,
     arguments.option(
@@ -46,7 +43,6 @@ def inspect(
     frame: Frame = None,
     worst: Rank = None,
     variant: Variant = None,
-    drive: Drive = None,
     camera: arguments.Camera = None,
     screenshot: Screenshot = None,
     json: arguments.Json = False,
@@ -64,21 +60,14 @@ def inspect(
     from roadeval.jobs.results.result import Result
 
     opened = arguments.of_camera(Result(recording), camera)
-    if opened.fleet:
-        if variant is not None:
-            raise typer.BadParameter(
-                "--variant does not go with a fleet: its worst are the first's"
-            )
-        if frame is not None and drive is None:
-            raise typer.BadParameter("--frame of a fleet needs its drive: --drive ID")
-        if drive is not None and worst is not None:
-            raise typer.BadParameter("--worst counts over all drives; give it without --drive")
-    elif drive is not None:
-        raise typer.BadParameter("--drive goes with a fleet's folder alone")
+    if opened.fleet and variant is not None:
+        raise typer.BadParameter("--variant does not go with a fleet: its worst are the first's")
+    if opened.fleet and frame is not None:
+        raise typer.BadParameter("--frame does not go with a fleet: give its drive's recording")
     if listed:
         _list(opened, worst, variant, as_json=json)
     else:
-        _show(opened, drive, frame, worst, variant, file=screenshot)
+        _show(opened, frame, worst, variant, file=screenshot)
     for warning in opened.warnings:
         messages.warning(warning)
     return ExitCode.DONE
@@ -98,39 +87,22 @@ def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bo
 
 
 def _show(
-    opened: Result,
-    name: str | None,
-    frame: int | None,
-    rank: int | None,
-    variant: str | None,
-    *,
-    file: Path | None,
+    opened: Result, frame: int | None, rank: int | None, variant: str | None, *, file: Path | None
 ) -> None:
-    """Open the viewer at a frame of a drive, by its number or rank, or draw it into a file."""
+    """Open the viewer at a frame, by its number or rank, or draw it into a file."""
     from roadeval.jobs.results import inspect as job
-    from roadeval.jobs.results.result import DriveResult
 
     drive, of, why = opened.drive, "", ""
-    if opened.fleet:
-        if name is None:
-            worst = job.of_rank(opened, rank or 1)
-            name, frame = worst.drive, worst.frame
-        drive, of = DriveResult(job.recording_of(opened.fleet, name)), f"{name}, "
-        for warning in drive.warnings:
-            messages.warning(warning)
-    elif opened.rig:
+    if rank is not None or drive is None:
         found = job.of_rank(opened, rank or 1, variant)
-        if frame is None:
-            frame, of = found.frame, f"{found.camera}, "
-        drive = opened.cameras[found.camera].drive
-    elif rank is not None:
-        frame = job.of_rank(opened, rank, variant).frame
-    assert drive is not None
-    if file and frame is None and not of and (bad := job.worst(drive, variant)):
-        is_worst = bad.frame == job.of_rank(opened, 1, variant).frame
-        which = "the worst" if bad.by == "ERR" else "the first to look at"
-        which += "" if is_worst else " that has pictures"
-        frame, why = bad.frame, f", {which} (--frame N or --worst K takes another)"
+        drive, of = job.drive_of(opened, found)
+        frame = found.frame if frame is None else frame
+    elif file and frame is None and (bad := job.worst(drive, variant)):
+        which = "worst" if bad.by == "ERR" else "first to look at"
+        frame, why = (
+            bad.frame,
+            f", the {which} with pictures (--frame N or --worst K takes another)",
+        )
     if frame is not None and (sentence := job.without_pictures(drive, frame)):
         messages.warning(sentence)
     shown = job.view(drive, frame, file)

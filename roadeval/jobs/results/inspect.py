@@ -18,7 +18,6 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
-from roadeval.results.schema import FAILED
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -125,22 +124,24 @@ def _ranked(
     ]
 
 
+def drive_of(result: Result, frame: WorstFrame) -> tuple[DriveResult, str]:
+    """Return the drive of one of a result's worst frames, and how its frames are called there."""
+    if result.fleet:
+        return DriveResult(recording_of(result.fleet, frame.drive)), f"{frame.drive}, "
+    if result.rig:
+        return next(c for c in result.rig.cameras if c.camera == frame.camera), f"{frame.camera}, "
+    assert result.drive is not None
+    return result.drive, ""
+
+
 def recording_of(fleet: FleetFolder, drive: str) -> Path:
     """Return the recording of a fleet's drive.
 
-    A `RoadevalError` if there is no such drive, or its recording was not kept: it says how to make
-    one.
+    A `RoadevalError` if it was not kept, with the command that makes it.
     """
-    row = fleet.drives.get(drive)
-    if row is None:
-        alike = [other for other, own in fleet.drives.items() if own["name"] == drive]
-        hint = f"; by that name there is {', '.join(alike)}" if alike else ""
-        raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
     if (path := fleet.recording(drive)).exists():
         return path
-    source = visible(without_secrets(str(row["source"])))
-    if row["status"] == FAILED:
-        raise RoadevalError(f"{source}: has no recording, for it failed: {row['reason']}")
+    source = visible(without_secrets(str(fleet.drives[drive]["source"])))
     words = ["roadeval", "replay", source, "--config", str(fleet.results(drive) / RUN)]
     words += ["--record", "worst:10", "--save", str(path), "--reports", str(Path("reports", drive))]
     raise RoadevalError(f"{drive}: no recording was kept; make it with: {shlex.join(words)}")
