@@ -11,7 +11,6 @@ own rows and columns.
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -29,13 +28,6 @@ File = bytes | memoryview
 
 _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
-MOST_SCANS: Final = 100
-"""Most scans of a JPEG; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
-can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
-_SCAN: Final = b"\xff\xda"
-_END: Final = 0xD9
-_MARKER: Final = re.compile(rb"\xff[\xc0-\xcf\xd9-\xfe]")
-"""Markers that end a scan: in its data a byte 255 is followed by 0, or by a restart marker."""
 
 
 def to_rgb(data: File, limits: Limits) -> Rgb:
@@ -141,9 +133,6 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     import simplejpeg
 
     limits.check(*_jpeg_size(data))
-    # What lies in a segment or behind the image can look like a scan, so those are counted first.
-    if bytes(data).count(_SCAN) > MOST_SCANS and _scans(bytes(data)) > MOST_SCANS:
-        raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
     try:
         pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=True)
     except ValueError as error:
@@ -159,16 +148,6 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     except (ValueError, KeyError) as error:  # KeyError for a subsampling that has no name
         raise ImageError("a JPEG whose head is damaged, or of a rare chroma subsampling") from error
     return width, height
-
-
-def _scans(data: bytes) -> int:
-    """Count the scans of a JPEG from the first marker to the image's end."""
-    at, count = 2, 0
-    while (found := _MARKER.search(data, at)) is not None and data[found.end() - 1] != _END:
-        at = found.end()
-        count += found.group() == _SCAN
-        at += int.from_bytes(data[at : at + 2], "big")
-    return count
 
 
 def _loaded(data: File, format_: ImageFormat, limits: Limits) -> Any:
@@ -228,8 +207,9 @@ def _samples(image: Any) -> Array:
 
 
 def png_of(pixels: npt.NDArray[np.uint8]) -> bytes:
-    """Encode an ``(H, W, 3)`` RGB or ``(H, W)`` grey image of uint8 as PNG."""
+    """Encode an ``(H, W)`` grey, ``(H, W, 3)`` RGB or ``(H, W, 4)`` RGBA image of uint8 as PNG."""
     import cv2
 
-    stored = cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR) if pixels.ndim == 3 else pixels
+    codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
+    stored = pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, codes[pixels.shape[2]])
     return cv2.imencode(".png", stored)[1].tobytes()

@@ -79,14 +79,12 @@ def mahalanobis(
     return distance, near
 
 
-def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
+def look_up_colours(planes: Planes, road: Words) -> Plane:
+    _require(road, COLOUR_WORDS)
     height, width = _shape(*planes)
     result = np.empty((height, width), np.uint8)
     room = np.empty(width, np.int32), np.empty(width, np.uint8)
-    tables = road, left if len(left) else None
-    for table in (road, left) if len(left) else (road,):
-        _require(table, COLOUR_WORDS)
-    _loops.look_up_colours(*planes, height, width, *tables, result, *room)
+    _loops.look_up_colours(*planes, height, width, road, None, result, *room)
     return result
 
 

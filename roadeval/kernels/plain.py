@@ -89,20 +89,18 @@ def _squared(
     return squared
 
 
-def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
+def look_up_colours(planes: Planes, road: Words) -> Plane:
     """Look every pixel up in a table over all colours, a bit each.
 
-    ``planes`` are red, green and blue, ``(H, W)`` uint8 each. ``road`` and ``left`` are ``(2^18,)``
-    uint64 by the upper six bits of red, green and blue; of a word's bits the lower two of each tell
-    which: similar colours, as an image has them side by side, share it. ``left`` may be empty.
-    Returned are ``(H, W)`` uint8: the bit in ``road``, and twice that in ``left``.
+    ``planes`` are red, green and blue, ``(H, W)`` uint8 each. ``road`` is ``(2^18,)`` uint64 by the
+    upper six bits of red, green and blue; of a word's bits the lower two of each tell which:
+    similar colours, as an image has them side by side, share it. Returned are the bits, ``(H, W)``
+    uint8.
     """
     r, g, b = (plane.astype(np.int64) for plane in planes)
     word = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
     bit = ((r & 3) << 4 | (g & 3) << 2 | b & 3).astype(np.uint64)
     found: Plane = (road[word] >> bit & np.uint64(1)).astype(np.uint8)
-    if len(left):
-        found |= (left[word] >> bit & np.uint64(1)).astype(np.uint8) << 1
     return found
 
 

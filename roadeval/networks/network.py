@@ -1,8 +1,7 @@
 """A network's road mask of a frame; what its settings lack is read from its file, or asked for.
 
-A file's metadata may hold class names, the channels' order, their range, and a licence. The keys
-are those that exporters write: ``names`` (a dictionary in Python's or JSON's form, or a list) and
-ONNX's own ``Image.BitmapPixelFormat`` and ``Image.NominalPixelRange``.
+A file's metadata may hold class names, as exporters write them (``names``: a dictionary in Python's
+or JSON's form, or a list), and a licence.
 """
 
 from __future__ import annotations
@@ -230,17 +229,6 @@ LONGEST: Final = 100_000
 """Letters of a list of class names."""
 QUOTED: Final = 1000
 """Letters of a licence that results quote."""
-_ORDERS: Final[Mapping[str, Literal["rgb", "bgr", "grey"]]] = {
-    "rgb8": "rgb",
-    "bgr8": "bgr",
-    "gray8": "grey",
-}
-_RANGES: Final[Mapping[str, tuple[float, float]]] = {
-    "nominalrange_0_255": (1.0, 0.0),
-    "normalized_0_1": (1 / 255, 0.0),
-    "normalized_1_1": (2 / 255, 1.0),
-}
-"""Scale and mean that bring 0..255 to the range."""
 
 
 def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
@@ -316,8 +304,7 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
         )
     if columns not in (None, width) or rows not in (None, height):
         raise file.question(f"takes no input of {width}x{height}: see `net.size`")
-    order = _ORDERS.get(file.metadata.get("Image.BitmapPixelFormat", "").lower())
-    channels = settings.channels or order or ("grey" if count == 1 else "rgb")
+    channels = settings.channels or ("grey" if count == 1 else "rgb")
     settings = replace(settings, layout=layout, channels=channels, size=(width, height))
     if count not in (None, settings.channel_count):
         raise file.question(
@@ -328,13 +315,10 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
 
 def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """Complete scale, mean and deviation."""
-    default = (1.0 if file.inputs[0].dtype == "uint8" else 1 / 255, 0.0)
-    named = file.metadata.get("Image.NominalPixelRange", "").lower()
-    scale, mean = _RANGES.get(named, default)
     settings = replace(
         settings,
-        scale=settings.scale or scale,
-        mean=settings.mean or ((mean,) if settings.scale is None else (0.0,)),
+        scale=settings.scale or (1.0 if file.inputs[0].dtype == "uint8" else 1 / 255),
+        mean=settings.mean or (0.0,),
         deviation=settings.deviation or (1.0,),
     )
     for name in ("mean", "deviation"):

@@ -37,8 +37,7 @@ class NetSettings:
     layout: Literal["NCHW", "NHWC"] | None = None
     """The order of its input's dimensions: N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None
-    """The order of its channels; by default as the file's metadata name them, or ``rgb``.
-    ``grey``: a single channel."""
+    """The order of its channels, by default ``rgb``. ``grey``: a single channel."""
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     """A grey level of 0..255 is multiplied by this first; by default by 1/255, and by 1 where the
     network takes whole numbers."""

@@ -29,12 +29,9 @@ LEVELS: Final = np.arange(256.0)
 EPS: Final = float(np.finfo(np.float64).eps)
 ENOUGH: Final = 1e-6
 """Margins as near as this leave some twenty of all colours undecided."""
-UNDECIDED: Final = 2
-"""The kernel's value for a colour that is not decided yet."""
 FEW: Final = 1 << 16
-"""Up to so many undecided colours are decided at once, when the table is made."""
+"""Undecided colours that are decided one by one, at most."""
 _NODES: Final = (16, 24, 32, 48, 64, 96, 128, 256)
-_NONE: Final = np.zeros(0, np.uint64)
 
 
 def sums_of_terms(terms: Floats, offset: float) -> Margins:
@@ -90,43 +87,20 @@ class ColourTable:
 
     ``margins`` is the margin of every colour: it decides where it is further from 0 than its error
     bound. ``decide`` is asked for the colours that are left, ``(n, 3)`` uint8 to ``(n,)`` bool:
-    some twenty as a rule. Where a machine has learnt nothing and its margin is 0 everywhere they
-    are all colours, and only those that are looked up are decided.
+    some twenty as a rule. Where more than `FEW` are left, as of a machine that has learnt nothing
+    and whose margin is 0 everywhere, none of them has a positive one.
     """
 
     def __init__(self, margins: Margins, decide: Decide) -> None:
-        self._decide = decide
-        self._words = road, left = _table(margins)
-        if not left.any():
-            self._words = road.copy(), _NONE
-        elif ones(left) <= FEW:
-            bits = np.unpackbits(left.view(np.uint8), bitorder="little")
-            road, _ = self._decided(self._words, np.flatnonzero(bits))
-            self._words = road, _NONE
+        self._road, left = _table(margins)
+        if 0 < ones(left) <= FEW:
+            places = np.flatnonzero(np.unpackbits(left.view(np.uint8), bitorder="little"))
+            road = places[decide(_colours(places))]
+            np.bitwise_or.at(self._road, road >> 6, np.uint64(1) << (road & 63).astype(np.uint64))
 
     def look_up(self, planes: Planes) -> Mask:
         """Return ``(H, W)`` uint8, 1 where a pixel's margin is positive; from any thread."""
-        words = self._words
-        mask = KERNELS.look_up_colours(planes, *words)
-        if len(words[1]):
-            seen = mask == UNDECIDED
-            if seen.any():
-                places = np.unique(_places(*(plane[seen] for plane in planes)))
-                # In new words, because other threads look up in the old ones. If two threads come
-                # here together the later one's are kept, and the other's colours decided again.
-                self._words = words = self._decided(words, places)
-                mask = KERNELS.look_up_colours(planes, *words)
-        return mask
-
-    def _decided(
-        self, words: tuple[Words, Words], places: npt.NDArray[np.int64]
-    ) -> tuple[Words, Words]:
-        """Return words in which the colours of ``(n,)`` places are decided too."""
-        road, left = (each.copy() for each in words)
-        word, bit = places >> 6, np.uint64(1) << (places & 63).astype(np.uint64)
-        np.bitwise_or.at(road, word, np.where(self._decide(_colours(places)), bit, np.uint64(0)))
-        np.bitwise_and.at(left, word, ~bit)
-        return road, left
+        return KERNELS.look_up_colours(planes, self._road)
 
 
 def _table(margins: Margins) -> tuple[Words, Words]:
@@ -160,18 +134,8 @@ def _table(margins: Margins) -> tuple[Words, Words]:
     return words[0].reshape(-1), words[1].reshape(-1)
 
 
-def _places(*colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
-    """Return the places of ``(n,)`` red, green and blue: the word times 64, and the bit in it.
-
-    See `roadeval.kernels.plain.look_up_colours`.
-    """
-    r, g, b = (channel.astype(np.int64) for channel in colours)
-    coarse = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
-    return coarse << 6 | (r & 3) << 4 | (g & 3) << 2 | b & 3
-
-
 def _colours(places: npt.NDArray[np.int64]) -> Colours:
-    """Return the ``(n, 3)`` colours of ``(n,)`` places."""
+    """Return the ``(n, 3)`` colours of ``(n,)`` places: the word times 64, and the bit in it."""
     coarse = places >> 18, places >> 12 & 63, places >> 6 & 63
     fine = places >> 4 & 3, places >> 2 & 3, places & 3
     channels = [c << 2 | f for c, f in zip(coarse, fine, strict=True)]

@@ -43,14 +43,11 @@ def show(recording: Path, frame: int | None = None) -> None:
     Without a frame it opens where the recording itself wants to begin. A `RecordingError` if there
     is no screen, or the viewer does not come up.
     """
-    if not has_screen():
-        raise RecordingError(
-            "no screen to open a window on; take a screenshot instead, or open "
-            f"{recording} on another machine"
-        )
-    with opened(recording) as (process, client):
-        go(client, frame)
-        process.wait()
+    window = WindowViewer()
+    try:
+        window.show(recording, frame).wait()
+    finally:
+        window.close()
 
 
 def has_screen() -> bool:
@@ -66,25 +63,25 @@ class WindowViewer:
         self._lock: Final = Lock()
         self._shown: tuple[Path, subprocess.Popen[bytes], ViewerClient] | None = None
 
-    def show(self, recording: Path, frame: int) -> None:
-        """Show a frame of a recording.
+    def show(self, recording: Path, frame: int | None) -> subprocess.Popen[bytes]:
+        """Show a frame of a recording; return the window's process.
 
         A `RecordingError` if there is no screen, or the viewer does not come up.
         """
         if not has_screen():
             raise RecordingError(
-                "No screen to open a window on: type the command on a machine that has one."
+                f"No screen to open a window on: open {recording} on a machine that has one, or "
+                "take a screenshot."
             )
         with self._lock:
-            if self._shown is not None:
-                shown, process, client = self._shown
-                if shown == recording and process.poll() is None:
-                    go(client, frame)
-                    return
-            self._shown = None
-            self._stack.close()
-            self._shown = recording, *self._stack.enter_context(opened(recording))
-            go(self._shown[2], frame)
+            known = self._shown
+            if known is None or known[0] != recording or known[1].poll() is not None:
+                self._shown = None
+                self._stack.close()
+                known = self._shown = recording, *self._stack.enter_context(opened(recording))
+            _, process, client = known
+            go(client, frame)
+            return process
 
     def close(self) -> None:
         """End the viewer."""

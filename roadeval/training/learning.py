@@ -300,9 +300,7 @@ def from_log(
         what = what if picks is None else "no frame that was picked by rank is labelled"
         warnings.append(f"{what}: {BY_PATCH}")
     schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first, picks=picks)
-    if base is None:
-        schedule = replace(schedule, sizes=frozenset(len(f.payload) for f in held))
-    else:
+    if base is not None:
         how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
         warnings.append(
             f"the model of other drives ({settings.model}) was adapted to this drive with "
@@ -345,13 +343,11 @@ def from_drives(
     frames: Mapping[Path, Sequence[Frame]],
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
-    warnings: Sequence[str] = (),
 ) -> Model:
     """Train on frames of some drives, by the drives' paths.
 
-    ``warnings`` are put before those of the training itself. A `TrainingError` if some drives have
-    truth and others have none, or none has although the settings insist on it, or there is nothing
-    to learn from.
+    A `TrainingError` if some drives have truth and others have none, or none has although the
+    settings insist on it, or there is nothing to learn from.
     """
     bare = [path for path, own in frames.items() if not any(f.truth is not None for f in own)]
     insists = settings.source == "truth" or len(bare) < len(frames)
@@ -363,7 +359,7 @@ def from_drives(
     guessed = bare and settings.source == "auto"
     guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
     every = [frame for own in frames.values() for frame in own]
-    return fit(every, pipelines, settings, [*warnings, *guess])
+    return fit(every, pipelines, settings, guess)
 
 
 def spread(

@@ -18,16 +18,12 @@ class Schedule:
     """Numbers of the frames after them that are left out as well."""
     first: int | None = None
     """Number of the first frame to evaluate, where it is known beforehand."""
-    sizes: frozenset[int] | None = None
-    """Sizes in bytes of the training frames as logged, if known: frames of other sizes are not
-    hashed."""
     picks: Picks | None = None
     """Which frames were picked to be labelled: those that were drawn at random are evaluated."""
 
     def role(self, frame: Frame) -> Role:
         """Return what a decoded frame is used for."""
-        may_be = self.sizes is None or len(frame.payload) in self.sizes
-        if may_be and frame.digest() in self.digests:
+        if frame.digest() in self.digests:
             return Role.TRAINING
         if frame.number in self.gap:
             return Role.GAP

@@ -159,26 +159,6 @@ def test_what_is_no_image_is_refused(data: bytes) -> None:
             read(data, LIMITS)
 
 
-def of_scans(data: bytes, count: int) -> bytes:
-    """Return a JPEG with as many more scans, each of a few bytes: luma is refined by nothing."""
-    scan = bytes([0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0])
-    return data[:-2] + count * scan + data[-2:]
-
-
-PROGRESSIVE = file("JPEG", progressive=True)
-
-
-def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded() -> None:
-    for read in (images.to_rgb, images.to_labels, images.to_png):
-        with pytest.raises(ImageError, match="a JPEG of more than 100 scans"):
-            read(memoryview(of_scans(PROGRESSIVE, 100)), LIMITS)
-
-
-def test_a_jpeg_of_many_scans_is_decoded() -> None:
-    with pytest.raises(ImageError, match="a damaged JPEG"):  # as the decoder found out
-        images.to_rgb(of_scans(PROGRESSIVE, 80), LIMITS)
-
-
 def test_what_looks_like_scans_in_a_comment_or_behind_the_image_is_none() -> None:
     comment = b"\xff\xfe" + (402).to_bytes(2, "big") + 200 * b"\xff\xda"
     for data in (JPEG[:2] + comment + JPEG[2:], JPEG + 200 * b"\xff\xda"):

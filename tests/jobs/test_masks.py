@@ -24,7 +24,7 @@ def places(tmp_path_factory) -> Path:
     base = tmp_path_factory.mktemp("places")
     drive = write_log(base / "drive.mcap", net=True)
     kinds = ("number", "stamp", "npy", "classes", "confidence", "images", "named", "half")
-    for kind in (*kinds, "sixteen"):
+    for kind in kinds:
         (base / kind).mkdir()
     with open_log(drive, WITH_MASKS) as log, LogWriter(base / "other.mcap") as other:
         selection = log.select()
@@ -42,7 +42,6 @@ def _write(base, number, stamp, mask):
     np.save(base / "npy" / f"{number}.npy", mask.astype(bool))
     cv2.imwrite(str(base / "classes" / f"{number}.png"), 3 + 4 * mask)
     cv2.imwrite(str(base / "confidence" / f"{number}.png"), 100 + 55 * mask)
-    np.save(base / "sixteen" / f"{number}.npy", (100 + 55 * mask).astype(np.int16))
     name = f"{chr(ord('a') + number)}.png"
     (base / "images" / name).touch()
     cv2.imwrite(str(base / "named" / name), mask)
@@ -245,8 +244,6 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
             "`masks.net.labels.road`, and those to leave out with `masks.net.labels.ignore`; or, "
             "for confidences, their threshold",
         ),
-        ({"path": "npy", "threshold": 0.5}, "holds only 0 and 1, as masks do"),
-        ({"path": "sixteen", "threshold": 0.5}, "holds no confidence above 0.0024: whole numbers"),
         ({"path": "nowhere"}, "no such folder"),
         ({"path": "other.mcap"}, "name a topic of it, as"),
         ({"path": "other.mcap:/no"}, "topic /no: is not in the log; its image topics are: /seg"),

@@ -76,12 +76,6 @@ def test_classes_can_be_named(tmp_path):
     assert read(path, road=("sidewalk", 0)).road == (1, 0)
 
 
-def test_onnx_tells_of_channels_and_range(tmp_path):
-    told = {"Image.BitmapPixelFormat": "Bgr8", "Image.NominalPixelRange": "Normalized_1_1"}
-    found = read(network(tmp_path / "n.onnx", metadata=told))
-    assert (found.channels, found.scale, found.mean) == ("bgr", 2 / 255, (1.0,))
-
-
 def test_results_tell_licence_inputs_outputs_and_road(tmp_path):
     path = network(tmp_path / "n.onnx", classes=3, metadata=CITY)
     facts = Network.of(NetSettings(file=str(path))).facts()

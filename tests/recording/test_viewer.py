@@ -45,7 +45,7 @@ def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine
 def test_a_screen_of_either_kind_will_do(screen, fake, tmp_path, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    with pytest.raises(RecordingError, match="no screen to open a window on"):
+    with pytest.raises(RecordingError, match="No screen to open a window on"):
         viewer.show(tmp_path / "x.rrd")
     monkeypatch.setenv(screen, ":0")
     with pytest.raises(RecordingError, match="the viewer did not start"):

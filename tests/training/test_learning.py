@@ -263,17 +263,6 @@ def test_a_drive_without_truth_among_others_is_named(source, frames):
         of_drives(source, **frames)
 
 
-def test_a_frame_of_another_size_than_the_training_frames_is_not_hashed(monkeypatch):
-    mine = frame(3)
-    digests = frozenset([mine.digest()])
-    known, unknown = Schedule(digests, sizes=frozenset([len(mine.payload)])), Schedule(digests)
-    assert known.role(mine) is unknown.role(mine) is Role.TRAINING
-    other = replace(mine, payload=bytes(mine.payload) + b"x")
-    assert unknown.role(other) is Role.EVALUATED
-    monkeypatch.setattr(Frame, "digest", lambda _frame: pytest.fail("it was hashed"))
-    assert known.role(other) is Role.EVALUATED
-
-
 # --- On top of a model of other drives ------------------------------------------------------------
 
 

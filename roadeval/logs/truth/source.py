@@ -13,13 +13,11 @@ import numpy as np
 
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
-from roadeval.logs.messages.pixels import format_of, size_of
+from roadeval.logs.messages.pictures import Picture, PictureSequence
+from roadeval.logs.messages.pixels import size_of
 from roadeval.logs.settings import LabelPlace, MaskSettings
-from roadeval.logs.topics.calibration import is_rectified
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.meaning import (
-    TOP,
     Confidence,
     Labels,
     Meaning,
@@ -42,11 +40,6 @@ from roadeval.logs.truth.pairing import (
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
-_RAW: Final = re.compile(r"image_raw")
-_BYTE: Final = 255
-"""Greatest code of a confidence map of 16 bits that was made for 8."""
-_ONES: Final = (1, 257)
-"""Greatest codes of a confidence map whose greatest value is 1, of 16 and of 8 bits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,8 +116,7 @@ def in_log(labels: TopicReader, settings: MaskSettings, camera: Camera, why: str
     A `LogError` if its values cannot be understood.
     """
     meaning = _meaning(labels, settings)
-    notes = other_optics(labels.name, camera.topic.name)
-    return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why, notes=notes)
+    return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why)
 
 
 def beside_log(
@@ -154,28 +146,8 @@ def beside_log(
     words = camera.clock if from_log and settings.pair is None else by
     meaning = _meaning(labels, settings, camera)
     notes = labels.origin.notes if isinstance(labels, NamedLabels) else ()
-    notes += other_optics(labels.name, camera.topic.name)
     why = f"{count}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
-
-
-def other_optics(labels: str, topic: str) -> tuple[str, ...]:
-    """Return a warning where names say that labels are of rectified images and the camera's not.
-
-    Both have the same size and stamps, so that nothing but the names of folder, file or topic
-    can tell.
-
-    >>> other_optics("labels_rectified", "/front/image_rect")
-    ()
-    """
-    rectified, of_camera = map(is_rectified, (labels, topic))
-    if rectified == of_camera or (of_camera and not _RAW.search(labels)):
-        return ()
-    theirs, ours = ("rectified", "raw") if rectified else ("raw", "rectified")
-    return (
-        f"by its name {labels} is of {theirs} images, and {topic} of {ours} ones: where the lens "
-        f"bends, edges do not fit; `topics.image` chooses the topic of the {theirs} images",
-    )
 
 
 def log_and_topic(path: str) -> tuple[str | None, str | None]:
@@ -230,7 +202,7 @@ def _meaning(
     wanted = settings.labels
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
-    problem, fractions = "", False
+    problem = ""
     for place, picture in samples(labels):
         try:
             if camera is not None:
@@ -239,25 +211,12 @@ def _meaning(
                 seen += seen_in(picture, wanted, labels.name, labels.limits)
             else:
                 seen.append(int(confidence.codes(picture, labels.limits).max()))
-                fractions |= isinstance(picture, RawPicture) and format_of(picture).dtype == "f4"
         except BadMessage as error:
             problem = problem or str(error)
     if not seen:
         raise nothing_of(labels, problem)
     if confidence is not None:
-        _check_confidence(max(seen), labels.name, fractions=fractions)
         return confidence
     if origin.occurring:
         return of_classes(wanted, origin, labels.name)
     return understand(wanted, seen, labels.name)
-
-
-def _check_confidence(greatest: int, name: str, *, fractions: bool) -> None:
-    """Refuse, as a `LogError`, what is no confidence map by its greatest code."""
-    if greatest in _ONES:
-        raise LogError(f"{name} holds only 0 and 1, as masks do: leave out the threshold")
-    if 0 < greatest <= _BYTE and not fractions:
-        raise LogError(
-            f"{name} holds no confidence above {greatest / TOP:.4f}: whole numbers of 16 bits "
-            "count as shares of 65535; write those from 0 to 255 with 8 bits"
-        )

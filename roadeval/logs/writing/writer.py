@@ -20,7 +20,7 @@ import numpy.typing as npt
 from mcap.writer import Writer
 
 from roadeval.data import Frame, FrameResult, Layer, Tally
-from roadeval.images import ImageError, Limits, format_of, size_of, to_png
+from roadeval.images import ImageError, Limits, format_of, png_of, size_of, to_png
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
 from roadeval.logs.settings import NS
@@ -100,13 +100,8 @@ class LogWriter:
 
         A `LogError` if the disk is full.
         """
-        import cv2
-
-        codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
-        stored = mask if mask.ndim == 2 else cv2.cvtColor(mask, codes[mask.shape[2]])
-        _, png = cv2.imencode(".png", stored)
-        content = png.tobytes()
-        self.image(topic, stamp_ns, content, "png", log_time_ns=log_time_ns, frame_id=frame_id)
+        png = png_of(mask)
+        self.image(topic, stamp_ns, png, "png", log_time_ns=log_time_ns, frame_id=frame_id)
 
     def json(
         self,

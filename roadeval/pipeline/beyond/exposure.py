@@ -10,7 +10,7 @@ where the patch lies in the shade or on a dark vehicle.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 import cv2
 import numpy as np
@@ -32,21 +32,19 @@ class ExposureSettings:
 
     level: Annotated[float, Field(gt=0, lt=255)] = 96.0
     """Grey level, 0..255, that the patch's median gets."""
-    channels: Literal["each", "alike"] = "each"
-    """``each`` channel gets a gain of its own, so that the road turns grey under any light and
-    camera; ``alike``: all get the one of the brightness."""
     patch: ReferencePatch = ReferencePatch()
     """The reference patch."""
 
 
 def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
-    """Return the gains ``(3,)`` that bring the patch of an ``(H, W, 3)`` image to the level."""
+    """Return the gains ``(3,)`` that bring the patch of an ``(H, W, 3)`` image to the level.
+
+    Each channel has its own, so that the road turns grey under any light and camera.
+    """
     rows, columns, patch = _box(*image.shape[:2], settings.patch)
     around = image[rows, columns]
     counts = [cv2.calcHist([around], [each], patch, [256], [0, 256]).cumsum() for each in range(3)]
     medians = np.array([float(np.searchsorted(own, own[-1] / 2)) for own in counts])  # the lower
-    if settings.channels == "alike":
-        medians = np.full(3, medians.mean())
     gain = settings.level / np.maximum(medians, 1.0)
     return np.asarray(np.clip(gain, *GAINS))
 

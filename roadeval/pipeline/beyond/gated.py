@@ -123,9 +123,6 @@ class GatedSettings:
     and wants caution; one that sees place and surroundings as well takes 1."""
     least: Annotated[float, Field(ge=0, lt=1)] = 0.1
     """Below this probability nothing is brightened."""
-    window: Annotated[int, Field(ge=1, le=99)] = 1
-    """Side of the square over which a candidate's own colour is averaged: texture finer than it
-    stays."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -330,18 +327,15 @@ def _sigmoid(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
     return share
 
 
-def gains(seen: Look, shaded: Values, settings: GatedSettings) -> Values:
+def gains(seen: Look, shaded: Values) -> Values:
     """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
 
-    It is ``(L / S)^p``: L is the mean colour of lit road, S that of the candidates around the
-    pixel, and p the probability that it is road in the shade. L / S is the ratio of illumination
-    if it is. No gain is less than 1 or more than `GREATEST_GAIN`. In the end they are averaged over
-    a square.
+    It is ``(L / S)^p``: L is the mean colour of lit road, S that of the pixel, and p the
+    probability that it is road in the shade, 0 where it is no candidate. L / S is the ratio of
+    illumination if it is. No gain is less than 1 or more than `GREATEST_GAIN`. In the end they are
+    averaged over a square.
     """
-    dark = seen.candidates.astype(np.float32)
-    side = (settings.window, settings.window)
-    around = cv2.blur(seen.image.astype(np.float32) * dark[..., None], side)
-    own = around / np.maximum(cv2.blur(dark, side), 1e-6)[..., None]
+    own = seen.image.astype(np.float32)
     ratio = np.log((seen.lit + OFFSET).astype(np.float32)) - np.log(own + OFFSET)
     np.clip(ratio, 0, np.log(GREATEST_GAIN), out=ratio)
     soft: Values = cv2.blur(np.exp(ratio * shaded[..., None]), (SOFTNESS, SOFTNESS))
@@ -382,7 +376,7 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     shape = view.image.shape
     seen = look(reduced(view.image, settings.width), model.place, settings)
     shaded = shade_of(seen, model, settings)
-    gain = gains(seen, shaded, settings)
+    gain = gains(seen, shaded)
     image = brighten(view.image, gain) if (shaded > 0).any() else view.image
     greatest = np.maximum.reduce(cv2.split(gain))
     small = (shaded > 0.5).view(np.uint8)
@@ -419,7 +413,7 @@ def oracle(settings: GatedSettings, model: ShadedRoad) -> Callable[[View, Truth]
         if not shadow.any():
             return Output(image=view.image)
         seen = replace(look(small, model.place, settings), candidates=shadow > 0)
-        return Output(image=brighten(view.image, gains(seen, shadow.astype(np.float32), settings)))
+        return Output(image=brighten(view.image, gains(seen, shadow.astype(np.float32))))
 
     return run
 

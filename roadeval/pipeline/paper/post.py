@@ -9,7 +9,6 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Final, Literal
 
-import cv2
 import numpy as np
 from pydantic import Field, field_validator
 
@@ -41,8 +40,6 @@ class PostSettings:
     element: Annotated[int, Field(ge=1, le=999)] | None = None
     """Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 % of the
     image's width, at least 3."""
-    shape: Literal["square", "ellipse"] = "square"
-    """``square`` or ``ellipse``."""
     operations: tuple[Literal["open", "close"], ...] = ("open", "close")
     """``open`` (Eq. 20) and ``close`` (Eq. 21) in the order they are applied. Section 4.4 begins
     with dilation and erosion, a closing. On a noisy mask that joins the road to whatever lies
@@ -71,11 +68,9 @@ def element_side(width: int) -> int:
 
 
 @lru_cache(maxsize=8)
-def structuring_element(side: int, shape: str) -> Reach:
-    """Return B of Eq. 17-22, ``side`` pixels wide (odd), as a `Reach`: shared, read-only."""
-    kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
-    below = cv2.getStructuringElement(kind, (side, side))[side // 2 :]
-    reach: Reach = (np.count_nonzero(below, axis=1) - 1) // 2
+def structuring_element(side: int) -> Reach:
+    """Return B of Eq. 17-22, a square of ``side`` pixels (odd), as a `Reach`; read-only."""
+    reach: Reach = np.full(side // 2 + 1, side // 2)
     reach.flags.writeable = False
     return reach
 
@@ -140,7 +135,7 @@ def fill_holes(mask: Packed) -> Packed:
 def post_process(mask: Packed, settings: PostSettings) -> Packed:
     """Open and close a road mask, keep one region, fill its holes (section 4.4)."""
     side = settings.element or element_side(mask.width)
-    element = structuring_element(side, settings.shape)
+    element = structuring_element(side)
     for operation in settings.operations:
         mask = opening(mask, element) if operation == "open" else closing(mask, element)
     if settings.region != "all":
@@ -151,7 +146,7 @@ def post_process(mask: Packed, settings: PostSettings) -> Packed:
 
 def bind(settings: PostSettings, _parameters: None) -> Callable[[View], Output]:
     """Return phase 4 as a pure function of the mask before it."""
-    edge = structuring_element(LINE, "square")
+    edge = structuring_element(LINE)
 
     def run(view: View) -> Output:
         if view.mask is None:

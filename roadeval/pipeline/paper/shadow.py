@@ -29,6 +29,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Floats, Labels, Runs
 from roadeval.kernels import KERNELS
+from roadeval.kernels.plain import paint
 from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
 Codes = npt.NDArray[np.uint8]
@@ -219,10 +220,7 @@ class Components:
 
     def labels(self) -> Labels:
         """Return their label image: ``(H, W)`` int32, 0 outside."""
-        labels = np.zeros(self.shape, np.int32)
-        for row, begin, end, label in self.runs.tolist():
-            labels[row, begin:end] = label
-        return labels
+        return paint(self.runs, *self.shape)
 
 
 def connected_components(shadow: Packed, connectivity: int) -> Components:

@@ -25,7 +25,6 @@ from roadeval.logs import (
 from roadeval.logs.errors import FrameError
 from roadeval.logs.truth.beside import GREATEST, labels_in
 from roadeval.logs.truth.formats.coco import lengths_in
-from roadeval.logs.truth.source import other_optics
 from tests.e2e.commands import here
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 from tests.logs.truth.test_folder import opened
@@ -103,31 +102,6 @@ def test_numbers_of_no_frame_are_refused_with_three_of_them(drive, tmp_path):
     assert "by number: theirs are 100 to 180 (x100.png, x120.png, x140.png, ...)" in message
     assert "the frames' 0 to 5: name the folder" in message
     assert message.endswith("with `truth.images`")
-
-
-def test_labels_whose_names_say_other_optics_bring_a_warning(drive, tmp_path):
-    names = [f"{number}.png" for number in range(FRAMES)]
-    for folder, warned in (("labels_rect", 1), ("rectangles", 0), ("undistorted", 1), ("a", 0)):
-        selection, *_ = select(drive, images(tmp_path / folder, *names))
-        assert len(selection.truth.notes) == warned, folder
-    (note,) = select(drive, tmp_path / "undistorted")[0].truth.notes
-    assert "is of rectified images, and /camera of raw ones" in note
-    run, summary = replay(drive, tmp_path / "labels_rect")
-    assert run.returncode == 0
-    assert [each for each in summary["warnings"] if "rectified" in each]
-
-
-@pytest.mark.parametrize(
-    ("labels", "topic", "warned"),
-    [
-        ("/labels/image_rect_color", "/front/image_raw", True),
-        ("/labels/image_rect_color", "/front/image_rect/compressed", False),
-        ("/front/image_raw/labels", "/front/image_rect", True),
-        ("/labels", "/front/image_rect", False),
-    ],
-)
-def test_names_of_topics_tell_raw_from_rectified_images(labels, topic, warned):
-    assert bool(other_optics(labels, topic)) is warned
 
 
 def test_stamps_of_no_frame_are_refused_with_three_of_each(drive, tmp_path):

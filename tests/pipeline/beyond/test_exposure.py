@@ -45,11 +45,6 @@ def test_what_is_brighter_than_the_patch_is_compressed_and_keeps_its_order():
     assert tones[-1] < 255
 
 
-def test_alike_keeps_the_tint():
-    output = run(scene((24, 48, 72)), channels="alike")
-    assert set(output.facts.values()) == {2.0}
-
-
 def test_the_median_is_what_counts_not_what_stands_on_the_road():
     image = scene((48, 48, 48))
     image[:, 32:] = 255  # two fifths of the patch

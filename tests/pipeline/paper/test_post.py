@@ -32,11 +32,7 @@ opening, closing = on_masks(post.opening), on_masks(post.closing)
 boundary, fill_holes = on_masks(post.boundary), on_masks(post.fill_holes)
 keep_region = on_masks(post.keep_region)
 
-elements = st.builds(
-    post.structuring_element,
-    st.sampled_from([1, 3, 5]),
-    st.sampled_from(["square", "ellipse"]),
-)
+elements = st.builds(post.structuring_element, st.sampled_from([1, 3, 5]))
 
 
 def on_a_plane(operation, road, element, **options):
@@ -80,13 +76,12 @@ def test_dilation_erosion_opening_and_closing_equal_scipys(road, element):
 @pytest.mark.parametrize("width", [63, 64, 65, 127, 128, 129])
 def test_they_equal_scipys_where_a_word_of_pixels_ends(width, share):
     road = (np.random.default_rng(width).random((20, width)) < share).astype(np.uint8)
-    for shape in ("square", "ellipse"):
-        assert_as_scipy(road, post.structuring_element(5, shape))
+    assert_as_scipy(road, post.structuring_element(5))
 
 
 @given(masks)
 def test_dilation_and_erosion_equal_the_set_definitions(road):
-    square = post.structuring_element(3, "square")
+    square = post.structuring_element(3)
     offsets = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
     m = {(int(y), int(x)) for y, x in zip(*np.nonzero(road), strict=True)}
     every = [(y, x) for y in range(road.shape[0]) for x in range(road.shape[1])]
@@ -99,7 +94,7 @@ def test_dilation_and_erosion_equal_the_set_definitions(road):
 
 def test_closing_keeps_road_along_the_border():
     road = mask("####", "####", "....")
-    assert (closing(road, post.structuring_element(3, "square")) == road).all()
+    assert (closing(road, post.structuring_element(3)) == road).all()
 
 
 @pytest.mark.parametrize("reach", [1, 32, 63, 64, 65, 128, 129, 250])
@@ -116,7 +111,7 @@ def test_closing_fills_gaps_no_wider_than_the_element_and_keeps_the_border_as_it
 
 def test_the_boundary_is_the_inner_edge_and_runs_along_the_image_border():
     road = mask("....", ".###", ".###", ".###")
-    edge = boundary(road, post.structuring_element(3, "square"))
+    edge = boundary(road, post.structuring_element(3))
     assert (edge == mask("....", ".###", ".#.#", ".###")).all()
 
 
@@ -128,13 +123,10 @@ def test_the_boundary_equals_scipys(road, element):
 
 
 @pytest.mark.parametrize("side", range(1, 16, 2))
-@pytest.mark.parametrize("shape", ["square", "ellipse"])
-def test_structuring_elements_are_symmetric_and_hold_their_centre(side, shape):
-    element = as_mask(post.structuring_element(side, shape))
-    kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
-    np.testing.assert_array_equal(element, cv2.getStructuringElement(kind, (side, side)))
-    assert element[side // 2, side // 2]
-    np.testing.assert_array_equal(element, element[::-1, ::-1])
+def test_structuring_elements_are_squares(side):
+    element = as_mask(post.structuring_element(side))
+    assert element.shape == (side, side)
+    assert element.all()
 
 
 @given(st.integers(1, 5000))
@@ -257,12 +249,10 @@ def test_every_step_can_be_left_out():
     rng = np.random.default_rng(5)
     road = (rng.random((30, 40)) > 0.4).astype(np.uint8)
     nothing = {"operations": (), "region": "all", "fill": False}
-    square = post.structuring_element(3, "square")
+    square = post.structuring_element(3)
     opened, closed = opening(road, square), closing(road, square)
-    ellipse = post.structuring_element(7, "ellipse")
     for step, expected in (
         ({}, road),
-        ({"operations": ("close",), "element": 7, "shape": "ellipse"}, closing(road, ellipse)),
         ({"operations": ("close",)}, closed),
         ({"operations": ("open",)}, opened),
         ({"operations": ("open", "close")}, closing(opened, square)),
@@ -271,7 +261,7 @@ def test_every_step_can_be_left_out():
         ({"fill": True}, fill_holes(road)),
         (
             {"operations": ("close",), "element": 5},
-            closing(road, post.structuring_element(5, "square")),
+            closing(road, post.structuring_element(5)),
         ),
     ):
         np.testing.assert_array_equal(post_process(road, **nothing | step), expected)
@@ -300,4 +290,4 @@ def test_opencvs_own_border_would_differ():
     # Why the border is stated: OpenCV's default lets road beyond the border keep road alive.
     road = np.ones((4, 4), np.uint8)
     assert cv2.erode(road, np.ones((3, 3), np.uint8)).all()
-    assert erode(road, post.structuring_element(3, "square")).sum() == 4
+    assert erode(road, post.structuring_element(3)).sum() == 4

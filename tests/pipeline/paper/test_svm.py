@@ -188,20 +188,8 @@ def indifferent():
     )
 
 
-def test_a_machine_that_learnt_nothing_decides_only_the_colours_that_occur(monkeypatch):
-    asked = []
-    exact = svm.decision
-    monkeypatch.setattr(
-        svm,
-        "decision",
-        lambda colours, *rest: asked.append(len(colours)) or exact(colours, *rest),
-    )
-    stage = svm.bind(SvmSettings(), indifferent())
-    image = noise(1, 50)[0]
-    colours = len(np.unique(image, axis=0))
-    assert not road(stage, image).any()
-    assert not road(stage, image).any()
-    assert asked == [colours]
+def test_a_machine_that_learnt_nothing_calls_nothing_road():
+    assert not road(svm.bind(SvmSettings(), indifferent()), noise(1, 50)[0]).any()
 
 
 def test_a_colour_is_decided_alike_whatever_is_decided_with_it(case):

@@ -53,10 +53,8 @@ def _shape(shape: Mapping[str, Any], path: Path) -> Shape:
             return Outline(label, points)
         case "mask", 4:
             pixels = to_rgb(b64decode(shape["mask"]), Limits())[..., 0] > 0
-            height, width = pixels.shape
-            changes = np.flatnonzero(np.diff(pixels.ravel(), prepend=False))
-            lengths = np.diff(changes, prepend=0, append=pixels.size).tolist()
-            return Runs(label, lengths, (int(points[0]), int(points[1]), width, height))
+            area = Proposal("", pixels)
+            return Runs(label, area.runs(), (int(points[0]), int(points[1]), *area.size))
         case other, _:
             raise LogError(f"{path}: it holds a shape ({other}) that roadeval does not read")
 
