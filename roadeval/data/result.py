@@ -130,7 +130,7 @@ class Output:
     regions: Mapping[str, Packed] = field(default_factory=dict)
     """Sets of pixels to count separately, by name."""
     facts: Mapping[str, float] = field(default_factory=dict)
-    """Numbers about the frame, by name, as ``components`` and ``max_gain``."""
+    """Numbers about the frame, by name, as the ``threshold`` that it chose."""
     probability: Probability | None = None
     """How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1, where the mask is a
     threshold on it.

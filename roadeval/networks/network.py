@@ -1,13 +1,7 @@
-"""A network's road mask of a frame; what its settings lack is read from its file, or asked for.
-
-A file's metadata may hold class names, as exporters write them (``names``: a dictionary in Python's
-or JSON's form, or a list), and a licence.
-"""
+"""A network's road mask of a frame; what its settings lack is read from its file, or asked for."""
 
 from __future__ import annotations
 
-import ast
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -73,9 +67,10 @@ class Network:
         limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * CERTAIN)
         mask = (codes > limit).astype(np.uint8)
         graded = not any(map(is_labels, outputs))
-        if not graded or len(settings.road_numbers) * len(outputs) == 1:
+        classes = settings.road or ()
+        if not graded or len(classes) * len(outputs) == 1:
             return Road(mask, codes, graded)
-        alone = [replace(settings, road=(each,)) for each in settings.road_numbers]
+        alone = [replace(settings, road=(each,)) for each in classes]
         return Road(
             *(mask, codes, graded),
             tuple(self._codes(output, place, each) for each in alone for output in outputs),
@@ -85,7 +80,6 @@ class Network:
         """Return facts about the network for results, beside its settings."""
         from onnxruntime import __version__
 
-        names = class_names(self.file.metadata)
         return {
             "onnxruntime": __version__,
             "file": self.file.path.name,
@@ -93,7 +87,7 @@ class Network:
             "licence": licence(self.file.metadata),
             "inputs": [str(each) for each in self.file.inputs],
             "outputs": [str(each) for each in self.file.outputs],
-            "road": [names.get(each, str(each)) for each in self.settings.road_numbers],
+            "road": [*map(str, self.settings.road or ())],
         }
 
     def _codes(
@@ -102,7 +96,7 @@ class Network:
         scores = as_scores(output, settings.layout)
         assert scores is not None
         if is_labels(output):
-            road = np.isin(scores[0], settings.road_numbers).astype(np.uint16)
+            road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
             return place.back(CERTAIN * road, exact=True)
         shares = road_probability(scores.astype(np.float32), settings)
         if not np.isfinite(shares).all():
@@ -119,7 +113,7 @@ def road_probability(scores: Values, settings: NetSettings) -> Values:
     of road, and of a ``sigmoid`` the greatest of them.
     """
     chosen = np.zeros(len(scores), np.bool_)
-    chosen[settings.road_numbers] = True
+    chosen[list(settings.road or ())] = True
     best: Values = scores[chosen].max(axis=0)
     if settings.decide == "argmax":
         other = scores[~chosen].max(axis=0)
@@ -222,11 +216,6 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> npt.NDArray[A
 
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
-NAMES: Final = ("names", "class_names", "classes", "labels")
-ROAD_NAMES: Final = frozenset({"road", "drivable", "drivable area", "driveable area", "roadway"})
-"""Names of classes that are road."""
-LONGEST: Final = 100_000
-"""Letters of a list of class names."""
 QUOTED: Final = 1000
 """Letters of a licence that results quote."""
 
@@ -250,17 +239,6 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     for name, array in zip(outputs, file.tried(settings.input_shape, outputs), strict=True):
         settings = _meaning(settings, file, name, array)
     return settings
-
-
-def class_names(metadata: Mapping[str, str]) -> dict[int, str]:
-    """Return the names of the classes by their numbers; none where the file lists none."""
-    text = next((metadata[key] for key in NAMES if key in metadata), "")
-    names = _read(text) if len(text) <= LONGEST else None
-    if isinstance(names, list | tuple):
-        names = dict(enumerate(names))
-    if not isinstance(names, dict):
-        return {}
-    return {int(key): visible(str(name)) for key, name in names.items() if str(key).isdecimal()}
 
 
 def licence(metadata: Mapping[str, str]) -> str | None:
@@ -361,42 +339,10 @@ def _meaning(
 
 def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int, ...]:
     """Return the numbers of the classes that are road, of ``count``; None: of labels."""
-    names = class_names(file.metadata)
-    if settings.road is not None:
-        road = tuple(_number(each, names, file) for each in settings.road)
-    elif count in (1, 2):
-        road = (count - 1,)
-    else:
-        road = tuple(n for n, name in names.items() if name.strip().lower() in ROAD_NAMES)
+    road = settings.road or ((count - 1,) if count in (1, 2) else ())
     if not road:
         of = "" if count is None else f" of its {count}"
-        listed = f", which are {_listed(names)}" if names else ""
-        raise file.question(f"name the classes{of} that are road by `net.road`, as [0]{listed}")
+        raise file.question(f"give the numbers of the classes{of} that are road by `net.road`")
     if count is not None and max(road) >= count:
         raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
     return road
-
-
-def _number(named: int | str, names: dict[int, str], file: OnnxFile) -> int:
-    if isinstance(named, int):
-        return named
-    found = next((number for number, name in names.items() if name == named), None)
-    if found is None:
-        known = f"it has {_listed(names)}" if names else "its file names none, so give numbers"
-        raise file.question(f"has no class {named!r}; {known}: see `net.road`")
-    return found
-
-
-def _listed(names: dict[int, str], most: int = 30) -> str:
-    shown = [f"{number} {name}" for number, name in list(names.items())[:most]]
-    return ", ".join(shown) + (", ..." if len(names) > most else "")
-
-
-def _read(text: str) -> Any:
-    """Return the data that a text writes in JSON's or Python's form; None if it is neither."""
-    for read in (json.loads, ast.literal_eval):
-        try:
-            return read(text)
-        except (ValueError, SyntaxError, MemoryError, RecursionError):
-            continue
-    return None

@@ -12,7 +12,7 @@ from roadeval.errors import RoadevalError
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Channels = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
 Side = Annotated[int, Field(ge=1, le=16384)]
-Class = Annotated[int, Field(ge=0, le=65535)] | str
+Class = Annotated[int, Field(ge=0, le=65535)]
 
 
 class NetworkError(RoadevalError):
@@ -51,7 +51,7 @@ class NetSettings:
     """Names of the outputs that show road; where there are several, road is what one of them calls
     road."""
     road: tuple[Class, ...] | None = None
-    """The classes that are road: numbers from 0, or names that the file's metadata list."""
+    """The numbers of the classes that are road, from 0."""
     activation: Literal["softmax", "sigmoid", "none"] | None = None
     """How probabilities are made of an output: ``softmax`` over its classes, ``sigmoid`` of each,
     or ``none`` where the network has applied one."""
@@ -74,11 +74,6 @@ class NetSettings:
         if self.layout == "NCHW":
             return 1, self.channel_count, height, width
         return 1, height, width, self.channel_count
-
-    @property
-    def road_numbers(self) -> list[int]:
-        """The numbers of the classes that are road, of complete settings."""
-        return [int(each) for each in self.road or ()]
 
     @field_validator("deviation")
     @classmethod

@@ -54,7 +54,7 @@ def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_pos
 
 def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
     settings = chain.steps[0].settings
-    image, *_ = shadow.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
+    image, _ = shadow.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
     assert (image != IMAGE).any()
     own = {step.stage.name: step.settings for step in chain.steps}
     after = chain_of(NAMES[1:], own)

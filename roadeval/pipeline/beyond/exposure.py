@@ -78,8 +78,7 @@ def bind(settings: ExposureSettings, _learnt: None, view: View) -> Output:
     """Expose what is seen."""
     gain = gains(view.image, settings)
     image = expose(view.image, gain, settings.level)
-    facts = {f"{name}_gain": float(gain[c]) for c, name in enumerate(("red", "green", "blue"))}
-    return Output((Layer(EXPOSED, image),), image=image, facts=facts)
+    return Output((Layer(EXPOSED, image),), image=image)
 
 
 STAGE: Final = Stage(

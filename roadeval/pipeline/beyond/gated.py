@@ -396,11 +396,6 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
         ),
         image=image,
         regions={name: Packed.of(mask) for name, mask in regions.items()},
-        facts={
-            "shadow_share": float(shadow.mean()),
-            "max_gain": float(greatest.max()),
-            "sunlit_level": seen.level / 3,
-        },
     )
 
 

@@ -275,14 +275,12 @@ class Moments:
 class Compensation:
     """The linear map of each component, ``target + (I - source) * gain``; ``(count, C)`` each.
 
-    ``applied`` is ``(count,)`` bool: the components that have a ring and the least area. The
-    others map to themselves.
+    Components without a ring, or smaller than the least area, map to themselves.
     """
 
     source: Floats
     target: Floats
     gain: Floats
-    applied: npt.NDArray[np.bool_]
 
 
 def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
@@ -334,18 +332,17 @@ def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Co
     applied = (ring.pixels > 0) & (inside.pixels >= settings.min_area)
     applied[0] = False
     here = applied[:, None]
-    return Compensation(
-        inside.mean, np.where(here, ring.mean, inside.mean), np.where(here, gain, 1.0), applied
-    )
+    target = np.where(here, ring.mean, inside.mean)
+    return Compensation(inside.mean, target, np.where(here, gain, 1.0))
 
 
-def compensate(
-    view: View, found: Components, ring: Packed, settings: ShadowSettings
-) -> tuple[Rgb, Compensation]:
+def compensate(view: View, found: Components, ring: Packed, settings: ShadowSettings) -> Rgb:
     """Apply Eq. 11 to every component of the image that is seen.
 
     ``ring`` is the union of their buffer rings. Without a component it is the image itself.
     """
+    if not found.count:
+        return view.image
     if settings.colour_space == "hsi":
         return _compensate_hsi(view.image, found, ring, settings)
     count, width = found.count + 1, settings.ring_width
@@ -356,26 +353,20 @@ def compensate(
     change = compensation(both[:count], both[count:], settings)
     # The kernels take C-contiguous arrays.
     linear = map(np.ascontiguousarray, (change.source, change.target, change.gain))
-    image = KERNELS.transfer(view.image, found.runs, *linear) if found.count else view.image
-    return image, change
+    return KERNELS.transfer(view.image, found.runs, *linear)
 
 
-def lift(
-    view: View, shadow: Packed, settings: ShadowSettings
-) -> tuple[Rgb, Packed, int, Compensation]:
+def lift(view: View, shadow: Packed, settings: ShadowSettings) -> tuple[Rgb, Packed]:
     """Compensate what a mask calls shadow: components, rings, linear map (Eq. 9-11).
 
-    Returns the image, the rings, the number of components, and the map of each.
+    Returns the image, and the rings.
     """
     found = connected_components(shadow, settings.connectivity)
     ring = buffer_ring(shadow, settings.ring_width)
-    image, change = compensate(view, found, ring, settings)
-    return image, ring, found.count, change
+    return compensate(view, found, ring, settings), ring
 
 
-def _compensate_hsi(
-    image: Rgb, found: Components, ring: Packed, settings: ShadowSettings
-) -> tuple[Rgb, Compensation]:
+def _compensate_hsi(image: Rgb, found: Components, ring: Packed, settings: ShadowSettings) -> Rgb:
     """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
     labels = found.labels()
     label, pixel = ring_pairs(labels, ring.pixels(), settings.ring_width)
@@ -391,7 +382,7 @@ def _compensate_hsi(
     result = flat.copy()
     # Components that are left as they are come back exactly: the conversion inverts every hsi.
     result[shadow] = hsv_to_rgb(hue(flat[shadow]), mapped[:, 0], mapped[:, 1])
-    return result.reshape(image.shape), change
+    return result.reshape(image.shape)
 
 
 def _saturation_value(rgb: npt.NDArray[np.uint8]) -> Floats:
@@ -406,7 +397,7 @@ def bind(settings: ShadowSettings, _learnt: None, view: View) -> Output:
     threshold = threshold_of(histogram)
     mask = shadow_mask(codes, threshold, inclusive=settings.inclusive)
     shadow = Packed.of(mask)
-    image, ring, count, change = lift(view, shadow, settings)
+    image, ring = lift(view, shadow, settings)
     lit = everywhere(shadow.shape) & ~(shadow.bits | ring.bits)
     return Output(
         layers=(
@@ -417,7 +408,7 @@ def bind(settings: ShadowSettings, _learnt: None, view: View) -> Output:
         ),
         image=image,
         regions={"shadow": shadow, "shadow_edge": ring, "lit": Packed(lit, shadow.width)},
-        facts=_facts(threshold, shadow, count, change),
+        facts={"threshold": math.nan if threshold is None else threshold / 127.5 - 1.0},
     )
 
 
@@ -428,20 +419,6 @@ def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth
         return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
 
     return run
-
-
-def _facts(
-    threshold: int | None, shadow: Packed, count: int, change: Compensation
-) -> dict[str, float]:
-    greatest = change.gain.max(axis=1)[change.applied]
-    return {
-        "threshold": float("nan") if threshold is None else threshold / 127.5 - 1.0,
-        "shadow_share": shadow.area() / math.prod(shadow.shape),
-        "components": float(count),
-        "compensated": float(greatest.size),
-        "max_gain": float(greatest.max()) if greatest.size else 1.0,
-        "gains_above_3": float(np.count_nonzero(greatest > 3.0)),
-    }
 
 
 STAGE: Final = Stage(
