@@ -177,7 +177,7 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
 
 
 def _chain(names: Any) -> tuple[str, ...]:
-    """Check a chain: known stages, each once, one mask of a name, and the final one last."""
+    """Check a chain: known stages, each once, and the final one last."""
     if not isinstance(names, list | tuple) or not names:
         raise ConfigError(f"chain must be a list of stages; choose {either(stages.names())}")
     for name in names:
@@ -190,11 +190,6 @@ def _chain(names: Any) -> tuple[str, ...]:
         raise ConfigError(f"chain: {error}") from error
     if len({stage.name for stage in found}) < len(found):
         raise ConfigError("chain: a stage can occur only once")
-    masks = [stage.reported for stage in found if stage.yields_mask]
-    for mask in masks:
-        if masks.count(mask) > 1:
-            both = [stage.name for stage in found if stage.reported == mask]
-            raise ConfigError(f"chain: {' and '.join(both)} both make the mask {mask}")
     if names[-1] != FINAL_STAGE:
         raise ConfigError(f"chain must end with {FINAL_STAGE}, whose mask is the answer")
     return tuple(names)

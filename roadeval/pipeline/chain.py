@@ -41,8 +41,8 @@ class Pipeline:
         return tuple(spec for stage, own in self._each() for spec in stage.specs(own))
 
     def masks(self) -> tuple[str, ...]:
-        """Return the road masks, in order, by the names that their stages are reported under."""
-        return tuple(stage.reported for stage in self.stages() if stage.yields_mask)
+        """Return the names of the stages that make a road mask, in order."""
+        return tuple(stage.name for stage in self.stages() if stage.yields_mask)
 
     @property
     def has_filter(self) -> bool:
@@ -108,9 +108,7 @@ class Pipeline:
 
     def about(self) -> dict[str, dict[str, Any]]:
         """Return what results say of stages beside their settings, by stage."""
-        return {
-            stage.reported: dict(stage.about(own)) for stage, own in self._each() if stage.about
-        }
+        return {stage.name: dict(stage.about(own)) for stage, own in self._each() if stage.about}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the chain and its settings as plain data, in the shape of a TOML file."""
@@ -154,7 +152,7 @@ class Chain:
         for step in self.steps:
             output = step.run(view)
             view = view.after(output)
-            yield step.stage.reported, output
+            yield step.stage.name, output
 
     def oracles(
         self,
@@ -169,7 +167,7 @@ class Chain:
         ``view`` and ``outputs`` are the argument and the outputs of `run`, ``road`` and ``shadow``
         the truths, ``(H, W)`` uint8 (0, 1, 255); without that of shadow no filter is replaced.
         ``known`` is what is the same for all variants of the frame, filled as it is computed.
-        Yielded are the stage that was replaced, as it is reported, and the masks of those after it.
+        Yielded are the name of the stage that was replaced, and the masks of those after it.
         """
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
@@ -178,7 +176,7 @@ class Chain:
                 key = _shared(step, rest)
                 if not key or key not in known:
                     known[key] = dict(_masks(rest, view.after(step.oracle(view, truth))))
-                yield step.stage.reported, known[key]
+                yield step.stage.name, known[key]
             view = view.after(output)
 
     def repeated(self, view: View, outputs: Sequence[Output]) -> Iterator[tuple[str, Packed]]:
@@ -217,4 +215,4 @@ def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:
         output = step.run(view)
         view = view.after(output)
         if output.mask is not None:
-            yield step.stage.reported, output.mask
+            yield step.stage.name, output.mask

@@ -155,7 +155,7 @@ class Stage:
     """One step of a pipeline."""
 
     name: str
-    """In a chain and in a configuration."""
+    """In a chain, a configuration, tables and recordings; also that of the layer of its mask."""
     title: str
     """A few words for a person, as ``Phase 1: colour similarity``."""
     settings: type[Any]
@@ -190,9 +190,6 @@ class Stage:
     hears: Callable[[Any], bool] | None = None
     """``hears(settings)`` tells whether it learns from what the stage before says of a frame, which
     must learn nothing itself: of frames that taught it, that would say too much. None: never."""
-    mask: str = ""
-    """The layer of its mask, and its name in tables and timing, where that is not ``name``: stages
-    that do the same in different ways are tabled under one name."""
     sees_mask_alone: bool = False
     """Whether its only input is the mask before it. After a perfect mask its result is then the
     same in every variant that has its settings."""
@@ -216,11 +213,6 @@ class Stage:
     def yields_mask(self) -> bool:
         """Whether it hands out a road mask; otherwise an image for the stages after it."""
         return not (self.is_filter or self.preprocesses)
-
-    @property
-    def reported(self) -> str:
-        """Its name in tables, recordings and timing."""
-        return self.mask or self.name
 
 
 def per_view(

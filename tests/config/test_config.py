@@ -102,7 +102,7 @@ def test_a_nested_table_overrides_a_part(tmp_path):
             r"fleet\.keep: must be all, none or worst:N",
         ),
         (
-            "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = ['a', -1]",
+            "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = [3, -1]",
             r"net\.road, item 2: must be at least 0",
         ),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),

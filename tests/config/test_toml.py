@@ -97,7 +97,7 @@ def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tm
 
 @pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
 def test_a_tuned_network_reads_back_from_the_file_of_a_run(write, tmp_path):
-    (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = ["road", 3]\n')
+    (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = [1, 3]\n')
     config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
     config = config.with_tuned(["mine"])
     (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")

@@ -64,7 +64,7 @@ def run_variant(
         if found is None:
             start = perf_counter()
             output = step.run(seen)
-            found = StageResult(stage.reported, output, perf_counter() - start)
+            found = StageResult(stage.name, output, perf_counter() - start)
         if is_shared:
             shared[stage.name, step.settings] = found
         results.append(found)

@@ -10,9 +10,9 @@ from __future__ import annotations
 import io
 import re
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import redirect_stderr
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
@@ -129,8 +129,6 @@ class Encoding:
     """A channel's ``message_encoding``."""
     reader: Callable[[Schema | None], MessageReader | None]
     """Return what reads the messages of a schema, or None if nothing does."""
-    kinds: Mapping[str, TopicKind] = field(default_factory=dict)
-    """What messages carry by the last part of their schema's name, for schemas not in `SCHEMAS`."""
     without_schema: TopicKind = TopicKind.OTHER
     """What the messages of a channel without a schema may carry; the first ones are looked at."""
 

@@ -164,11 +164,10 @@ def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
 
     Of transforms only those that are static: others come too often to be indexed.
     """
-    encoding = message_encodings().get(channel.message_encoding)
     if schema is None:
+        encoding = message_encodings().get(channel.message_encoding)
         return encoding.without_schema if encoding else TopicKind.OTHER
-    kinds = {**KINDS, **encoding.kinds} if encoding else KINDS
-    kind = kinds.get((parts_of(schema.name) or [""])[-1], TopicKind.OTHER)
+    kind = KINDS.get((parts_of(schema.name) or [""])[-1], TopicKind.OTHER)
     moves = kind is TopicKind.TRANSFORMS and not channel.topic.endswith("static")
     return TopicKind.OTHER if moves else kind
 

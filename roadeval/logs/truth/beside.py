@@ -214,11 +214,8 @@ def npy_picture(data: bytes, limits: Limits) -> RawPicture:
     """
     head = io.BytesIO(data[:_LONGEST_HEAD])
     try:
-        version = np.lib.format.read_magic(head)
-        if version == (1, 0):
-            shape, by_columns, dtype = np.lib.format.read_array_header_1_0(head)
-        else:
-            shape, by_columns, dtype = np.lib.format.read_array_header_2_0(head)
+        np.lib.format.read_magic(head)
+        shape, by_columns, dtype = np.lib.format.read_array_header_1_0(head)
     except (ValueError, TypeError, SyntaxError, EOFError, RecursionError, MemoryError) as error:
         raise BadMessage("no NPY file, or its head is damaged") from error
     if len(shape) != 2 or dtype.kind not in "buif":

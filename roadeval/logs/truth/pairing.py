@@ -424,7 +424,13 @@ def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
         in_order = period > 0 and _rise(images) and _rise(labels)
         reach = max(REACH * period, camera.tolerance_ns) if in_order else None
         return Pairing(images, labels, camera.tolerance_ns, reach)
-    return Pairing(Times(images.log_times), Times(labels.log_times), camera.tolerance_ns)
+    # Where all times are equal, order means something only if there is a label for each image.
+    in_order = len(images) == len(labels) or images.log_times[0] != images.log_times[-1]
+    return Pairing(
+        Times(images.log_times),
+        Times(labels.log_times, None if in_order else 0),
+        camera.tolerance_ns,
+    )
 
 
 def _rise(stamps: Stamps) -> bool:
