@@ -131,13 +131,10 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     return runs[: room[0][-1]].copy(), count
 
 
-def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
-    if patch.size:
-        _require(patch, len(bits), width)
+def keep_region(bits: Bits, width: int) -> Bits:
     room, kept = _room_for_runs(bits, width), np.zeros_like(bits)
     votes = np.empty_like(room[3])
-    wanted = patch if patch.size else None
-    _loops.keep_region(bits, len(bits), width, wanted, *room, votes, kept)
+    _loops.keep_region(bits, len(bits), width, None, *room, votes, kept)
     return kept
 
 

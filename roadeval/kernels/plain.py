@@ -316,20 +316,16 @@ def _run_pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:
     return np.repeat(y, length), first + np.arange(len(first)), np.repeat(label, length)
 
 
-def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
-    """Keep one 8-connected component of a mask; an empty one stays empty.
+def keep_region(bits: Bits, width: int) -> Bits:
+    """Keep the largest 8-connected component of a mask; of equals the first from the top.
 
-    The one with most pixels where ``patch``, ``(H, W)`` or empty, is nonzero; the largest where
-    none has any there. Of equals the first from the top.
+    An empty mask stays empty.
     """
     count, labels = cv2.connectedComponents(unpack(bits, width))
     if count <= 1:
         return bits.copy()
-    votes = np.bincount(labels.ravel(), minlength=count)[1:]
-    if patch.size:
-        inside = np.bincount(labels[patch > 0], minlength=count)[1:]
-        votes = inside if inside.any() else votes
-    best = np.flatnonzero(votes == votes.max()) + 1
+    areas = np.bincount(labels.ravel(), minlength=count)[1:]
+    best = np.flatnonzero(areas == areas.max()) + 1
     # The library numbers components by blocks of rows: of equals, the first pixel decides.
     first = best[0] if len(best) == 1 else labels[np.isin(labels, best)][0]
     return pack(labels == first)

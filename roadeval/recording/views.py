@@ -43,15 +43,10 @@ from roadeval.runtime.text import as_markdown
 
 BlueprintPart = Any
 """A view or a container of views."""
-# All sizes are points; the viewer takes them as shares of the room that it has.
-_WIDTH: Final = 1920
-_HEIGHT: Final = 990
-_TITLE: Final = 26
-_HEADER: Final = 120
-_LEAST_WORDS: Final = 400
-_LEAST_CURVES: Final = 250
-_LEAST_PICTURE: Final = 200
-
+_TOP, _ROW, _BOTTOM = 64, 44, 50
+"""Shares of the height that the overview's first row, a variant's row and its curves take."""
+_PICTURE, _HEADER = 100, 50
+"""Shares of the width of a row that each of its pictures takes, and its header at least."""
 _ROWS: Final = 2
 """Most variants that have a row: more would leave every picture too small to read."""
 _ABREAST: Final = 3
@@ -211,21 +206,13 @@ def overview(layout: Layout) -> BlueprintPart:
     columns = max(map(len, rows.values()))
     shortest = min(rows, key=lambda name: len(rows[name]))
     aside = {shortest: _events()} if len(rows[shortest]) + 1 < columns else {}
-
     pictures = [camera(), *([truth()] if layout.has_truth else [])]
     pictures += [outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]]
-    ratio = layout.height / layout.width
-    row = min((_WIDTH - _HEADER) / columns * ratio, _HEIGHT / 3) + _TITLE
-    height = _HEIGHT - row * len(rows) - _LEAST_CURVES - _TITLE
-    width = max(min(height / ratio, (_WIDTH - _LEAST_WORDS) / len(pictures)), _LEAST_PICTURE)
-    top = width * ratio + _TITLE
-    guide = document(at.GUIDE, "What you see")
-    shares = [*[width] * len(pictures), _WIDTH - width * len(pictures)]
     return rrb.Vertical(
-        rrb.Horizontal(*pictures, guide, column_shares=shares),
+        rrb.Horizontal(*pictures, document(at.GUIDE, "What you see")),
         *(_row(name, cells, columns, aside.get(name)) for name, cells in rows.items()),
         rrb.Horizontal(*_curves(layout), *([] if aside else [_events()])),
-        row_shares=[top, *[row] * len(rows), max(_HEIGHT - top - row * len(rows), _LEAST_CURVES)],
+        row_shares=[_TOP, *[_ROW] * len(rows), _BOTTOM],
         name="Overview",
     )
 
@@ -253,13 +240,11 @@ def _row(
 
     What has its place beside a short row stands before the row's header, which parts the two.
     """
-    width = (_WIDTH - _HEADER) / columns
-    space = (columns - len(cells)) * width
     # Titles must be short here: the layers' names.
     pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
-    header = document(at.guide_path(variant))
+    header, space = document(at.guide_path(variant)), _PICTURE * (columns - len(cells))
     start, shares = ([aside, header], [space, _HEADER]) if aside else ([header], [_HEADER + space])
-    return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[width] * len(cells)])
+    return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[_PICTURE] * len(cells)])
 
 
 def _curves(layout: Layout) -> list[BlueprintPart]:

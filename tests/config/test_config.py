@@ -65,9 +65,9 @@ def test_a_file_may_start_from_a_preset(tmp_path):
 
 
 def test_a_nested_table_overrides_a_part(tmp_path):
-    post = load_config(write(tmp_path, "[post.patch]\ntop = 0.6")).pipeline.settings["post"]
-    assert post.patch.top == 0.6
-    assert post.patch.bottom == RunConfig().pipeline.settings["post"].patch.bottom
+    training = load_config(write(tmp_path, "[training.patch]\ntop = 0.6")).training
+    assert training.patch.top == 0.6
+    assert training.patch.bottom == RunConfig().training.patch.bottom
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_nested_table_overrides_a_part(tmp_path):
         ("[svm]\ngamma = nan", r"svm\.gamma: .*finite"),
         ("[svm]\nkernel = 'poly'", r"svm\.kernel: .*'rbf' or 'linear'"),
         ("[post]\nelement = 4", r"post\.element: must be odd"),
-        ("[post.patch]\ntop = 0.99", r"post\.patch: top must lie above bottom"),
+        ("[training.patch]\ntop = 0.99", r"training\.patch: top must lie above bottom"),
         ("[frames]\nevery = true", r"frames\.every: must be a whole number \(given: true\)"),
         ("[labels]\nroad = 3", r"labels\.road: must be a list \(given: 3\)"),
         (f"[topics]\nimage = ['{'x' * 999}']", r"must be text \(given: \[\"x{58}\.\.\.\)$"),

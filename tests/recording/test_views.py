@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import pytest
 import rerun as rr
 
 from roadeval.data import LabelClass, LayerKind, LayerSpec, VariantLayout, mask_spec
@@ -39,20 +38,6 @@ def test_a_third_variant_has_its_errors_on_the_overview_but_no_row():
     assert "/network/errors" in overview
     assert "/unfiltered/svm" in overview
     assert "/network/svm" not in overview
-
-
-@pytest.mark.parametrize(("width", "height"), [(480, 360), (1920, 400), (300, 900)])
-def test_every_shape_of_image_leaves_room_for_the_curves(width, height):
-    root = views.arrange({"": layout(width=width, height=height)}).root_container
-    shares = root.contents[0].row_shares
-    assert min(shares) > 0
-    assert shares[-1] >= sum(shares) * 0.15
-
-
-@pytest.mark.parametrize(("width", "height"), [(480, 360), (1920, 400)])
-def test_the_rows_of_the_overview_fill_a_screen_and_no_more(width, height):
-    root = views.arrange({"": layout(width=width, height=height)}).root_container
-    assert sum(root.contents[0].row_shares) == pytest.approx(990)
 
 
 # --- The words in a recording ---------------------------------------------------------------------

@@ -12,10 +12,9 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Packed, colours, mask_spec
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Packed, colours, mask_spec
 from roadeval.data.arrays import Reach
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View, stage_settings
 
 LINE: Final = 3
@@ -46,13 +45,10 @@ class PostSettings:
     beside it, for good: without the filter it costs 4 and 10 points of ERR on two real drives
     (on three synthetic ones it gains 8 and 6 and costs 1). So the opening comes first here; the
     presets ``printed_order`` and ``printed`` close first."""
-    region: Literal["largest", "patch", "all"] = "largest"
-    """What is kept: the ``largest`` component, the component with most pixels in the reference
-    patch before the vehicle (``patch``; the largest where none has any), or ``all`` of them."""
+    region: Literal["largest", "all"] = "largest"
+    """What is kept: the ``largest`` component, or ``all`` of them."""
     fill: bool = True
     """Whether the holes of what is kept are filled (Eq. 23)."""
-    patch: ReferencePatch = ReferencePatch()
-    """The reference patch."""
 
     @field_validator("element")
     @classmethod
@@ -110,17 +106,12 @@ def boundary(mask: Packed, element: Reach) -> Packed:
     return Packed(mask.bits & ~erode(mask, element).bits, mask.width)
 
 
-def keep_region(mask: Packed, patch: Mask | None = None) -> Packed:
-    """Keep one 8-connected component of a mask ("largest and connected areas", section 3.4).
+def keep_region(mask: Packed) -> Packed:
+    """Keep the largest 8-connected component ("largest and connected areas", section 3.4).
 
-    The largest, or, given an ``(H, W)`` ``patch``, the one with most pixels in it where any has
-    some. Of equals the first from the top. An empty mask stays empty. A ValueError if the patch
-    has another shape.
+    Of equals the first from the top. An empty mask stays empty.
     """
-    if patch is not None and patch.shape != mask.shape:
-        raise ValueError(f"a patch of {patch.shape} does not fit a mask of {mask.shape}")
-    chosen = np.zeros((0, 0), np.uint8) if patch is None else patch
-    return Packed(KERNELS.keep_region(mask.bits, mask.width, chosen), mask.width)
+    return Packed(KERNELS.keep_region(mask.bits, mask.width), mask.width)
 
 
 def fill_holes(mask: Packed) -> Packed:
@@ -138,9 +129,8 @@ def post_process(mask: Packed, settings: PostSettings) -> Packed:
     element = structuring_element(side)
     for operation in settings.operations:
         mask = opening(mask, element) if operation == "open" else closing(mask, element)
-    if settings.region != "all":
-        patch = settings.region == "patch"
-        mask = keep_region(mask, patch_mask(*mask.shape, settings.patch) if patch else None)
+    if settings.region == "largest":
+        mask = keep_region(mask)
     return fill_holes(mask) if settings.fill else mask
 
 

@@ -74,8 +74,6 @@ class ShadowSettings:
     ring_width: Annotated[int, Field(ge=1, le=16)] = 1
     """Number of 3x3 dilations that make a buffer ring (Eq. 10), at most 16: the work grows with its
     square."""
-    min_area: Annotated[int, Field(ge=1)] = 1
-    """Components of fewer pixels are left as they are."""
     max_gain: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     """Upper bound of the contrast gain of Eq. 11; none as printed. Gains above 3 are common."""
     statistic: Literal["deviation", "printed"] = "deviation"
@@ -275,7 +273,7 @@ class Moments:
 class Compensation:
     """The linear map of each component, ``target + (I - source) * gain``; ``(count, C)`` each.
 
-    Components without a ring, or smaller than the least area, map to themselves.
+    Components without a ring map to themselves.
     """
 
     source: Floats
@@ -329,9 +327,8 @@ def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Co
     gain = np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), 1.0)
     if settings.max_gain is not None:
         gain = np.minimum(gain, settings.max_gain)
-    applied = (ring.pixels > 0) & (inside.pixels >= settings.min_area)
-    applied[0] = False
-    here = applied[:, None]
+    here = ring.pixels[:, None] > 0
+    here[0] = False
     target = np.where(here, ring.mean, inside.mean)
     return Compensation(inside.mean, target, np.where(here, gain, 1.0))
 

@@ -10,7 +10,6 @@ from scipy import ndimage
 from roadeval.data import Packed
 from roadeval.pipeline.paper import post
 from roadeval.pipeline.paper.post import PostSettings
-from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import Output, View
 from tests.pipeline import reference
 from tests.pipeline.images import mask, masks
@@ -162,26 +161,13 @@ def test_diagonal_neighbours_are_one_component():
     assert (keep_region(road) == mask("....", "....", "...#", "..#.", ".#..")).all()
 
 
-def test_the_component_with_most_pixels_in_the_patch_is_preferred():
-    road = mask("######", "......", "##..#.")
-    patch = mask("......", "......", ".###.#")
-    assert (keep_region(road, patch) == mask("......", "......", "##....")).all()
-
-
-def test_without_any_pixel_in_the_patch_the_largest_component_is_kept():
-    road, patch = mask("##....", "......", "######"), mask("......", "######", "......")
-    assert (keep_region(road, patch) == mask("......", "......", "######")).all()
-
-
 def test_the_region_rule_is_a_setting():
     road = mask(*["############"] * 6, *["............"] * 5, *["....####...."] * 5)
-    patch = ReferencePatch(top=0.8, bottom=1.0)
     for region, kept in (
         ("largest", road * (np.arange(16) < 6)[:, None]),
-        ("patch", road * (np.arange(16) > 6)[:, None]),
         ("all", road),
     ):
-        np.testing.assert_array_equal(post_process(road, region=region, patch=patch), kept)
+        np.testing.assert_array_equal(post_process(road, region=region), kept)
 
 
 # --- Eq. 23 ---------------------------------------------------------------------------------------

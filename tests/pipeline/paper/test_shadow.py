@@ -265,7 +265,7 @@ def literal_eq_11(values, shadowed, options, connectivity=2):
     labels, _ = ndimage.label(shadowed, ndimage.generate_binary_structure(2, connectivity))
     result = values.astype(float)
     for _, own, ring in literal_rings(shadowed, labels, options.ring_width):
-        if not ring.any() or own.sum() < options.min_area:
+        if not ring.any():
             continue
         for c in range(values.shape[2]):
             inside, around = values[own, c].astype(float), values[ring, c].astype(float)
@@ -292,7 +292,6 @@ options = st.builds(
     ShadowSettings,
     connectivity=st.sampled_from([4, 8]),
     ring_width=st.integers(1, 3),
-    min_area=st.sampled_from([1, 1, 3]),
     max_gain=st.sampled_from([None, None, 1.5]),
     statistic=st.sampled_from(["deviation", "printed"]),
 )
