@@ -8,7 +8,7 @@ from itertools import takewhile
 from typing import Any
 
 from roadeval.data import LayerSpec, Output, Packed, Rgb, Truth
-from roadeval.pipeline.stage import Stage, View, perfect_mask
+from roadeval.pipeline.stage import Stage, View
 from roadeval.pipeline.stages import stages_of
 
 
@@ -160,23 +160,18 @@ class Chain:
         outputs: Sequence[Output],
         road: Truth,
         shadow: Truth | None,
-        known: dict[Any, dict[str, Packed]],
     ) -> Iterator[tuple[str, dict[str, Packed]]]:
         """Yield what the chain makes of an image once one of its stages is replaced by the truth.
 
         ``view`` and ``outputs`` are the argument and the outputs of `run`, ``road`` and ``shadow``
         the truths, ``(H, W)`` uint8 (0, 1, 255); without that of shadow no filter is replaced.
-        ``known`` is what is the same for all variants of the frame, filled as it is computed.
         Yielded are the name of the stage that was replaced, and the masks of those after it.
         """
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
             if step.oracle is not None and truth is not None:
-                rest = self.steps[place + 1 :]
-                key = _shared(step, rest)
-                if not key or key not in known:
-                    known[key] = dict(_masks(rest, view.after(step.oracle(view, truth))))
-                yield step.stage.name, known[key]
+                seen = view.after(step.oracle(view, truth))
+                yield step.stage.name, dict(_masks(self.steps[place + 1 :], seen))
             view = view.after(output)
 
     def repeated(self, view: View, outputs: Sequence[Output]) -> Iterator[tuple[str, Packed]]:
@@ -198,16 +193,6 @@ class Chain:
             if not step.stage.yields_mask:
                 view = view.after(step.run(view))
         return view.image
-
-
-def _shared(step: Step, rest: Sequence[Step]) -> tuple[tuple[str, Any], ...]:
-    """Return what the masks after a perfect stage depend on apart from the truth.
-
-    Empty where they depend on the image too.
-    """
-    if step.stage.oracle is not perfect_mask or not all(s.stage.sees_mask_alone for s in rest):
-        return ()
-    return tuple((each.stage.name, each.settings) for each in rest)
 
 
 def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:

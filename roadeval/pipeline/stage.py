@@ -190,9 +190,6 @@ class Stage:
     hears: Callable[[Any], bool] | None = None
     """``hears(settings)`` tells whether it learns from what the stage before says of a frame, which
     must learn nothing itself: of frames that taught it, that would say too much. None: never."""
-    sees_mask_alone: bool = False
-    """Whether its only input is the mask before it. After a perfect mask its result is then the
-    same in every variant that has its settings."""
     resolve: Callable[[Any], Any] | None = None
     """``resolve(settings)`` returns the settings with all stated that they leave to a file, its
     digest included; a `RoadevalError` if the file cannot be used. None where they name none."""

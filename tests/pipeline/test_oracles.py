@@ -32,7 +32,7 @@ def assert_same(found, expected, name=""):
 
 def oracles(chain, shadow_truth=TRULY_DARK):
     outputs = [output for _, output in chain.run(SEEN)]
-    return dict(chain.oracles(SEEN, outputs, ROAD, shadow_truth, {}))
+    return dict(chain.oracles(SEEN, outputs, ROAD, shadow_truth))
 
 
 def masks(steps_of, image):
@@ -66,7 +66,7 @@ def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
 
 def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
     outputs = [output for _, output in chain.run(SEEN)]
-    told = dict(chain.oracles(SEEN, outputs, ROAD, outputs[0].regions["shadow"].pixels(), {}))
+    told = dict(chain.oracles(SEEN, outputs, ROAD, outputs[0].regions["shadow"].pixels()))
     for name, mask in masks(chain, IMAGE).items():
         assert_same(told["shadow"][name], mask, name)
 
@@ -83,7 +83,7 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     outputs = [output for _, output in longer.run(SEEN)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
-    told = dict(longer.oracles(SEEN, outputs, ROAD, outputs[1].regions["shadow"].pixels(), {}))
+    told = dict(longer.oracles(SEEN, outputs, ROAD, outputs[1].regions["shadow"].pixels()))
     for name, mask in masks(longer, IMAGE).items():
         assert_same(told["shadow"][name], mask, name)
 
@@ -100,7 +100,7 @@ def test_a_perfect_filter_leaves_a_frame_without_shadow_as_it_is(chain):
 def test_running_oracles_changes_no_output(chain):
     outputs = [output for _, output in chain.run(SEEN)]
     before = [None if o.mask is None else o.mask.pixels() for o in outputs]
-    dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, {}))
+    dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK))
     for mask, output in zip(before, outputs, strict=True):
         if mask is not None:
             np.testing.assert_array_equal(mask, output.mask.pixels())
@@ -109,20 +109,6 @@ def test_running_oracles_changes_no_output(chain):
 def test_every_machine_and_every_filter_has_an_oracle():
     named = {name for name, stage in STAGES.items() if stage.oracle}
     assert named == {"shadow", "gated", "svm", "trees"}
-
-
-def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):
-    outputs = [output for _, output in chain.run(SEEN)]
-    known = {}
-    first = dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, known))
-    again = dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, known))
-    assert again["svm"] is first["svm"]
-    assert again["shadow"] is not first["shadow"]
-    other = chain_of(["svm", "post"], SETTINGS["printed"])
-    outputs = [output for _, output in other.run(SEEN)]
-    alone = dict(other.oracles(SEEN, outputs, ROAD, None, {}))["svm"]
-    shared = dict(other.oracles(SEEN, outputs, ROAD, None, known))["svm"]
-    assert_same(shared["post"], alone["post"])
 
 
 # --- A chain that takes over what another of the same stages has computed -------------------------

@@ -49,9 +49,9 @@ def run_variant(
     """Run a chain on a frame and time each of its stages.
 
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
-    ``known`` is what the frame's variants share: what `Chain.oracles` says, and the first stage of
-    chains that makes a mask and has learnt nothing, as a network that is tuned besides. Then the
-    chains of further trainings run, too, by their seeds.
+    ``known`` is what the frame's variants share: the first stage of chains that makes a mask and
+    has learnt nothing, as a network that is tuned besides. Then the chains of further trainings
+    run, too, by their seeds.
     """
     shared = {} if known is None else known
     results, seen = [], view
@@ -72,7 +72,7 @@ def run_variant(
     if truth is None:
         return VariantResult(name, tuple(results))
     outputs = [each.output for each in results]
-    oracles = dict(chain.oracles(view, outputs, truth, shadow_truth, shared))
+    oracles = dict(chain.oracles(view, outputs, truth, shadow_truth))
     again = {s: dict(other.repeated(view, outputs)) for s, other in (repeats or {}).items()}
     return VariantResult(name, tuple(results), oracles, again)
 

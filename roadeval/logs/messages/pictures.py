@@ -53,15 +53,11 @@ class CompressedPicture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecodedPicture:
-    """A video's frame: its packet, and what became of it together with those before it.
-
-    ``damage`` says what is wrong with the pixels; empty if nothing is.
-    """
+    """A video's frame: its packet, and what became of it together with those before it."""
 
     stamp_ns: int
     data: Buffer
     pixels: Rgb
-    damage: str = ""
 
 
 BUFFERS: Final = (bytes, bytearray, memoryview)
@@ -365,10 +361,11 @@ class Video:
         for frame in frames:
             damage = self._damage_of(frame)
             packet = self._waiting.pop(frame.pts, None)
-            if packet is not None:
+            if packet is not None and damage:
+                self._ready[frame.pts] = FrameError(damage)
+            elif packet is not None:
                 pixels = frame.to_ndarray(format="rgb24")
-                found = DecodedPicture(packet.stamp_ns, packet.data, pixels, damage)
-                self._ready[frame.pts] = found
+                self._ready[frame.pts] = DecodedPicture(packet.stamp_ns, packet.data, pixels)
 
     def _reason(self, error: Any) -> str:
         """Return why a packet cannot be decoded: its size, where the decoder tells it."""

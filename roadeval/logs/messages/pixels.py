@@ -151,8 +151,6 @@ def to_rgb(picture: Picture, limits: Limits) -> Rgb:
             return raw_to_rgb(picture, limits)
         if isinstance(picture, CompressedPicture):
             return images.to_rgb(_image_file(picture), limits)
-    if picture.damage:
-        raise BadMessage(picture.damage)
     return picture.pixels
 
 

@@ -175,12 +175,6 @@ def _notes(
         notes.append(f"{some(others)}: of another format than the other labels, not read")
     if bare := len(drawn) - len(labelled):
         notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
-    beyond = [each.image for each in labelled if each.is_cut()]
-    if beyond:
-        notes.append(
-            f"{len(beyond)} of {len(labelled)} labels reach beyond their image, and are cut at its "
-            f"edge: {some(beyond)}"
-        )
     return tuple(notes)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -106,14 +105,6 @@ class Drawing:
     def classes(self) -> set[str]:
         """The classes that occur."""
         return {shape.label for shape in self.shapes}
-
-    def is_cut(self) -> bool:
-        """Whether an outline reaches more than a pixel beyond the image; not if one is wrong."""
-        with suppress(BadMessage, TypeError, ValueError, OverflowError):
-            rings = [each.points() for each in self.shapes if isinstance(each, Outline)]
-            beyond = (((r < -1.5) | (r > np.add(self.size or FARTHEST, 0.5))).any() for r in rings)
-            return any(beyond)
-        return False
 
     def content(self) -> bytes:
         """Return all that decides its pixels."""

@@ -154,5 +154,4 @@ STAGE: Final = Stage(
     settings=PostSettings,
     bind=bind,
     layers=(POST, BOUNDARY),
-    sees_mask_alone=True,
 )
