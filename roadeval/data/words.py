@@ -11,6 +11,8 @@ from typing import Any, Final, TypeGuard
 DASH: Final = "\N{EN DASH}"
 """Between two numbers; and where a number is undefined."""
 MINUS: Final = "\N{MINUS SIGN}"
+UNSET: Final = "not given"
+"""Of a setting."""
 _YEAR_NS: Final = 365 * 24 * 3600 * 1_000_000_000
 
 
@@ -100,7 +102,7 @@ def setting(value: Any) -> str:
     ('not given', '3, 4', '0.5')
     """
     if value is None or value in ({}, [], ()):
-        return "not given"
+        return UNSET
     if isinstance(value, dict):
         return ", ".join(f"{name}={each}" for name, each in value.items())
     if isinstance(value, list | tuple):

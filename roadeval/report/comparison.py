@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from itertools import groupby, pairwise
 from typing import Any, Final
 
@@ -17,7 +16,7 @@ from roadeval.evaluation.comparison import (
     MovedFrame,
     RegionChange,
 )
-from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
+from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import TESTED
 from roadeval.report.blocks import (
     Block,
@@ -133,10 +132,7 @@ def overview(
     yield from _limits(judgements)
     yield Text(told.verdict(comparison), "verdict")
     yield from (Text(line) for line in told.changed_settings(comparison, most))
-    if comparison.paired:
-        yield from _changes(comparison)
-    else:
-        yield _levels(comparison.changes)
+    yield from _changes(comparison)
     if where := told.where(comparison):
         yield BulletList("Where", where)
 
@@ -196,19 +192,6 @@ def _by(rows: Sequence[Change], key: Callable[[Change], str]) -> list[tuple[str,
     return [(name, [*own]) for name, own in groupby(rows, key)]
 
 
-def _levels(rows: Sequence[Change]) -> Table:
-    columns: Columns = {
-        "stage": lambda row: row.stage,
-        "frames": lambda row: number(row.frames),
-        **{f"{rate} %": partial(_level, rate=rate) for rate in (*SHORT, *SHORT_OVERLAP)},
-    }
-    return _table(rows, columns, "Over each result's own frames")
-
-
-def _level(row: Change, rate: str) -> str:
-    return percent(row.new[rate])
-
-
 def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
     """Tabulate rows: what names one, without a result that says nothing new, and columns.
 
@@ -231,11 +214,9 @@ def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
 
 def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Block]:
     finals = [row for row in _changed(comparison) if row.final]
-    if comparison.paired and finals:
+    if finals:
         caption = "Change of the final mask's rates against the base."
         yield Figure(charts.changes(finals), caption)
-    elif not comparison.paired:
-        yield Figure(charts.levels(finals), "Rates of the final masks.")
     if over_drive:
         yield Heading("Over the drive", 2)
         yield Figure(over_drive, f"{TESTED} of the final masks over the common frames.")

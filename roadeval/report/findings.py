@@ -80,8 +80,6 @@ class Findings:
     helped: Sequence[NotableFrame] = ()
     harmed: Sequence[NotableFrame] = ()
     """Frames to look at."""
-    coverage: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
-    """Without truth: by variant and frame the share of the image called road."""
     cameras: Mapping[str, Findings] = field(default_factory=dict)
     """Of a rig: each camera's own, by its name; there are no tables of all together."""
     camera: str = ""

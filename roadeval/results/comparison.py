@@ -59,8 +59,6 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
 
 def verdict(comparison: Comparison) -> str:
     """Return what changed in the final masks, and how sure that is."""
-    if not comparison.paired:
-        return "Different drives, side by side: no difference is given."
     finals = comparison.finals()
     base = comparison.results[0].label
     several = len({change.variant for change in finals}) > 1

@@ -168,7 +168,6 @@ def a_comparison(*changes: Change, **more: Any) -> Comparison:
     labels = ["base", *dict.fromkeys(change.result for change in changes)]
     parts = ("drives", "regions", "moved", "disagreements", "warnings")
     known: dict[str, Any] = {
-        "paired": True,
         "results": tuple(ComparedResult(label, 1, 1, "street", "d", 12, None) for label in labels),
         "changes": changes,
         "levels": changes,

@@ -1,7 +1,6 @@
 """A drive's score, from its frames to its sums."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +9,7 @@ import pytest
 from roadeval.data import Counts, Health, Packed, Role
 from roadeval.evaluation.score import (
     BlindPrior,
-    CountsNotConservedError,
     Scoreboard,
-    check_conserved,
 )
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels
@@ -124,36 +121,6 @@ def test_a_frame_that_ignores_every_pixel_has_undefined_rates_and_is_counted_so(
     assert totals["N"] == 0
     assert math.isnan(totals["ERR"])
     assert totals["undefined"]["ERR"] == 1
-
-
-class TestTheSelfCheck:
-    names = (("net", "svm"), ("net", "post"))
-    whole = (2, 2, 1, 1)
-
-    def check(self, labelled: int, second: Sequence[Counted], found: Sequence[str] = ()) -> None:
-        """Prove two masks. Nothing is amiss with the first: its first part is the whole of it."""
-        parts = [self.whole, (0, 0, 0, 0)] if found else []
-        check_conserved(self.names, np.array([[self.whole, *parts], second]), found, labelled)
-
-    def test_accepts_counts_that_add_up(self) -> None:
-        halves = [(1, 0, 1, 0), (1, 2, 0, 1)]
-        self.check(6, [self.whole, *halves], ["boundary", "interior"])
-
-    def test_refuses_a_lost_pixel(self) -> None:
-        with pytest.raises(CountsNotConservedError, match=r"net/post: .* \(whole\), of 6 labelled"):
-            self.check(6, [(2, 2, 1, 0)])
-
-    def test_refuses_a_negative_count(self) -> None:
-        with pytest.raises(CountsNotConservedError, match="net/post"):
-            self.check(6, [(7, 0, -1, 0)])
-
-    @pytest.mark.parametrize("found", [["band_0", "band_1"], ["boundary", "interior"]])
-    def test_refuses_parts_that_do_not_make_the_whole(self, found: list[str]) -> None:
-        with pytest.raises(CountsNotConservedError, match="net/post"):
-            self.check(6, [self.whole, (2, 0, 0, 0), (0, 2, 2, 0)], found)
-
-    def test_regions_that_overlap_need_not_make_the_whole(self) -> None:
-        self.check(6, [self.whole, (2, 0, 0, 0), (0, 2, 2, 0)], ["shadow", "lit"])
 
 
 class TestOracles:

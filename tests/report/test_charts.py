@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from roadeval.data import colours
-from roadeval.evaluation.comparison import Change
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.report.chart import ChartKind, looks, looks_of_results
@@ -77,14 +76,6 @@ def test_the_differences_of_frames_have_their_mean_across():
     assert [*own.points()] == [(7, pytest.approx(10)), (9, pytest.approx(-20))]
     assert own.look.colour == FILTERED
     assert (chart.level.name, chart.level.value) == ("mean", -5)
-
-
-def test_each_result_of_another_drive_has_a_row():
-    own = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
-    rows = [Change(n, "filtered", "post", True, 1, 12, {}, own, {}) for n in ("old", "new")]
-    made = charts.levels(rows)
-    assert [chart.names for chart in made] == [["old", "new"]] * 3
-    assert [chart.series[0].y for chart in made] == [[10, 10], [20, 20], [30, 30]]
 
 
 # --- Drive by drive -------------------------------------------------------------------------------

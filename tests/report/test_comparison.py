@@ -71,25 +71,6 @@ def test_a_variant_of_which_no_stage_changed_has_no_rows():
     assert [row[:2] for row in plain_rows(table)][3:5] == [["wide", "svm"], ["", "post"]]
 
 
-def test_different_drives_are_laid_side_by_side():
-    change = replace(CHANGE, base={}, difference={})
-    comparison = a_comparison(change, paired=False, moved=())
-    (table,) = blocks(Table, comparison)
-    assert dict(zip(table.columns, *table.rows, strict=True)) == {
-        "variant": "filtered",
-        "stage": "post",
-        "frames": "12",
-        "ERR %": "11.20",
-        "FPR %": "11.20",
-        "FNR %": "11.20",
-        "IoU %": "11.20",
-    }
-    assert table.text_columns == [0, 1]
-    words = text(pdf(document(comparison, (), [])))
-    assert "Different drives, side by side: no difference is given." in words
-    assert "11.20" in words
-
-
 def test_its_contents_lead_to_its_parts():
     made = document(a_comparison(), LIMITS, [])
     assert links_within(pdf(made)) == 2

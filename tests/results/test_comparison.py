@@ -50,11 +50,6 @@ def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
     assert "net: on these 12 frames" in verdict(a_comparison(rows[0], moved))
 
 
-def test_of_different_drives_there_is_no_difference_to_tell():
-    told = verdict(a_comparison(paired=False))
-    assert told == "Different drives, side by side: no difference is given."
-
-
 def test_changed_settings_are_told_of_each_result_and_some_of_many():
     chains = ["svm"], ["trees", "post"]
     settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}

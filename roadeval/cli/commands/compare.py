@@ -62,7 +62,7 @@ def compare(
 
     Drives are paired by name or log, and frames by stamp; frames that either trained on are left
     out. One drive is judged over its frames, several over drives. Results of different drives are
-    put side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one
+    not compared. Exit code 4 if a --fail-if condition holds; 1 if one
     cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
     of the smaller one.
     """

@@ -2,7 +2,7 @@
 
 Drives are matched by their names, else by their logs, and their frames by their stamps; a frame
 that either result trained on, or that either lacks, is left out of both. Results without a drive in
-common are only put side by side: a difference between them would mix the scene with the method.
+common are not compared: a difference between them would mix the scene with the method.
 
 Where one drive is compared, intervals are those of its frames; where several are, those of drives.
 """
@@ -153,9 +153,6 @@ class RegionChange:
 class Comparison:
     """Results compared with the first of them."""
 
-    paired: bool
-    """Whether each new result shares a drive with the base. If not, nothing is subtracted:
-    ``changes`` are ``levels``."""
     results: tuple[ComparedResult, ...]
     """The base first."""
     changed_settings: Mapping[str, Mapping[str, tuple[Any, Any]]]
@@ -163,7 +160,7 @@ class Comparison:
     changes: tuple[Change, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
     levels: tuple[Change, ...]
-    """The same on all of its own frames; side by side those of every result."""
+    """The same on all of its own frames, without the base."""
     drives: tuple[DriveChange, ...]
     """Where several drives are compared: each, mask by mask, the surest first."""
     regions: tuple[RegionChange, ...]
@@ -214,8 +211,8 @@ def compare(
     """Compare results with the first of them.
 
     ``across_variants`` says that each side is one variant of the same result, to be matched with
-    another one. A `ComparisonError` if a result has nothing to compare, or two have no frame in
-    common.
+    another one. A `ComparisonError` if a result has nothing to compare, or two have no drive or no
+    frame in common.
     """
     for side in sides:
         if not side.scored:
@@ -229,7 +226,7 @@ def compare(
         matches = [match_drives(base, new) for new in others]
     for new, (pairs, _) in zip(others, matches, strict=True):
         if not pairs:
-            return _side_by_side(sides, new, settings)
+            raise ComparisonError(_apart(base, new))
     found = [
         _Against(base, new, *match, settings, across=across_variants)
         for new, match in zip(others, matches, strict=True)
@@ -239,7 +236,6 @@ def compare(
     regions = [row for each in found for row in each.regions()]
     corrected = holm([row.difference for row in regions])
     return Comparison(
-        paired=True,
         results=tuple(_result(*each) for each in zip(sides, frames, strict=True)),
         changed_settings={each.label: each.changed for each in found if each.changed},
         changes=tuple(_corrected(changes)),
@@ -253,26 +249,15 @@ def compare(
     )
 
 
-def _side_by_side(sides: Sequence[Side], other: Side, settings: EvaluationSettings) -> Comparison:
-    """Give each result's own rates where ``other`` has no drive in common with the base."""
-    rows: list[Change] = []
-    results = []
-    for side in sides:
-        masks, frames = _Masks(list), 0
-        for part in side.scored:
-            table = side.rows(part, "frames")
-            frames += _add_levels(masks, part, part.group or part.drive, table)
-        rows += _changes(side.label, masks)
-        results.append(_result(side, frames))
-    why = (
-        f"{sides[0].label} and {other.label} are of different drives: side by side only, for a "
-        "difference would mix the scene with the method"
-    )
-    for side in (other, sides[0]):
+def _apart(base: Side, new: Side) -> str:
+    """Return why two results have no drive in common."""
+    for side in (new, base):
         if any(part.digest is None for part in side.scored):
-            why = f"{side.label} does not say which log it is of: nothing is subtracted"
-    made, levels = tuple(results), tuple(rows)
-    return Comparison(False, made, {}, levels, levels, (), (), (), (), (why,), settings)
+            return f"{side.label} does not say which log it is of, so nothing can be compared"
+    return (
+        f"{base.label} and {new.label} are of different drives, whose difference would mix the "
+        "scene with the method; compare results of the same drives"
+    )
 
 
 def _result(side: Side, frames: int) -> ComparedResult:

@@ -7,28 +7,23 @@ A condition is a quantity, an operator and a limit, and may ask for certainty::
     limit     := number "pp"        the change from the base to the new result, percentage points
                | number "%"         the rate of the new result itself, percent
     number    := ["+" | "-"] digits ["." digits]
-    RATE      := ACC ERR TPR FNR TNR FPR, each also as pooled_..., IoU F1 precision
+    RATE      := ACC ERR TPR FNR TNR FPR, each also as pooled_..., IoU mIoU F1 precision
 
-``post.filtered.ERR > +0.5pp`` holds where the error rate of the final mask has risen by more than
-half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. A change is that of
-the frames that both results evaluated; a level is that of all the frames of the new result, and
-needs no base: between different drives it is judged on every result. Of several drives both are
-means over drives, each group of drives alike. Nothing is ever executed.
+A change is that of the frames that both results evaluated, a level that of all frames of the new
+result. Of several drives both are means over drives, each group of drives alike. Nothing is ever
+executed.
 
-``post.filtered.ERR > +0.5pp surely`` holds where the whole interval of the change lies beyond the
-limit. The interval is in doubt about frames, not about what the training's seed draws, so the limit
-must leave room for that: of 20 ordered pairs of five seeds on a drive of CamVid (0006R0) two trip
-+0.5 pp, and none trips it surely; without room, at +0 pp, seven still do. Only the
-change of a mean of the frames' rates has an interval: of ACC, ERR, FNR and FPR, and not of what
-mirrors them. A level is that of these very frames, and an interval around it would describe frames
-that were not evaluated.
+With ``surely`` the whole interval of the change must lie beyond the limit. The interval is in doubt
+about frames, not about what the training's seed draws, so the limit must leave room for that: of 20
+ordered pairs of five seeds on a drive of CamVid (0006R0) two trip +0.5 pp, and none trips it
+surely; without room, at +0 pp, seven still do. Only the mean change of ACC, ERR, FNR and FPR has an
+interval.
 
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
-is undefined, where a change is asked for between different drives or scales, where certainty is
-asked for and there is no interval, and where frames are too few. They must be at least as many as
-an interval needs (``evaluation.least_frames``, 10 by default), and for a change at least half of
-the frames of the shorter result; where several drives are compared, half of the scored drives of
-the smaller one.
+is undefined, a change is asked for between different scales, certainty without an interval, and
+where frames are too few. They must be at least as many as an interval needs
+(``evaluation.least_frames``), and for a change at least half of the frames of the shorter result;
+where several drives are compared, half of the scored drives of the smaller one.
 """
 
 from __future__ import annotations
@@ -172,7 +167,7 @@ def judge(
     """Judge each condition, in order, on every result that it names a mask of.
 
     A `ConditionError` if a condition asks for what is not there, or for a change between different
-    drives or scales, or if there are too few frames.
+    scales, or if there are too few frames.
     """
     judgements = []
     for condition in conditions:
@@ -185,11 +180,6 @@ def judge(
 
 def _named(condition: Condition, comparison: Comparison) -> list[Change]:
     """Return what was found of the mask that a condition names, a row a result."""
-    if condition.is_change and not comparison.paired:
-        raise ConditionError(
-            f"{condition.text}: not judged, because the results are of different drives, whose "
-            "difference mixes the scene with the method; limits in % can be judged"
-        )
     masks = comparison.changes if condition.is_change else comparison.levels
     named = [m for m in masks if (m.stage, m.variant) == (condition.stage, condition.variant)]
     if not named:

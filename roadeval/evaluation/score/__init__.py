@@ -20,8 +20,6 @@ from roadeval.evaluation.score.counts import (
 )
 from roadeval.evaluation.score.frame import (
     BlindPrior,
-    CountsNotConservedError,
-    check_conserved,
     judge,
 )
 from roadeval.evaluation.score.metres import Measured, differences_of

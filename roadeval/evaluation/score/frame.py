@@ -27,9 +27,8 @@ from roadeval.data import (
     TruthBits,
     VariantResult,
     histogram,
-    ones,
 )
-from roadeval.data.arrays import Bits, Sums
+from roadeval.data.arrays import Bits
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, Surveys
 from roadeval.evaluation.region import LabelledFrame
@@ -48,10 +47,6 @@ from roadeval.evaluation.settings import (
 K = TypeVar("K", str, int)
 """What further masks are of: the stage that was replaced by the truth, or a training's seed."""
 Rates = Mapping[str, float]
-
-
-class CountsNotConservedError(RuntimeError):
-    """The self-check failed: a defect of the program, not of the log."""
 
 
 def score_frame(
@@ -149,41 +144,14 @@ def _histograms(truth: Truth, variants: Iterable[VariantResult]) -> dict[Name, H
 def tally(
     names: Sequence[Name], masks: Bits, truth: TruthBits, found: Mapping[str, Bits]
 ) -> tuple[Tally, ...]:
-    """Count named masks in the regions ``found``, and check that no pixel was lost.
-
-    A `CountsNotConservedError` if the counts of a mask do not add up to the labelled pixels, or its
-    parts not to the whole.
-    """
+    """Count named masks in the whole frame and in the regions ``found``."""
     counted = count(masks, truth, list(found.values()))
-    check_conserved(names, counted, list(found), ones(truth.labelled))
     tallies = []
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
         whole, *parts = (Counts(*row) for row in rows)
         by_region = dict(zip(found, parts, strict=True))
         tallies.append(Tally(variant, stage, whole, by_region, metrics.of(whole)))
     return tuple(tallies)
-
-
-def check_conserved(
-    names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int
-) -> None:
-    """Check that ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions add up.
-
-    Where regions that together are the frame are among those ``found``, as the row bands are,
-    their counts must add up to the whole's. ``counted`` is what `count` returns.
-    """
-    whole = counted[:, 0]
-    lost = (whole.sum(axis=1) != labelled) | (whole < 0).any(axis=1)
-    for family in regions.partitions(found):
-        places = [found.index(name) + 1 for name in family]
-        lost |= (counted[:, places].sum(axis=1) != whole).any(axis=1)
-    if lost.any():
-        first = int(np.argmax(lost))
-        raise CountsNotConservedError(
-            f"{'/'.join(names[first])}: TP, TN, FP and FN are {counted[first].tolist()} "
-            f"({', '.join(('whole', *found))}), of {labelled} labelled pixels: please report this "
-            "as a defect of roadeval"
-        )
 
 
 def _tallies(

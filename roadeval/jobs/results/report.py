@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
-
-import numpy as np
 
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
@@ -97,8 +94,6 @@ def page_of(result: Result, on_progress: OnProgress = ignore) -> Document:
     return page_document(findings, replace(frames, strips=strips))
 
 
-SAMPLED: Final = 100
-"""Frames whose masks are read for how much they cover, at most, where there is no truth."""
 EXAMPLES: Final = 4
 THUMBNAILS: Final = 4
 """Frames in figure 2 and on the first page."""
@@ -126,7 +121,6 @@ def collect(result: DriveResult) -> Findings:
         worst=worst,
         helped=picker.moved([], harmed=False),
         harmed=picker.moved(worst, harmed=True),
-        coverage=_coverage(result, pictured),
         camera=result.camera,
     )
 
@@ -148,17 +142,3 @@ def collect_rig(rig: RigResult) -> Findings:
         ],
         cameras=own,
     )
-
-
-def _coverage(result: DriveResult, numbers: Sequence[int]) -> dict[str, dict[int, float]]:
-    """Return without truth how much of the image each final mask covers."""
-    if result.recording is None or len(result.rows):
-        return {}
-    return {
-        variant.name: {
-            number: np.nan if mask is None else float(np.mean(mask == 1))
-            for number in evenly(numbers, SAMPLED)
-            for mask in [result.layer(variant.name, variant.stages[-1], number)]
-        }
-        for variant in result.recording.variants
-    }

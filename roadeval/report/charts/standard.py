@@ -110,18 +110,6 @@ def _along(
     ]
 
 
-def coverage(shares: Mapping[str, Mapping[int, float]]) -> Chart:
-    """Return the share of the image that each variant calls road, by frame."""
-    return Chart(
-        "Share of the image called road",
-        ChartKind.LINES,
-        [
-            thinned(series(name, look, shares[name], 100 * np.array([*shares[name].values()])))
-            for name, look in looks([*shares]).items()
-        ],
-    )
-
-
 def stages(totals: Totals) -> list[Chart]:
     """Return a chart a rate: each stage's mask, a line a variant."""
     names = merged(own for variant, own in totals.items() if variant != BASELINE)
@@ -268,30 +256,6 @@ def changes(finals: Sequence[Change]) -> list[Chart]:
             ],
             names=[row.name for row in finals],
             unit="pp",
-        )
-        for rate in SHORT
-    ]
-
-
-def levels(finals: Sequence[Change]) -> list[Chart]:
-    """Return the rates of several results' final masks, a chart a rate."""
-    results = list(dict.fromkeys(row.result for row in finals))
-    variants = list(dict.fromkeys(row.variant for row in finals))
-    return [
-        Chart(
-            rate,
-            ChartKind.MARKS,
-            [
-                Series(
-                    variant,
-                    look,
-                    [results.index(row.result) for row in finals if row.variant == variant],
-                    [in_percent(row.new[rate]) for row in finals if row.variant == variant],
-                )
-                for variant, look in looks(variants).items()
-            ],
-            names=results,
-            from_zero=not SHORT[rate].higher_is_better,
         )
         for rate in SHORT
     ]

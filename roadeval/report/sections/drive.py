@@ -24,7 +24,7 @@ from roadeval.report.blocks import (
     Text,
 )
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import coverage, difference, figures_over_drive
+from roadeval.report.charts.standard import difference, figures_over_drive
 from roadeval.report.findings import Findings
 from roadeval.report.images import ExampleFrame, LayerImage, heat_map, jpeg, pictures_of
 from roadeval.report.tables import differences_table, stages_table, thresholds_table, variant_cell
@@ -381,8 +381,3 @@ def masks(findings: Findings) -> Iterator[Block]:
     )
     if findings.examples:
         yield _examples(findings.examples)
-    if findings.coverage:
-        yield Figure(
-            [coverage(findings.coverage)],
-            "The share of the image that the final masks call road. A jump is worth a look.",
-        )

@@ -1,23 +1,16 @@
-"""Settings and versions behind the results, and the command that makes them again."""
+"""What is behind the results, and the command that makes them again; run.toml has the settings."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
-from roadeval.data.words import number
+from roadeval.data.words import UNSET, number, setting
 from roadeval.report.blocks import Block, Command, Details, Heading, KeepTogether, Table, Text
 from roadeval.report.findings import Findings
 from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
-
-TABLES: Final = ("topics", "labels", "frames", "training", "evaluation")
-"""Of the run's configuration, beside its stages: what can change a number."""
-
-
-OF_A_FLEET: Final = ("output", "run")
-"""Tables of a fleet's configuration that change no number."""
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -44,13 +37,8 @@ def section(findings: Findings) -> Iterator[Block]:
         masks = ((v, stage, s) for v, own in facts.seconds.items() for stage, s in own.items())
         seconds = [[variant, stage, f"{1e3 * value:.2f}"] for variant, stage, value in masks]
         about.append(_words(["variant", "stage", "ms a frame"], seconds))
-    if facts.settings:
-        first = {"preset": facts.run["preset"]} if "preset" in facts.run else {}
-        shared = {name: facts.run[name] for name in TABLES if name in facts.run}
-        own = {name: {**first, **each, **shared} for name, each in facts.settings.items()}
-        about.append(_settings(settings_rows(own)))
     if about:
-        yield Details("Topics, versions, milliseconds, settings", about, on_paper=False)
+        yield Details("Topics, versions, milliseconds", about, on_paper=False)
 
 
 def of_drives(findings: FleetFolder) -> Iterator[Block]:
@@ -67,9 +55,6 @@ def of_drives(findings: FleetFolder) -> Iterator[Block]:
         "SHA-256. The same logs, configuration and version give the same numbers.",
         "note",
     )
-    own = {name: value for name, value in facts.run.items() if name not in OF_A_FLEET}
-    settings = _settings([[name, value] for name, value in flattened(own)])
-    yield Details("Settings", [settings], on_paper=False)
 
 
 def _models(findings: FleetFolder) -> str:
@@ -94,14 +79,9 @@ def _methods(facts: Facts) -> Iterator[Block]:
         for stage, about in stages.items():
             seconds = facts.seconds.get(variant, {}).get(stage)
             time = {} if seconds is None else {"ms a frame": f"{1e3 * seconds:.2f}"}
-            known = {name: value for name, value in flattened(about) if value != "none"} | time
+            known = dict(flattened(about)) | time
             rows = [[name, value] for name, value in known.items()]
             yield Details(f"{variant}: {stage}", [_words(["what", "value"], rows)])
-
-
-def _settings(rows: Sequence[Sequence[str]]) -> Table:
-    """Tabulate settings, without those that are unset."""
-    return _words(["setting", "value"], [row for row in rows if row[1] != "none"])
 
 
 def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -109,41 +89,14 @@ def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     return Table(columns, rows, text_columns=(0, 1), small=True)
 
 
-def settings_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
-    """Return name and value of the settings: one value where the variants agree, else each one's.
-
-    The settings are by variant, nested as in a TOML file.
-    """
-    own = {variant: dict(flattened(each)) for variant, each in settings.items()}
-    names = dict.fromkeys(name for each in own.values() for name in each)
-    return [[name, _value(name, own)] for name in names]
-
-
-def _value(name: str, own: Mapping[str, Mapping[str, str]]) -> str:
-    """Return the value that a setting has in every variant that has it, or each one's."""
-    values = {variant: each[name] for variant, each in own.items() if name in each}
-    if len(set(values.values())) > 1:
-        return "; ".join(f"{variant}: {text}" for variant, text in values.items())
-    only = "" if len(values) == len(own) else f" ({', '.join(values)} only)"
-    return next(iter(values.values())) + only
-
-
-def _as_in_toml(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
 def flattened(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield settings by their dotted names.
+    """Yield settings that are set, by their dotted names.
 
-    >>> list(flattened({"svm": {"kernel": "rbf"}, "frames": {"scale": 1.0}}))
-    [('svm.kernel', 'rbf'), ('frames.scale', '1.0')]
+    >>> list(flattened({"svm": {"kernel": "rbf"}, "size": [4, 3], "seed": None}))
+    [('svm.kernel', 'rbf'), ('size', '4, 3')]
     """
     for name, value in settings.items():
         if isinstance(value, Mapping):
             yield from flattened(value, f"{prefix}{name}.")
-        elif isinstance(value, list | tuple) and any(isinstance(each, Mapping) for each in value):
-            yield from flattened({str(i): each for i, each in enumerate(value)}, f"{prefix}{name}.")
-        elif isinstance(value, list | tuple):
-            yield f"{prefix}{name}", ", ".join(map(str, value)) or "none"
-        else:
-            yield f"{prefix}{name}", "none" if value is None else _as_in_toml(value)
+        elif (text := setting(value)) != UNSET:
+            yield f"{prefix}{name}", text

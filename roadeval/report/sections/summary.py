@@ -7,7 +7,6 @@ from typing import Final
 
 from roadeval.data import BASELINE
 from roadeval.data.words import counted, defined, listing, number, percent
-from roadeval.evaluation.stats import STUDENT_FROM
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -21,7 +20,6 @@ from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
 from roadeval.report.sections.drives import WORST_AT
 from roadeval.report.tables import differences_table, rates_table, seeds_table
-from roadeval.results.facts import FleetFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
@@ -86,14 +84,12 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
         where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
         title = f"Worst frame: {where} (ERR {percent(frame['ERR'], 1)} %)"
         yield LinkList([(title, WORST_AT)], findings.inspect(frame))
-    if note := _how_sure_over_drives(facts):
-        yield Text(note, "note")
     if facts.totals:
         yield rates_table(facts)
     if facts.effects:
         yield differences_table(facts)
-        note = "Every drive counts the same, long or short; drives of one group count as one."
-        yield Text(note, "note")
+        note = "Every drive counts the same, long or short; those of one group count as one, and "
+        yield Text(f"{note}so do copies of a log.", "note")
     yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
     yield _beware(list(fleet_warnings(findings)))
     yield TableOfContents()
@@ -179,29 +175,6 @@ def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
 
 def _were(count: int) -> str:
     return f"{counted(count, 'drive')} {'was' if count == 1 else 'were'}"
-
-
-def _how_sure_over_drives(facts: FleetFacts) -> str:
-    errors = (each.rates["ERR"] for each in facts.effects)
-    first = next((each for each in errors if each.units), None)
-    if first is None:
-        return ""
-    if first.unit == "frames":
-        return "One drive: intervals are those of its frames."
-    count = first.groups or 0
-    groups = (
-        f" The {first.units} drives count as {count}: those of a group are one, "
-        "and so are copies of a log."
-        if count < first.units
-        else ""
-    )
-    if first.low is None:
-        return f"No interval: it takes {first.needed} drives or groups.{groups}"
-    method = "the exact sign-flip test" if count < STUDENT_FROM else "Student's t over drives"
-    return (
-        f"Intervals of {percent(first.confidence, 0)} %, by {method}; the drive is the "
-        f"unit.{groups}"
-    )
 
 
 def _legend(findings: Findings) -> str:

@@ -5,7 +5,6 @@ import math
 from roadeval.data.words import DASH
 from roadeval.report.blocks import BulletList, LinkList, Table
 from roadeval.report.findings import NotableFrame
-from roadeval.report.sections.provenance import flattened, settings_rows
 from roadeval.report.sections.summary import section, warnings
 from roadeval.report.tables import rates_table
 from roadeval.results.facts import TrainingFacts
@@ -100,28 +99,3 @@ def test_a_partial_recording_is_marked_before_the_verdict():
 
 
 # --- Settings and versions: what all variants share is told once ----------------------------------
-
-
-def test_settings_are_told_once_where_variants_agree_and_apart_where_they_differ():
-    settings = {
-        "filtered": {"preset": "paper", "svm": {"c": 1.0}, "shadow": {"threshold": "otsu"}},
-        "unfiltered": {
-            "preset": "paper",
-            "svm": {"c": 2.0, "gamma": None},
-            "chain": ["svm", "post"],
-        },
-    }
-    assert settings_rows(settings) == [
-        ["preset", "paper"],
-        ["svm.c", "filtered: 1.0; unfiltered: 2.0"],
-        ["shadow.threshold", "otsu (filtered only)"],
-        ["svm.gamma", "none (unfiltered only)"],
-        ["chain", "svm, post (unfiltered only)"],
-    ]
-
-
-def test_a_list_of_tables_is_told_setting_by_setting():
-    told = dict(
-        flattened({"nets": [{"name": "a", "size": [4, 3]}, {"name": "b"}], "seeds": [1, 2]})
-    )
-    assert told == {"nets.0.name": "a", "nets.0.size": "4, 3", "nets.1.name": "b", "seeds": "1, 2"}
