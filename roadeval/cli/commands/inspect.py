@@ -99,10 +99,8 @@ def _show(
         frame = found.frame if frame is None else frame
     elif file and frame is None and (bad := job.worst(drive, variant)):
         which = "worst" if bad.by == "ERR" else "first to look at"
-        frame, why = (
-            bad.frame,
-            f", the {which} with pictures (--frame N or --worst K takes another)",
-        )
+        why = f", the {which} with pictures (--frame N or --worst K takes another)"
+        frame = bad.frame
     if frame is not None and (sentence := job.without_pictures(drive, frame)):
         messages.warning(sentence)
     shown = job.view(drive, frame, file)
