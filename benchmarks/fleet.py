@@ -90,7 +90,7 @@ def _extrapolate(folder: Path, walls: dict[int, float], frame_s: float) -> None:
     per_drive = (walls[1] - frames * frame_s) / drives
     count = HOURS // DRIVE_HOURS
     total = HOURS * 3600 * RATE_HZ
-    size = fleet.drives["size_bytes"].sum() / frames
+    size = sum(Path(each).stat().st_size for each in fleet.drives["source"]) / frames
     kept = {
         "frames/": sum(f.stat().st_size for f in folder.glob("frames/*/*")) / frames,
         "results/": sum(f.stat().st_size for f in folder.glob("results/*/*")) / frames,

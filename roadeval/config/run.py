@@ -27,11 +27,12 @@ import dataclasses
 import inspect
 import os
 import textwrap
-import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Final
+
+from pydantic import TypeAdapter
 
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
 from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
@@ -396,7 +397,13 @@ def log_config(tables: Mapping[str, Any]) -> LogConfig:
 
 
 WIDTH: Final = 100
-_BOUNDS: Final = {"ge": "at least {}", "gt": "above {}", "le": "at most {}", "lt": "below {}"}
+_BOUNDS: Final = {
+    "minimum": "at least {}",
+    "exclusiveMinimum": "above {}",
+    "maximum": "at most {}",
+    "exclusiveMaximum": "below {}",
+}
+"""How a JSON schema's bounds are said."""
 
 
 def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay") -> str:
@@ -467,7 +474,7 @@ def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
 def _table(name: str, settings: Any) -> str:
     """Write the table of a settings dataclass; dataclasses in it follow as tables."""
     texts = meanings(type(settings))
-    hints = get_type_hints(type(settings), include_extras=True)
+    schemas = TypeAdapter(type(settings)).json_schema()["properties"]
     title = (inspect.getdoc(type(settings)) or "").partition("\n\n")[0]
     lines, inner = [*_comment(title), f"[{name}]"], []
     for each in dataclasses.fields(settings):
@@ -475,7 +482,7 @@ def _table(name: str, settings: Any) -> str:
         if dataclasses.is_dataclass(value):
             inner.append(_table(f"{name}.{each.name}", value))
             continue
-        allowed = _allowed(hints[each.name])
+        allowed = _allowed(schemas[each.name])
         lines += ["", *_comment(" ".join(filter(None, (texts.get(each.name), allowed))))]
         lines.append(_assignment(each.name, value))
     return "\n\n".join(["\n".join(lines), *inner])
@@ -498,26 +505,12 @@ def _comment(text: str) -> list[str]:
     return textwrap.wrap(words, WIDTH, initial_indent="# ", subsequent_indent="# ")
 
 
-def _allowed(hint: Any) -> str:
-    """Describe the allowed values of a setting's type; empty where all are allowed."""
-    if get_origin(hint) in (Union, types.UnionType):
-        known = (_allowed(each) for each in get_args(hint) if each is not type(None))
-        return next(filter(None, known), "")
-    if get_origin(hint) is Literal:
-        return f"One of {', '.join(map(str, get_args(hint)))}."
-    if get_origin(hint) is not Annotated:
-        return ""
-    kind, *constraints = get_args(hint)
-    bounds = ", ".join(_bounds(constraints)).capitalize()
-    return " ".join(filter(None, (_allowed(kind), f"{bounds}." if bounds else "")))
-
-
-def _bounds(constraints: Iterable[Any]) -> Iterator[str]:
-    """Yield the bounds among a type's constraints; a pydantic field holds several."""
-    for constraint in constraints:
-        for each in getattr(constraint, "metadata", None) or [constraint]:
-            yield from (
-                text.format(getattr(each, name))
-                for name, text in _BOUNDS.items()
-                if getattr(each, name, None) is not None
-            )
+def _allowed(schema: Mapping[str, Any]) -> str:
+    """Describe the allowed values of a setting by its JSON schema; empty where all are allowed."""
+    for each in (schema, *schema.get("anyOf", ())):
+        if "enum" in each:
+            return f"One of {', '.join(map(str, each['enum']))}."
+        bounds = [text.format(each[name]) for name, text in _BOUNDS.items() if name in each]
+        if bounds:
+            return f"{', '.join(bounds).capitalize()}."
+    return ""

@@ -7,7 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -17,7 +17,7 @@ from roadeval.config import RunConfig, in_file
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
-from roadeval.logs import METADATA, CameraSettings, files_of, natural
+from roadeval.logs import METADATA, files_of, natural
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import public_url, visible, without_secrets
 
@@ -203,22 +203,6 @@ def cameras_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
             entry = replace(entry, id=drive, name=name)  # noqa: PLW2901
         found.append(entry)
     return found
-
-
-def with_cameras(
-    entries: Iterable[DriveEntry], cameras: Sequence[CameraSettings]
-) -> list[DriveEntry]:
-    """Return an entry for each camera of each drive, with what is its own as settings of it."""
-    found = []
-    for entry in entries:
-        for camera in cameras:
-            given = {**vars(camera), "name": None, "ground": None}
-            known = {name: value for name, value in given.items() if value}
-            own = {**entry.settings, "topics": {**entry.settings.get("topics", {}), **known}}
-            if camera.ground.given:
-                own["ground"] = asdict(camera.ground)
-            found.append(replace(entry, settings=own))
-    return cameras_apart(found)
 
 
 def is_bag(folder: Path) -> bool:

@@ -279,7 +279,6 @@ _OF_DRIVES: Final = (
             Column(
                 "log_digest", Kind.NAME, "tells the log from another: of its index and checksums"
             ),
-            Column("size_bytes", Kind.COUNT, "of the log"),
             Column("start_ns", Kind.TIME, "header stamp of the first evaluated frame"),
             Column("end_ns", Kind.TIME, "of the last one"),
             Column("rate_hz", Kind.NUMBER, "of the camera"),

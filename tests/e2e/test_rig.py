@@ -214,9 +214,14 @@ def test_a_file_names_the_cameras(rig: Path, tmp_path: Path):
 
 
 def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path, tmp_path: Path):
-    cameras = [{"image": f"/{name}{IMAGE}"} for name in ("front", "copy")]
-    config = roadeval.configure({"cameras": cameras})
-    roadeval.replay_fleet([rig / "rig.mcap"], tmp_path / "fleet", config, executor=Here())
+    manifest = tmp_path / "cameras.toml"
+    manifest.write_text(
+        "".join(
+            f'[[drives]]\npath = "{rig / "rig.mcap"}"\ntopics.image = "/{name}{IMAGE}"\n'
+            for name in ("front", "copy")
+        )
+    )
+    roadeval.replay_fleet([manifest], tmp_path / "fleet", executor=Here())
     fleet = roadeval.Result(tmp_path / "fleet")
     assert fleet.drives["name"].tolist() == ["rig front", "rig copy"]
     (effect,) = [

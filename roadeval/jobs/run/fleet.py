@@ -13,14 +13,7 @@ from typing import Any
 from roadeval.config import FleetSettings, RunConfig, run_toml
 from roadeval.errors import RoadevalError
 from roadeval.fleet.engine import ATTEMPTS, died, started
-from roadeval.fleet.entry import (
-    DriveEntry,
-    FleetError,
-    deal,
-    groups_of,
-    shuffled,
-    with_cameras,
-)
+from roadeval.fleet.entry import DriveEntry, FleetError, deal, groups_of, shuffled
 from roadeval.fleet.sources import find_drives
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
@@ -100,8 +93,7 @@ def replay_fleet(
     config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in listed(drives)])
     if config.cameras:
-        entries = with_cameras(entries, config.cameras)
-        config = replace(config, cameras=())
+        raise FleetError("several cameras of a log stand in a manifest, each with `topics.image`")
     if config.fleet.folds is not None and config.training.model is not None:
         raise FleetError(
             "`fleet.folds` and `training.model` do not go together: folds train models"

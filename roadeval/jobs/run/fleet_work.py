@@ -232,7 +232,6 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
         | {
             "fold": task.fold,
             "model": task.model or None,
-            "size_bytes": _size_of(task.entry),
             "seconds": time.perf_counter() - started,
         }
     )
@@ -240,14 +239,6 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
     key = Key(drive, outcome.facts.drive.camera)
     rows = {table: cells(table, key, each) for table, each in own.items()}
     return Record(drive, task.asked, before, rows)
-
-
-def _size_of(entry: DriveEntry) -> int:
-    """Return the bytes of a drive's files."""
-    if entry.path is None:
-        return sum(size for size, _ in stamp(entry.source).values())
-    files = entry.path.iterdir() if entry.path.is_dir() else [entry.path]
-    return sum(each.stat().st_size for each in files)
 
 
 def _remove(task: DriveTask, *folders: str) -> None:

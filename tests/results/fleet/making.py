@@ -99,7 +99,6 @@ def _scored(i, drive, masks, *, lost):
         "losses": f"frame {i} cannot be decoded\n3 records are cut off" if lost else None,
         "seconds": 10.0 + i % 7,
         "log_digest": f"{i:064x}",
-        "size_bytes": 10**6,
         "evaluated": n,
         "trained_on": 10,
         "in_log": n + 10,
