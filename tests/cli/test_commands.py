@@ -57,22 +57,6 @@ def test_what_was_left_out_is_told_and_decides_the_exit_code(tmp_path, monkeypat
     assert (tmp_path / "m.model").exists()
 
 
-# --- ``roadeval fleet`` in a terminal -------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("words", "again"), [((), False), (("--retry-failed",), True)])
-def test_what_failed_is_tried_again_only_where_that_is_asked_for(words, again, monkeypatch, capsys):
-    given = {}
-
-    def stopped(*_, **options):
-        given.update(options)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("roadeval.jobs.run.fleet.replay_fleet", stopped)
-    assert main(["fleet", "drives", "-o", "out", "--quiet", *words]) == 130
-    assert given["retry_failed"] is again
-
-
 # --- The command ``pack``: a folder of images becomes a log that ``info`` and ``replay`` take -----
 
 

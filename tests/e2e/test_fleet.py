@@ -66,13 +66,11 @@ def drives(tmp_path_factory):
     return folder
 
 
-def run(drives, folder, *, executor=None, retry_failed=False, **fleet):
+def run(drives, folder, *, executor=None, **fleet):
     """Run a fleet in this process; returns its outcome, and what was submitted."""
     executor = executor or Here()
     config = roadeval.configure({**OPTIONS, "fleet": fleet})
-    found = roadeval.replay_fleet(
-        [drives], folder, config, executor=executor, retry_failed=retry_failed
-    )
+    found = roadeval.replay_fleet([drives], folder, config, executor=executor)
     return found, [Path(task.entry.source).stem for task in executor.tasks]
 
 
@@ -146,11 +144,11 @@ def test_the_numbers_are_those_of_single_replays(drives, ran, tmp_path):
                 assert row[key] == total[key], (name, key)
 
 
-def test_the_same_command_again_replays_nothing(drives, ran, tmp_path):
+def test_the_same_command_again_tries_what_failed_alone(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     before = tables(folder)
     again, submitted = run(drives, folder, keep="worst:1")
-    assert (again.replayed, submitted) == (0, [])
+    assert (again.replayed, submitted) == (1, ["b"])
     assert again.counts == ran.counts
     assert again.problems == ran.problems
     assert tables(folder) == before
@@ -162,15 +160,8 @@ def test_a_drive_whose_results_have_gone_is_replayed_alone(drives, ran, tmp_path
     (gone,) = (folder / "results").glob("c-*")
     shutil.rmtree(gone)
     again, submitted = run(drives, folder, keep="worst:1")
-    assert (again.replayed, submitted) == (1, ["c"])
+    assert (again.replayed, submitted) == (2, ["b", "c"])
     assert tables(folder) == before
-
-
-def test_what_failed_is_tried_again_when_asked(drives, ran, tmp_path):
-    folder = copied(ran, tmp_path)
-    _, submitted = run(drives, folder, keep="worst:1", retry_failed=True)
-    assert submitted == ["b"]
-    assert tables(folder) == tables(ran.folder)
 
 
 def test_the_recording_of_the_worst_drive_alone_is_kept(ran):
@@ -310,7 +301,7 @@ def test_a_full_disk_ends_the_run_and_what_was_done_before_stays(
         with pytest.raises(RoadevalError, match=said):
             run(drives, folder)
     _, submitted = run(drives, folder, keep="worst:1")
-    assert submitted == ["a"]
+    assert submitted == ["a", "b"]
     assert tables(folder) == tables(ran.folder)
 
 
@@ -337,7 +328,7 @@ def test_a_record_that_another_command_has_made_meanwhile_is_not_mixed_with_ours
 def test_recordings_that_must_be_kept_are_made_where_they_lack(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     _, submitted = run(drives, folder, keep="all")
-    assert len(submitted) == 1
+    assert len(submitted) == 2
     scored = [d["drive"] for d in ran.summary["drives"] if d["name"] != "b"]
     assert all(recording_path(folder, drive).exists() for drive in scored)
     assert tables(folder) == tables(ran.folder)

@@ -94,10 +94,10 @@ def test_report_and_page_have_the_section(metres: Path):
 
 
 def test_a_fleet_counts_by_distance_with_the_camera_of_each_drive(metres: Path):
-    (metres / "drives.csv").write_text(
-        "path,ground.height,ground.pitch,ground.fov\ndrive.mcap,1.42,2.9,59.49\n"
+    (metres / "drives.toml").write_text(
+        '[[drives]]\npath = "drive.mcap"\nground = { height = 1.42, pitch = 2.9, fov = 59.49 }\n'
     )
-    roadeval.replay_fleet([metres / "drives.csv"], metres / "fleet", executor=Here())
+    roadeval.replay_fleet([metres / "drives.toml"], metres / "fleet", executor=Here())
     scores = roadeval.Result(metres / "fleet").scores
     assert {"0-10m", "40-80m", "from_above"} <= {*scores["region"]}
 
@@ -140,12 +140,6 @@ def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
     heights = {name: each.drive.ground.pose[0] for name, each in facts.cameras.items()}
     assert heights == pytest.approx({"front": 1.42, "rear": 2.5})
     assert {*pd.read_csv(tmp_path / "rig" / "metres.csv")["camera"]} == {"front", "rear"}
-    config = roadeval.load_config(tmp_path / "rig.toml")
-    roadeval.replay_fleet([tmp_path / "rig.mcap"], tmp_path / "fleet", config, executor=Here())
-    folders = (tmp_path / "fleet" / "results").iterdir()
-    facts_of = (roadeval.Result(folder).drive.facts for folder in folders)
-    found = sorted(facts.drive.ground.pose[0] for facts in facts_of)
-    assert found == pytest.approx([1.42, 2.5])
     (tmp_path / "camera.toml").write_text(CAMERA)
     refused = here("replay", "rig.mcap", *words, "--camera", "camera.toml", cwd=tmp_path)
     assert refused.returncode != 0

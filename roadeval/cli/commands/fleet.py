@@ -35,9 +35,6 @@ def fleet(
         ),
     ],
     given: Given,
-    retry_failed: Annotated[
-        bool, arguments.option("--retry-failed", "Try drives again that failed before.")
-    ] = False,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -52,7 +49,7 @@ def fleet(
     from roadeval.jobs.run.fleet import replay_fleet as run
 
     with progress.watched(quiet) as watch:
-        found = run(paths, output, config, retry_failed=retry_failed, on_progress=watch)
+        found = run(paths, output, config, on_progress=watch)
     if json:
         console.emit(found.facts.text().rstrip())
     elif not quiet:

@@ -49,8 +49,6 @@ PICTURED: Final = 24
 """Frames of a page with pictures, at most."""
 BYTES: Final = 9_900_000
 """Of a page, at most."""
-SHADOW: Final = 1 / 3
-"""A frame with much shadow is among this share of the drive's."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -275,7 +273,6 @@ def facts_of(result: DriveResult) -> Iterator[FrameRow]:
         doubts += [(each, stamps[each], {}) for each in result.pictured if each not in seen]
         yield from (FrameRow(*each) for each in sorted(doubts, key=itemgetter(0)))
         return
-    dark = _much_shadow(result)
     for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
@@ -283,7 +280,7 @@ def facts_of(result: DriveResult) -> Iterator[FrameRow]:
             frame,
             stamp,
             rates,
-            [*_conditions(others, blind), *(["much shadow"] if frame in dark else [])],
+            [*_conditions(others, blind)],
             [*notes(others, blind)],
         )
 
@@ -304,17 +301,6 @@ def _conditions(
             yield "the filter harms" if change > 0 else "the filter helps"
     if blind is not None and rates[first]["ERR"] > blind["ERR"]:
         yield f"{first} worse than {BASELINE}"
-
-
-def _much_shadow(result: DriveResult) -> set[int]:
-    """Return the frames with the most pixels in shadow, as the filter saw them."""
-    regions = result.table("regions")
-    shadow = score.finals(regions.take(regions["region"] == "shadow"))
-    if not len(shadow):
-        return set()
-    first = shadow.of_variant(shadow["variant"][0])
-    much = first["N"] > np.quantile(first["N"], 1 - SHADOW)
-    return set(first["frame"][much].tolist()) if np.ptp(first["N"]) else set()
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:

@@ -65,14 +65,13 @@ def replay_fleet(
     config: RunConfig | None = None,
     *,
     executor: Executor | None = None,
-    retry_failed: bool = False,
     on_progress: OnProgress = ignore,
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
     The folder is the state: a drive whose record is there, made of the same log, settings, model
-    and version, is not replayed again. A `RoadevalError` if there is no drive, or the folder or the
-    engine cannot be used.
+    and version, is not replayed again, unless it failed. A `RoadevalError` if there is no drive, or
+    the folder or the engine cannot be used.
 
     Parameters
     ----------
@@ -85,8 +84,6 @@ def replay_fleet(
         Every option, those of the fleet included (`RunConfig.fleet`).
     executor
         Who replays the drives; by default Dask's workers, as `RunConfig.fleet` says.
-    retry_failed
-        Whether drives that failed before are tried again.
     on_progress
         Called in the caller's thread as drives are done.
     """
@@ -100,7 +97,7 @@ def replay_fleet(
         )
     writer = FleetWriter(Path(output))
     writer.begin()
-    run = FleetRun(writer.folder, tuple(entries), config, on_progress, retry_failed, executor)
+    run = FleetRun(writer.folder, tuple(entries), config, on_progress, executor)
     run.replay_all()
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
@@ -121,7 +118,6 @@ class FleetRun:
     entries: tuple[DriveEntry, ...]
     config: RunConfig
     on_progress: OnProgress
-    retry: bool
     executor: Executor | None
     """Who does the tasks; None until there is one, and Dask's workers are started then."""
     workers: int = 1
@@ -160,7 +156,6 @@ class FleetRun:
             model,
             fold,
             recorded=self.config.fleet.keep != "none",
-            retry=self.retry,
         )
 
     def _of(self, entry: DriveEntry) -> RunConfig:

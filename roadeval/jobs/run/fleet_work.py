@@ -77,8 +77,6 @@ class DriveTask:
     recorded: bool = False
     required: bool = False
     """Whether a drive without a recording is not done."""
-    retry: bool = False
-    """Whether a drive that has failed is tried again."""
 
     @property
     def asked(self) -> str:
@@ -124,14 +122,14 @@ def replay_drive(task: DriveTask) -> Done:
 def valid_record(task: DriveTask) -> Record | None:
     """Return the record of a drive that needs not be replayed: it is whole, and nothing changed."""
     record = read_record(task.folder, task.entry.id)
-    if record is None or record.asked != task.asked or not record.is_whole(task.folder):
+    if record is None or record.failed or record.asked != task.asked:
         return None
-    if record.failed and task.retry:
+    if not record.is_whole(task.folder):
         return None
     if task.required and not recording_path(task.folder, record.drive).exists():
         return None
     now = seen(task.entry, task.config)
-    return record if record.stamp == now and (record.failed or now is not None) else None
+    return record if now is not None and record.stamp == now else None
 
 
 def done(record: Record, *, repeated: bool = False) -> Done:

@@ -142,7 +142,7 @@ class FrameRow:
     rates: Mapping[str, Mapping[str, float]]
     """Of each variant's final mask, as short tables show them; without truth its doubts."""
     conditions: Sequence[str] = ()
-    """Its conditions in words, as ``much shadow``."""
+    """Its conditions in words, as ``the filter helps``."""
     notes: Sequence[str] = ()
     """Sentences about it."""
 
