@@ -201,6 +201,8 @@ class Accounting:
     """Of these, those with truth."""
     masks: Counter[str] = field(default_factory=Counter)
     """Of these, those that have a mask of another method, by its name."""
+    repeated: int = 0
+    """Of these, those that repeat an earlier one, by stamp and content."""
     undecodable: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that could not be decoded, and why."""
 
@@ -208,6 +210,16 @@ class Accounting:
     def losses(self) -> tuple[str, ...]:
         """The frames that could not be decoded: a sentence each."""
         return tuple(f"frame {number}: {why}" for number, why in sorted(self.undecodable.items()))
+
+    @property
+    def repeats(self) -> tuple[str, ...]:
+        """A sentence on images that repeat others; none where there are none."""
+        if not self.repeated:
+            return ()
+        return (
+            f"{self.repeated} of the {self.read} images repeat an earlier one, by stamp and "
+            "content; each of them is counted",
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -313,6 +325,8 @@ class FrameStream:
             name: (source, source.partners(begin)) for name, source in selection.labels.items()
         }
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
+        self._first: dict[int, int] = {}
+        """The number of the first frame with a stamp, by the stamp."""
         self._iterator = map(self._frame, numbers)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
@@ -344,9 +358,17 @@ class FrameStream:
         log_time = int(camera.images.log_times[number])
         stamp = camera.images.stamp(number) if camera.clock is Clock.STAMP else UNREADABLE
         stamp = log_time if stamp == UNREADABLE else stamp
+        self.accounting.repeated += self._repeats(number, stamp)
         return LoggedFrame(
             number, stamp, log_time, picture, labels, self._selection, self.accounting
         )
+
+    def _repeats(self, number: int, stamp: int) -> bool:
+        """Return whether a frame's message is that of the first frame with its stamp, too."""
+        first, images = self._first.setdefault(stamp, number), self._selection.camera.images
+        with suppress(FrameError):
+            return first != number and images.message(first).data == images.message(number).data
+        return False
 
 
 def at_scale(frame: Frame, scale: float) -> Frame:

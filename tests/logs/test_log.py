@@ -282,3 +282,16 @@ def test_a_log_is_described_for_machines(tmp_path: Path) -> None:
     assert found["bytes"] == path.stat().st_size
     assert found["picks"][0] == "image: /camera (the only camera image)"
     assert (found["problem"], found["damage"], found["losses"]) == ("", [], [])
+
+
+@pytest.mark.parametrize("apart", [0, 50])
+def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, apart: int) -> None:
+    images = [compressed(1 + i, jpeg(grey(20 * i))) for i in range(3)]
+    messages = [("/camera", 1 + i + again * apart, images[i]) for again in (0, 1) for i in range(3)]
+    messages.append(("/camera", 100, compressed(3, jpeg(grey(200)))))  # an old stamp
+    path = ros2_log(tmp_path / "a.mcap", sorted(messages, key=lambda message: message[1]))
+    with open_log(path) as log:
+        stream = log.frames(log.select())
+        assert sum(1 for _ in stream) == 7
+        (told,) = stream.accounting.repeats
+    assert told.startswith("3 of the 7 images repeat an earlier one, by stamp and content")

@@ -263,6 +263,7 @@ def warnings(run: Run) -> tuple[str, ...]:
     return (
         *((unlabelled, *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
+        *run.frames.accounting.repeats,
         *tuple(warned),
         *_tuned(run),
         *_missing(run),

@@ -18,16 +18,11 @@ from mcap.records import Channel, Schema
 
 from roadeval.logs.container.records import (
     BUFFER,
-    DEFINITIONS,
-    HEAD,
     IN_MEMORY,
-    PRIVATE,
-    Bytes,
     Entries,
     FileBytes,
     Message,
     message_at,
-    walk,
 )
 from roadeval.logs.container.scan import Scan, StampOf, definitions, entries_of
 from roadeval.logs.errors import BadRecord
@@ -115,11 +110,8 @@ class Container:
         """Whether the checksum of all data is, None before it was looked at."""
         self.misled: set[int] = set()
         """Chunks whose message indexes were found to be wrong."""
-        self.unlisted: dict[int, int] = {}
-        """Records that the message indexes of a chunk leave out, by the chunk's number."""
         self.redefined: dict[int, str] = {}
         """Which of two descriptions of topics is believed, by the offset of the second."""
-        self._checked: set[int] = set()
         logs = self._file()
         if self.summary.statistics is not None and not self._is_as_counted(logs):
             logs = self._file(look=True)
@@ -135,7 +127,6 @@ class Container:
         self.looked_into = frozenset(self.scan.seen)
         """Chunks whose messages were not filed by their message indexes."""
         self.scan.seen.clear()
-        self._checked |= self.looked_into
         read = {channel_id for channel_id, log in self.logs.items() if log.wanted}
         order = sorted(self.channels, key=lambda channel_id: (channel_id not in read, channel_id))
         self.channels_left_out = frozenset(order[CHANNELS:])
@@ -162,15 +153,14 @@ class Container:
 
     def message(self, chunk: int, offset: int) -> Message:
         """Read the message at ``offset`` in a chunk, or in the file if it is `OUTSIDE`."""
-        return message_at(self.source if chunk == OUTSIDE else self._records(chunk), offset)
+        is_outside = chunk == OUTSIDE
+        records = self.source if is_outside else self.reader.read(self.chunks[chunk])
+        return message_at(records, offset)
 
     def look(self, chunk: int, channel_id: int) -> Entries:
         """Find the messages of a channel by looking into a chunk, whatever its indexes say."""
         self.misled.add(chunk)
-        found, index = self.scan.look(chunk), self.scan.indexes[chunk] or {}
-        if all(len(found[each]) <= len(index.get(each, ())) for each in found):
-            self.unlisted.pop(chunk, None)
-        return found.get(channel_id, entries_of(array("Q")))
+        return self.scan.look(chunk).get(channel_id, entries_of(array("Q")))
 
     def is_bad(self, chunk: int) -> bool:
         """Whether a chunk was found to be unreadable."""
@@ -182,9 +172,9 @@ class Container:
         ``take`` is given the whole log in blocks, ``on_bytes`` how many more bytes were read.
         """
         for number, chunk in enumerate(self.chunks):
-            if number not in self._checked:
+            if number not in self.looked_into:
                 with suppress(BadRecord):
-                    self._records(number)
+                    self.reader.read(chunk)
             on_bytes(chunk.data_size)
         self.read_all(take)
 
@@ -229,16 +219,6 @@ class Container:
     def close(self) -> None:
         """Close the file."""
         self.source.close()
-
-    def _records(self, number: int) -> Bytes:
-        """Read a chunk; the first time see whether its message indexes list all that it holds."""
-        records = self.reader.read(self.chunks[number])
-        index = self.scan.indexes[number]
-        if index and number not in self._checked and number not in self.scan.seen:
-            self._checked.add(number)
-            if missing := _unlisted(records, index):
-                self.unlisted[number] = missing
-        return records
 
     def _is_as_counted(self, logs: Mapping[int, ChannelLog]) -> bool:
         expected = {channel_id: count for channel_id, count in self.expected.items() if count}
@@ -323,23 +303,6 @@ class Container:
                     if stamp is not None:
                         decoded, nearness = decoded + 1, nearness - abs(stamp - log_time)
         return decoded, nearness
-
-
-def _unlisted(records: Bytes, index: Mapping[int, Entries]) -> int:
-    """Count the records of a chunk that are no definitions and that no message index lists."""
-    places = np.sort(np.concatenate([entries[:, 1] for entries in index.values()]))
-    if not isinstance(records, memoryview) or places[-1] > len(records) - HEAD.size:
-        return 0
-    lengths = np.frombuffer(records, np.uint8)[places[:, None] + np.arange(1, HEAD.size)].view(
-        "<i8"
-    )
-    if lengths.sum() + HEAD.size * len(places) == len(records):
-        return 0
-    listed = set(places.tolist())
-    return sum(
-        each.offset not in listed and each.opcode not in DEFINITIONS and each.opcode < PRIVATE
-        for each in walk(records)
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -437,10 +400,6 @@ def _chunks(container: Container) -> Iterator[Damage]:
         at, start, end = chunk.offset, chunk.start, chunk.end
         if number in container.misled:
             yield Damage(path, at, "the message index of a chunk is wrong", lossy=False)
-        if number in container.unlisted:
-            count = f"{container.unlisted[number]} records that its message indexes do not list"
-            reason = f"a chunk with {count}, and which are not read"
-            yield Damage(path, at, reason, True, start, end, unsure_ns=start)
         reason = reader.bad.get(at) or reader.kept.get(at, "")
         if reason:
             index = container.scan.indexes[number] or {}

@@ -68,9 +68,6 @@ _CANDIDATE: Final = re.compile(
     rb"(?=[\x02-\x0f].{4}\x00{4}|\x89MCAP0\r\n\x01|\x06\xff{8})", re.DOTALL
 )
 """The head of a record that is shorter than 4 GiB or was never ended, or a log's first bytes."""
-_LAST_RECORD: Final = re.compile(
-    re.escape(HEAD.pack(Opcode.FOOTER, 20)) + rb".{20}" + re.escape(MAGIC), re.DOTALL
-)
 _NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that are never found inside a chunk, unlike messages and their descriptions."""
 RECORDS: Final = 1 << 18
@@ -464,15 +461,12 @@ class RecordFinder:
         """Find the next record that makes sense at or after ``begin``, or the end of the file.
 
         The damage is in or behind the record ``doubted``. What lies in a chunk are no records of
-        the file, and what lies in an attachment may be those of another log.
+        the file.
         """
-        size, log_end = self._size, 0
-        kinds = {doubted.opcode, *self._source[doubted.end : doubted.end + 1]}
+        size = self._size
         for offset in self._candidates(begin):
             if self._source[offset : offset + len(MAGIC)] == MAGIC:
-                if ATTACHMENT in kinds:
-                    log_end = max(log_end, self._end_of_log(offset))
-                elif self._source[offset - 8 : offset] == MAGIC or (
+                if self._source[offset - 8 : offset] == MAGIC or (
                     not self._summary.checked and self._source[0:8] == MAGIC
                 ):  # else it may be this log's own beginning, moved
                     return Record(BORDER, offset, offset, offset + len(MAGIC))
@@ -483,7 +477,7 @@ class RecordFinder:
                 if self._tries_left < 0:
                     break
                 record = self.record(offset)
-                if self._is_believed(record, doubted, log_end):
+                if self._is_believed(record, doubted):
                     return record
         return Record(END, size, size, size)
 
@@ -495,16 +489,16 @@ class RecordFinder:
             found.update(border for border in self._borders if at <= border < at + _BLOCK)
             yield from sorted(each for each in found if each < at + _BLOCK)
 
-    def _is_believed(self, record: Record, doubted: Record, log_end: int) -> bool:
+    def _is_believed(self, record: Record, doubted: Record) -> bool:
         """Whether it is more than chance that this looks like a record of the log."""
         opcode, content = record.opcode, record.content
         in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
         if opcode == CHUNK:
             ours = content.listing[2:] in self._sizes
             if not self._sizes:
-                ours = content.compression in COMPRESSIONS and record.offset >= log_end
+                ours = content.compression in COMPRESSIONS
             return ours and (content.proven or not in_chunk)
-        misplaced = opcode in (END, BORDER, Opcode.HEADER) or record.offset < log_end
+        misplaced = opcode in (END, BORDER, Opcode.HEADER)
         if misplaced or (in_chunk and opcode not in _NOT_IN_CHUNKS):
             return False
         if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
@@ -514,10 +508,3 @@ class RecordFinder:
         with suppress(BadRecord):
             return bool(self.record(record.end))
         return False
-
-    def _end_of_log(self, offset: int) -> int:
-        for at in range(offset, self._size, _BLOCK):
-            found = _LAST_RECORD.search(self._source[at : at + _BLOCK + 64])
-            if found is not None:
-                return at + found.end()
-        return self._size

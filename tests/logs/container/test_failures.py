@@ -90,26 +90,6 @@ def test_a_chunk_that_lies_in_a_message_is_no_chunk_of_the_log(tmp_path):
     assert found == 2
 
 
-def test_a_log_in_an_attachment_of_a_broken_length_gives_no_message(tmp_path):
-    inner = logged(tmp_path / "inner.mcap", 8, first=500)
-    with (tmp_path / "outer.mcap").open("wb") as file:
-        writer = Writer(file, chunk_size=2_000, compression=CompressionType.NONE)
-        writer.start()
-        channel = writer.register_channel("/a", "json", 0)
-        for number in range(8):
-            data = b'{"n":%d,"fill":"%s"}' % (number, b"x" * 480)
-            writer.add_message(channel, 1_000 * number, data, 1_000 * number)
-        writer.add_attachment(0, 0, "inner.mcap", "application/octet-stream", inner)
-        writer.finish()
-    data = (tmp_path / "outer.mcap").read_bytes()
-    at = data.index(inner) - len(b"application/octet-stream") - len("inner.mcap") - 16 - 16
-    begin = data.rindex(b"\x09", 0, at + 8)
-    (length,) = struct.unpack_from("<Q", data, begin + 1)
-    broken = data[: begin + 1] + struct.pack("<Q", length - 7) + data[begin + 9 :]
-    (found,), told = read(tmp_path, broken)
-    assert found == 8, told
-
-
 def test_a_log_that_is_a_link_to_itself_is_one_line(tmp_path):
     path = tmp_path / "loop.mcap"
     path.symlink_to(path)
