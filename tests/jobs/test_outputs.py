@@ -88,18 +88,16 @@ def test_whoever_shares_one_output_with_another_run_is_refused(name, to, tmp_pat
     assert names(tmp_path) == []
 
 
-def test_what_killed_runs_left_goes_but_for_the_newest_partial_recording(to, tmp_path):
+def test_what_killed_runs_left_goes_when_a_run_has_ended(to, tmp_path):
     for name in (".out.0123abcd.partial.mcap", ".out.mcap.lock", "out.00000003.partial.rrd"):
         (tmp_path / name).touch()
     for name in (".reports.0123abcd.partial", "out.00000001.partial.rrd-images"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "frames.csv").touch()
-    for when, name in enumerate(("out.00000001.partial.rrd", "out.00000002.partial.rrd")):
-        (tmp_path / name).write_text("some frames")
-        os.utime(tmp_path / name, (when, when))
-    with to.holding(()) as left:
-        assert left == tmp_path / "out.00000002.partial.rrd"
-    assert names(tmp_path) == [left.name]
+    (tmp_path / "out.00000002.partial.rrd").write_text("some frames")
+    with to.holding(()):
+        assert "out.00000002.partial.rrd" in names(tmp_path)
+    assert names(tmp_path) == []
 
 
 def test_without_locks_nothing_that_may_be_another_run_s_is_removed(to, tmp_path, monkeypatch):
@@ -107,8 +105,8 @@ def test_without_locks_nothing_that_may_be_another_run_s_is_removed(to, tmp_path
     for name in left:
         (tmp_path / name).touch()
     monkeypatch.setitem(sys.modules, "fcntl", None)
-    with to.holding(()) as one, to.holding(()):
-        assert one is None
+    with to.holding(()), to.holding(()):
+        pass
     assert names(tmp_path) == left
 
 
