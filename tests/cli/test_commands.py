@@ -83,10 +83,6 @@ def test_images_and_masks_become_one_log(folder, capsys):
     assert "truth: /truth/road" in capsys.readouterr().out
 
 
-def test_the_output_has_to_be_named(folder):
-    assert main(["pack", f"{folder}/imgs"]) == 2
-
-
 def test_masks_in_colours_are_packed_with_a_word_on_what_replay_needs(folder, capsys):
     for number in range(2):
         colours = np.full((6, 8, 3), (128, 64, 128), np.uint8)

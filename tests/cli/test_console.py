@@ -18,17 +18,6 @@ def shown(capsys, monkeypatch):
     return show
 
 
-def test_a_wrapped_sentence_has_no_space_at_the_end_of_a_line(shown):
-    assert shown("one two three four five six") == ["one two three four", "five six", ""]
-
-
-def test_a_table_is_not_padded_on_the_right(shown):
-    table = Table.grid()
-    table.add_row("a long cell")
-    table.add_row("short", style="bold")
-    assert shown(table) == ["a long cell", "short", ""]
-
-
 HOSTILE = "\x1b[2Ja\nb\u202e"
 ESCAPED = r"\u001b[2Ja\nb\u202e"
 

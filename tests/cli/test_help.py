@@ -1,10 +1,7 @@
 """Help and version answer at once, because they import nothing heavy."""
 
-import re
 import subprocess
 import sys
-from importlib import import_module
-from inspect import getsource
 
 import pytest
 
@@ -31,12 +28,6 @@ def test_every_command_has_help_of_80_columns(command, capsys, monkeypatch):
     assert f"Usage: roadeval {command}" in shown.out
     assert max(len(line) for line in shown.out.splitlines()) <= 80
     assert shown.err == ""
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_leaves_its_work_to_a_room_below(command):
-    source = getsource(import_module(f"roadeval.cli.commands.{command}"))
-    assert re.search(r"^    from roadeval\.(jobs|config)[\w.]* import", source, re.MULTILINE)
 
 
 def test_no_command_at_all_shows_the_help_as_wrong_usage(capsys):

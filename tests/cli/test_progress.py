@@ -51,14 +51,6 @@ def test_a_line_comes_now_and_then_with_rate_and_time_left(monkeypatch):
     ]
 
 
-def test_a_job_of_unknown_length_tells_no_time_left(monkeypatch):
-    steps = [(0, step(1, None)), (5, step(4, None)), (10, step(6, None))]
-    assert lines_of(steps, monkeypatch) == [
-        "replaying: 1 frames",
-        "replaying: 6 frames, 0.4 frames/s",
-    ]
-
-
 def test_without_a_terminal_the_lines_go_to_stderr(capsys):
     with progress.watched() as watch:
         watch(step(1, 10))

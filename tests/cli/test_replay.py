@@ -4,8 +4,7 @@ import pytest
 
 from roadeval import RunConfig, configure
 from roadeval.cli.app import main
-from roadeval.cli.options import OPTIONS, takes, with_flags
-from roadeval.config import PRESETS
+from roadeval.cli.options import OPTIONS, with_flags
 from roadeval.jobs.progress import Progress
 from roadeval.jobs.run.replay import Outcome
 from roadeval.results.facts import DriveFacts, FrameAccount
@@ -28,12 +27,6 @@ def asked(monkeypatch):
 
     monkeypatch.setattr("roadeval.jobs.run.replay.replay", replay)
     return asked
-
-
-def test_the_defaults_are_those_of_the_library(asked):
-    assert main(["replay", "drive.mcap"]) == 0
-    assert asked["drive"] == "drive.mcap"
-    assert asked["config"] == RunConfig()
 
 
 def test_every_option_arrives(asked, tmp_path):
@@ -89,30 +82,12 @@ def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
     assert "starts from preset gated, not from robust" in capsys.readouterr().err
 
 
-def test_a_variant_without_a_file_is_the_preset_of_its_name(asked):
-    assert main(["replay", "d.mcap", "--variant", "hsi", "--variant", "printed_order"]) == 0
-    presets = {name: {"preset": name} for name in ("hsi", "printed_order")}
-    assert asked["config"] == configure({"variants": presets})
-
-
-def test_a_variant_can_be_a_preset_by_another_name(asked):
-    assert main(["replay", "d.mcap", "--variant", "mine=hsi"]) == 0
-    assert asked["config"] == configure({"variants": {"mine": {"preset": "hsi"}}})
-
-
 def test_a_model_and_training_frames_do_not_go_together(capsys):
     assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
     assert (
         "--train-frames, --train-on and --train-gap do not go with a model (m)"
         in capsys.readouterr().err
     )
-
-
-def test_nor_with_a_model_that_a_file_names(tmp_path, capsys):
-    (tmp_path / "c.toml").write_text('[training]\nmodel = "city.model"\n')
-    words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--train-frames", "3"]
-    assert main(words) == 2
-    assert "do not go with a model (city.model)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -125,18 +100,6 @@ def test_nor_with_a_model_that_a_file_names(tmp_path, capsys):
 def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
     assert main(["replay", "d.mcap", *words.split()]) == 2
     assert f"roadeval: error: {said}" in capsys.readouterr().err
-
-
-def test_in_a_file_a_setting_is_no_flag(tmp_path, capsys):
-    (tmp_path / "c.toml").write_text("[labels]\nignore = [3]\n")
-    assert main(["replay", "d.mcap", "--config", str(tmp_path / "c.toml")]) == 1
-    assert "c.toml: labels.ignore needs labels.road" in capsys.readouterr().err
-
-
-def test_a_file_that_is_called_like_a_setting_keeps_its_name(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["info", "output.mcap"]) == 1
-    assert "output.mcap" in capsys.readouterr().err
 
 
 def test_every_option_s_words_are_a_setting_s_value(asked):
@@ -212,17 +175,3 @@ def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
 def test_a_path_without_a_name_is_shown_with_one(words, said, capsys):
     assert main(["replay", "d.mcap", *words.split()]) == 2
     assert capsys.readouterr().err == (f"roadeval: error: {said}; see 'roadeval replay --help'\n")
-
-
-def test_every_preset_is_named_in_the_help():
-    (preset,) = (option for option in OPTIONS if option.setting == "preset")
-    assert (preset.metavar or "").split("|") == [*PRESETS]
-
-
-# --- Which options a command takes ----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["frames.max_pixels_", "label"])
-def test_a_setting_that_no_option_sets_is_an_error(name):
-    with pytest.raises(ValueError, match=f"no option sets {name}$"):
-        takes("preset", name)

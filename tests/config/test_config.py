@@ -16,37 +16,11 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_paper_is_the_default():
-    assert RunConfig() == configure() == configure({"preset": "paper"})
-
-
-def test_printed_takes_the_misprints_literally():
-    printed = configure({"preset": "printed"}).pipeline.settings
-    assert printed["shadow"].threshold == "printed"
-    assert printed["shadow"].inclusive
-    assert printed["shadow"].statistic == "printed"
-    assert printed["shadow"].colour_space == "hsi"
-    assert printed["svm"].kernel == "linear"
-
-
 def test_seeds_are_for_what_learns():
     chain = {"chain": ["post"], "training": {"seeds": 2}}
     with pytest.raises(ConfigError, match=r"`training.seeds`: no stage of any variant learns"):
         configure(chain)
     assert configure(chain | {"variants": {"v": {}}}).training.seeds == 2
-
-
-@pytest.mark.parametrize(
-    ("preset", "stage", "key", "value"),
-    [
-        ("printed_order", "post", "operations", ("close", "open")),
-        ("hsi", "shadow", "colour_space", "hsi"),
-    ],
-)
-def test_a_preset_that_shows_one_thing_differs_from_paper_by_that_alone(preset, stage, key, value):
-    own, paper = configure({"preset": preset}).pipeline, configure().pipeline
-    assert own == configure({stage: {key: value}}).pipeline
-    assert own != paper
 
 
 def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
@@ -55,19 +29,6 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
     assert config.pipeline.settings["shadow"].connectivity == 8
     assert config.pipeline.settings["svm"] == RunConfig().pipeline.settings["svm"]
     assert config.training.frames == 20
-
-
-def test_a_file_may_start_from_a_preset(tmp_path):
-    config = load_config(write(tmp_path, 'preset = "printed"\n[svm]\nc = 3'))
-    assert config.preset == "printed"
-    assert config.pipeline.settings["svm"].kernel == "linear"
-    assert config.pipeline.settings["svm"].c == 3
-
-
-def test_a_nested_table_overrides_a_part(tmp_path):
-    training = load_config(write(tmp_path, "[training.patch]\ntop = 0.6")).training
-    assert training.patch.top == 0.6
-    assert training.patch.bottom == RunConfig().training.patch.bottom
 
 
 @pytest.mark.parametrize(
@@ -140,11 +101,6 @@ def test_a_time_may_be_a_number_or_a_date(tmp_path, text, start):
     assert load_config(write(tmp_path, f"[frames]\nstart = {text}")).frames.start == start
 
 
-def test_a_missing_file_is_one_line(tmp_path):
-    with pytest.raises(ConfigError, match="cannot be read: No such file"):
-        load_config(tmp_path / "none.toml")
-
-
 def test_a_file_that_is_no_text_is_one_line(tmp_path):
     (tmp_path / "c.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigError, match="cannot be read"):
@@ -202,15 +158,6 @@ def test_reserved_names_are_refused(name):
 def test_names_that_are_no_plain_word_are_refused(name):
     with pytest.raises(ConfigError, match="letters, digits"):
         configure({"variants": {name: {}}})
-
-
-def test_a_layout_lists_layers_and_masks_in_order():
-    layout = RunConfig().variants()[0].layout()
-    assert layout.stages == ("similarity", "svm", "post")
-    assert [spec.name for spec in layout.layers] == [
-        *("ndi", "shadow", "rings", "compensated"),
-        *("distance", "similarity", "svm", "post", "boundary"),
-    ]
 
 
 def test_no_stage_is_called_like_a_table_of_the_run():

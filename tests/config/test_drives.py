@@ -34,8 +34,3 @@ def test_bad_masks_are_named(table, message):
 def test_masks_without_a_path_are_refused_with_the_drive():
     with pytest.raises(ConfigError, match=r"\[masks.net\] has no path"):
         configure({"masks": {"net": {"threshold": 0.5}}}).for_drive("a.mcap")
-
-
-def test_masks_and_a_variant_cannot_share_a_name():
-    with pytest.raises(ConfigError, match="'net': the name is taken"):
-        configure({"variants": {"net": {"preset": "gated"}}, "masks": {"net": {"path": "a"}}})

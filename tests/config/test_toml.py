@@ -1,7 +1,5 @@
 """A run's configuration as a file that makes the same run again, and as a documented one."""
 
-import tomllib
-from dataclasses import fields
 from itertools import pairwise
 
 import pytest
@@ -17,7 +15,6 @@ from roadeval.config import (
     network_variant,
     run_toml,
 )
-from roadeval.config.settings import SECTIONS
 
 OTHER = {
     "output.save": "out.rrd",
@@ -110,16 +107,6 @@ def test_every_preset_reads_back_from_its_file(preset, tmp_path):
     for text in (run_toml(config, "d", "1"), config_toml(config)):
         (tmp_path / "run.toml").write_text(text)
         assert load_config(tmp_path / "run.toml") == config
-
-
-def test_the_file_of_a_run_holds_every_setting_that_has_a_value():
-    config = configure({"preset": "robust"})
-    plain = tomllib.loads(run_toml(config, "d", "1"))
-    assert plain["chain"] == list(config.pipeline.chain)
-    for name in SECTIONS:
-        settings = getattr(config, name)
-        given = {f.name for f in fields(settings) if getattr(settings, f.name) is not None}
-        assert plain[name].keys() == given
 
 
 def test_every_setting_is_documented_with_its_range():

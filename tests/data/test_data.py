@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from roadeval.data import CODES, ERRORS, IGNORE, best_code, colours, histogram, wrong_above
+from roadeval.data import CODES, IGNORE, best_code, histogram, wrong_above
 from roadeval.data.arrays import sigmoid
-from roadeval.data.words import DASH, MINUS, interval, listing, number, percent, points, timestamp
+from roadeval.data.words import DASH, MINUS, percent, points
 
 
 @pytest.mark.parametrize(
@@ -23,27 +23,6 @@ def test_a_rate_is_in_percent_and_undefined_is_a_dash(fraction, told):
 )
 def test_a_difference_has_its_sign_unless_it_is_nothing(difference, told):
     assert points(difference) == told
-
-
-def test_an_interval_is_given_or_not():
-    assert interval(-0.01, 0.02) == f"{MINUS}1.00 to +2.00"
-    assert interval(None, None) == "none given"
-
-
-def test_a_stamp_is_a_date_where_it_can_be_one():
-    assert timestamp(1_700_000_041_250_000_000) == "2023-11-14 22:14:01.250 UTC"
-    assert timestamp(12_345_000_000) == "12.345 s"
-
-
-def test_a_count_has_its_thousands_apart():
-    assert number(15_222_322) == "15,222,322"
-    assert number(999) == "999"
-
-
-def test_words_are_joined():
-    assert listing([]) == ""
-    assert listing(["a"]) == "a"
-    assert listing(["a", "b", "c"]) == "a, b and c"
 
 
 # --- The threshold that errs least, against trying each -------------------------------------------
@@ -72,22 +51,6 @@ def test_of_thresholds_that_err_alike_it_is_the_middle_one():
     counts[0, 1000], counts[1, 3001] = 5, 5
     assert best_code(counts) == 2000
     assert best_code(np.zeros_like(counts)) == (CODES - 1) // 2
-
-
-# --- The palette ----------------------------------------------------------------------------------
-
-
-def test_variants_never_share_a_colour():
-    given = (colours.FILTERED, colours.UNFILTERED, colours.BLIND, *colours.EXTRA)
-    assert len(set(given)) == len(given)
-
-
-def test_an_error_map_has_the_documented_colours():
-    found = {c.name: colours.hex_of(c.rgba[:3]) for c in ERRORS.classes}
-    assert found["TP"] == "#009E73"
-    assert found["FP"] == "#D55E00"
-    assert found["FN"] == "#CC79A7"
-    assert ERRORS.classes[0].rgba == colours.CLEAR
 
 
 # --- Functions of every number of an array --------------------------------------------------------

@@ -54,11 +54,6 @@ def test_a_worse_configuration_ends_with_4_and_the_sentence_that_says_why(demo, 
     assert "frames that out evaluated are left out" in run.stderr
 
 
-def test_a_limit_that_is_kept_ends_with_0(demo, worse):
-    kept = ("--fail-if", "post.filtered.ERR < -50pp", "--fail-if", "post.filtered.ERR > 99%")
-    assert here("compare", demo.recording, worse.reports, *kept).returncode == 0
-
-
 def test_the_files_are_written_by_their_endings(demo, worse, tmp_path):
     names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
     words = [word for name in names for word in ("-o", name)]
@@ -141,17 +136,6 @@ def test_what_cannot_be_done_is_one_line(words, code, said, demo):
     assert len(run.stderr.splitlines()) == 1
 
 
-def test_where_err_is_undefined_on_every_frame_it_is_said(ignored, tmp_path):
-    names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
-    words = [word for name in names for word in ("-o", name)]
-    run = here("compare", ignored.reports, *words)
-    assert run.returncode == 0, run.stderr
-    said = "Nothing to compare: ERR of post is undefined on every frame."
-    assert said in run.stdout
-    assert "no interval" not in run.stdout
-    assert said in text(names[0].read_bytes())
-
-
 # --- Fleets ---------------------------------------------------------------------------------------
 
 
@@ -171,17 +155,6 @@ def test_a_worse_fleet_ends_with_4_and_the_sentence_that_says_why(fleets):
     assert max(map(len, run.stdout.splitlines())) <= 80
     assert "post.filtered.ERR of new changed by" in run.stderr
     assert "warning: 2 drives are left out of base" in run.stderr
-
-
-def test_fleets_are_written_as_files_too(fleets, tmp_path):
-    names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json", "html")]
-    run = here("compare", *fleets, *(word for name in names for word in ("-o", name)), "-q", *LIMIT)
-    assert (run.returncode, run.stdout) == (4, "")
-    document, markdown, content, _ = (name.read_bytes() for name in names)
-    told = json.loads(content)
-    assert told["verdict"] == json.loads(here("compare", *fleets, "--json").stdout)["verdict"]
-    assert "**Limits exceeded**" in markdown.decode()
-    assert "Which drives changed" in text(document)
 
 
 @pytest.mark.parametrize("words", [["post.net.ERR > 1pp"], ["post.filtered.ERR > 99pp surely"]])

@@ -18,7 +18,7 @@ from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
 from roadeval.jobs.run.fleet_work import train_fold
 from roadeval.logs import LogWriter
-from roadeval.results.fleet import record_path, recording_path
+from roadeval.results.fleet import record_path
 from tests.e2e.commands import here
 from tests.fixtures.make import make
 from tests.training.making import frame
@@ -164,13 +164,6 @@ def test_a_drive_whose_results_have_gone_is_replayed_alone(drives, ran, tmp_path
     assert tables(folder) == before
 
 
-def test_the_recording_of_the_worst_drive_alone_is_kept(ran):
-    scores = roadeval.Result(ran.folder).scores
-    final = scores[(scores.variant == "filtered") & scores.final & (scores.region == "all")]
-    (kept,) = (ran.folder / "recordings").glob("*.rrd")
-    assert kept.stem == final.loc[final.ERR.idxmax()].drive
-
-
 def test_of_recordings_that_are_not_kept_none_stays_of_a_drive_without_a_score(tmp_path):
     folder = tmp_path / "logs"
     write(folder / "a.mcap", 0)
@@ -240,17 +233,6 @@ def test_a_fold_whose_training_ends_its_workers_fails_its_own_drives_alone(two, 
     (row,) = [row for row in rows if row["status"] == "failed"]
     assert row["reason"].startswith("its worker process ended 2 times while the model of fold 1")
     assert row["model"] is None
-
-
-def test_a_fold_whose_model_cannot_be_written_is_told(two, tmp_path):
-    class Full(Here):
-        def submit(self, do, /, task):
-            task.path.parent.touch()
-            return super().submit(do, task)
-
-    drives, config = two
-    with pytest.raises(RoadevalError, match=r"cannot be written: (File exists|Not a directory)"):
-        roadeval.replay_fleet(drives, tmp_path / "f", config, executor=Full())
 
 
 class ThreadTasks(ThreadPoolExecutor):
@@ -323,15 +305,6 @@ def test_a_record_that_another_command_has_made_meanwhile_is_not_mixed_with_ours
     ):
         roadeval.replay_fleet([drives], tmp_path / "f", config, executor=Meanwhile())
     assert not (tmp_path / "f" / "fleet.json").exists()
-
-
-def test_recordings_that_must_be_kept_are_made_where_they_lack(drives, ran, tmp_path):
-    folder = copied(ran, tmp_path)
-    _, submitted = run(drives, folder, keep="all")
-    assert len(submitted) == 2
-    scored = [d["drive"] for d in ran.summary["drives"] if d["name"] != "b"]
-    assert all(recording_path(folder, drive).exists() for drive in scored)
-    assert tables(folder) == tables(ran.folder)
 
 
 def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):

@@ -61,14 +61,6 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     assert "Where no recording was kept, --worst K says how to make it." in read
 
 
-def test_by_default_the_worst_frame_of_all_opens(made, monkeypatch):
-    shown = []
-    monkeypatch.setattr(viewer, "show", lambda recording, frame: shown.append((recording, frame)))
-    assert here("inspect", made / "f").returncode == 0
-    first = worst(made / "f")
-    assert shown == [(made / "f" / "recordings" / f"{first.drive}.rrd", first.frame)]
-
-
 def test_of_a_drive_that_was_not_kept_the_command_that_makes_its_recording_is_said(
     fleet, drawn, tmp_path, monkeypatch
 ):

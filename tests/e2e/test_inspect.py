@@ -1,6 +1,5 @@
 """``roadeval inspect``: the worst frames, and the real viewer at one of them."""
 
-import json
 from pathlib import Path
 
 import cv2
@@ -26,16 +25,6 @@ def worst(replayed):
         if (row["variant"], row["stage"]) == ("filtered", "post") and row["ERR"]
     ]
     return int(max(rows, key=lambda row: float(row["ERR"]))["frame"])
-
-
-def test_the_list_begins_with_the_worst_frame_and_says_why(demo):
-    listed = json.loads(roadeval("inspect", demo.recording, "--list", "--json").stdout)
-    assert listed[0]["frame"] == worst(demo)
-    assert [each["rank"] for each in listed] == list(range(1, len(listed) + 1))
-    errors = [each["rates"]["ERR"] for each in listed]
-    assert errors == sorted(errors, reverse=True)
-    for each in listed:
-        assert sum(each["parts"].values()) == pytest.approx(each["rates"]["ERR"])
 
 
 @drawable
@@ -111,10 +100,6 @@ def test_where_err_is_undefined_on_every_frame_none_is_the_worst(words, ignored,
     ]
 
 
-def test_where_err_is_undefined_the_first_evaluated_frame_is_drawn(ignored, told):
-    assert told(ignored.recording) == "frame 12\n"
-
-
 @pytest.mark.parametrize("words", [("--worst", "1"), ("--frame",)])
 def test_a_frame_without_pictures_is_drawn_with_a_warning(
     words, sparse, tmp_path, monkeypatch, capsys
@@ -140,14 +125,6 @@ def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
     assert inspecting.worst(opened, "unfiltered").by == "disagreement"
     again = "the first to look at with pictures (--frame N or --worst K takes another)"
     assert told(unlabelled.recording) == f"frame {first}, {again}\n"
-
-
-def test_the_list_without_truth_names_its_rank_and_no_error_rate(unlabelled, capsys):
-    assert main(["inspect", str(unlabelled.recording), "--list"]) == 0
-    said = capsys.readouterr().out
-    assert "frames to look at of filtered by" in said
-    assert "disagreement of post" in said
-    assert "ERR" not in said
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,9 @@ import shutil
 import pandas as pd
 import pytest
 
-from roadeval.report.blocks import Figure
-from roadeval.report.chart import Chart, ChartKind, Look, Series
-from roadeval.report.page.render import write_page
 from roadeval.results.fleet import FleetFolder
 from tests.e2e.commands import here
 from tests.fixtures.browser import missing, violations, wait_until
-from tests.report.making import a_document
 from tests.results.fleet.making import fleet_of
 
 if reason := missing():
@@ -186,21 +182,6 @@ def test_the_address_names_the_frame_and_back_goes_to_the_last_one(drive, watche
     assert frame(watched(f"{drive.as_uri()}#frame-{two}").tab) == two
 
 
-def test_rows_of_frames_are_one_line_and_their_number_stays_in_sight(drive, watched):
-    for width in (1440, 390):
-        tab = watched(drive.as_uri(), width=width).tab
-        rows = tab.locator(".frames tbody tr")
-        heights = rows.evaluate_all("rows => rows.map(row => row.offsetHeight)")
-        assert max(heights) < 40
-        box = tab.locator(".scroll:has(.frames)")
-        box.evaluate("each => each.scrollTo(200, 200)")
-        left = box.bounding_box()["x"]
-        number = rows.nth(9).locator("th").bounding_box()
-        assert number["x"] - left == pytest.approx(1, abs=1)
-        head = tab.locator(".frames thead").bounding_box()
-        assert head["y"] - box.bounding_box()["y"] == pytest.approx(1, abs=1)
-
-
 def test_a_page_opens_on_six_screens_at_most(drive, fleet, watched):
     height = "document.documentElement.scrollHeight"
     assert watched(fleet.as_uri()).tab.evaluate(height) <= 6 * 900
@@ -319,19 +300,6 @@ def test_two_variants_are_chosen_for_the_whole_page(drive, watched):
     assert shown(tab, "#summary tbody th") == ["filtered", "unfiltered", "blind"]
 
 
-def test_rows_of_marks_are_told_by_pointer_and_keyboard(drive, watched):
-    tab = watched(drive.as_uri()).tab
-    rows = tab.locator(".rows").first
-    rows.locator(".row").nth(2).hover()
-    told = tab.locator(".tip:visible").inner_text()
-    assert told.startswith("in light\n")
-    assert re.search(r"blind\s+\d+\.\d\d %", told)
-    rows.focus()
-    tab.keyboard.press("ArrowDown")
-    names = rows.locator(".row:not(.scale) .name").all_inner_texts()
-    assert tab.locator(".tip:visible .head").inner_text() == names[3]
-
-
 def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
     tab = watched(drive.as_uri()).tab
     section = tab.locator("#what-the-filter-and-the-variants-change")
@@ -341,23 +309,6 @@ def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
     ends = " to ".join(f"{100 * mean[end]:+.2f}" for end in ("low", "high"))
     told = f"mean and its interval\n{100 * mean['mean']:+.2f} pp ({ends})".replace("-", "\u2212")
     assert told in tab.locator(".tip:visible").inner_text()
-
-
-def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path, watched):
-    curve = Series("a", Look("#0072B2"), [0.0, 40.0, 90.0], [100.0, 95.0, 60.0])
-    mask = Series("a: the mask", Look("#0072B2"), [40.0], [93.0])
-    chart = Chart("precision", ChartKind.LINES, [curve, mask], across="recall", x_range=(0, 101))
-    page = write_page(tmp_path / "page.html", a_document(Figure([chart], "")))
-    tab = watched(page.as_uri()).tab
-    tab.locator(".area").focus()
-    said = []
-    for _ in range(2):
-        tab.keyboard.press("ArrowRight")
-        said.append([*filter(None, tab.locator(".tip:visible").inner_text().split("\n"))])
-    assert said == [
-        ["recall 40.00 %", "a", "95.00 %", "a: the mask", "93.00 %"],
-        ["recall 90.00 %", "a", "60.00 %"],
-    ]
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (390, "dark")])
@@ -445,16 +396,6 @@ def test_of_many_drives_the_worst_have_a_row_each_with_its_interval(many, watche
     assert told == f"worse: {mean} pp ({low} to {high})"
     assert seen.complaints == []
     assert violations(seen.tab) == []
-
-
-def test_a_results_folder_gives_a_page_without_pictures(demo, tmp_path, watched):
-    folder = tmp_path / "results"
-    shutil.copytree(demo.reports, folder)
-    assert here("report", folder, "-o", tmp_path / "page.html").returncode == 0
-    seen = watched((tmp_path / "page.html").as_uri())
-    assert seen.complaints == []
-    assert "Made without pictures" in seen.tab.content()
-    assert seen.tab.locator(".frames tbody tr").count() == demo.summary["frames"]["evaluated"]
 
 
 def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):

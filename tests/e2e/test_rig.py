@@ -139,15 +139,6 @@ def test_a_rig_is_compared_camera_by_camera_with_a_replay_of_one(rig: Path):
     assert "rear" not in told.partition(": ")[2]
 
 
-def test_results_have_a_row_for_each_camera(rig: Path):
-    for path in ("recordings/rig.rrd", "reports/rig"):
-        result = roadeval.Result(rig / path)
-        assert list(result.cameras) == [*NAMES]
-        assert result.drives["camera"].tolist() == list(result.cameras)
-        rows = pd.read_csv(rig / "reports" / "rig" / "frames.csv")["camera"].value_counts()
-        assert result.frames["camera"].value_counts().to_dict() == rows.to_dict()
-
-
 def test_the_first_screen_lists_the_cameras(rig: Path):
     shown = (rig / "screen.txt").read_text()
     assert "rig: 3 cameras, 46 of 76 frames were evaluated" in shown
@@ -169,26 +160,6 @@ def test_reports_show_all_cameras_and_each(rig: Path):
     assert "rig, /rear/camera/image" in (folder / "one.html").read_text()
 
 
-def test_a_report_lands_beside_others_by_the_recordings_name(rig: Path):
-    for place in ("recordings/rig.rrd", "reports/rig"):
-        for words in ((), ("--camera", "rear")):
-            assert here("report", place, *words, cwd=rig).returncode == 0
-    for name in ("rig", "rig-rear_camera_image", "rig/report", "rig/report-rear_camera_image"):
-        assert (rig / "reports" / f"{name}.pdf").exists()
-
-
-def test_the_worst_frames_name_their_camera(rig: Path):
-    run = here("inspect", rig / "recordings/rig.rrd", "--list", "--json")
-    frames = json.loads(run.stdout)
-    errors = [each["rates"]["ERR"] for each in frames]
-    assert errors == sorted(errors, reverse=True)
-    assert {each["camera"] for each in frames} <= {
-        f"/{n}{IMAGE}" for n in ("front", "copy", "rear")
-    }
-    alone = here("inspect", rig / "recordings/rig.rrd", "--camera", "rear", "--list", "--json")
-    assert {each["camera"] for each in json.loads(alone.stdout)} == {f"/rear{IMAGE}"}
-
-
 def test_worst_frames_of_all_cameras_are_recorded(rig: Path, tmp_path: Path):
     out = tmp_path / "worst.rrd"
     words = "--record", "worst:5", "--save", out, "-o", tmp_path / "r", "-q"
@@ -198,19 +169,6 @@ def test_worst_frames_of_all_cameras_are_recorded(rig: Path, tmp_path: Path):
     rows = roadeval.Result(out).frames.query("variant != 'blind' and stage == 'post'")
     worst = rows.groupby(["camera", "frame"])["ERR"].max().nlargest(5)
     assert {frame for _, frame in worst.index} == {n for own in kept for n in own}
-
-
-def test_a_file_names_the_cameras(rig: Path, tmp_path: Path):
-    text = "".join(f'[[cameras]]\nname = "{n}"\nimage = "/{n}{IMAGE}"\n' for n in ("front", "rear"))
-    (tmp_path / "rig.toml").write_text(text)
-    words = "--config", tmp_path / "rig.toml", "--save", tmp_path / "o.rrd", "-o", tmp_path / "o"
-    assert here("replay", rig / "rig.mcap", *words, "-q").returncode == 0
-    assert set(roadeval.Result(tmp_path / "o").frames["camera"]) == {"front", "rear"}
-    assert roadeval.Recording(tmp_path / "o.rrd", "rear").frame_numbers[0] == 0
-    again = here(
-        "replay", rig / "rig.mcap", "--config", tmp_path / "o.rrd", "--record", "none", "-q"
-    )
-    assert again.returncode == 0, again.stderr
 
 
 def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path, tmp_path: Path):

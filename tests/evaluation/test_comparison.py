@@ -35,17 +35,6 @@ def a_street(**errors):
     return Side("street", [a_part({(name, "post"): own for name, own in errors.items()})])
 
 
-def test_a_result_against_itself_differs_by_nothing_for_sure():
-    errors = [(7 * number) % 23 for number in range(40)]
-    found = compare([a_side("a", errors), a_side("b", errors)], SETTINGS)
-    (change,) = found.changes
-    assert change.base == change.new
-    for told in change.difference.values():
-        assert (told.mean, told.low, told.high) == (0, 0, 0)
-    assert found.moved == ()
-    assert found.warnings == ()
-
-
 def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     base, new = a_side("base", [10, 10, 10, 10]), a_side("new", [12, 14])
     found = compare([base, new], SETTINGS)
@@ -104,21 +93,6 @@ def test_settings_that_differ_are_named_with_both_values():
     )
 
 
-def test_another_method_is_named_and_no_reason_for_doubt():
-    sides = [a_side(name, [10] * 12, asked={"svm.c": c}) for name, c in (("a", 1), ("b", 2))]
-    found = compare(sides, SETTINGS)
-    assert found.changed_settings == {"b": {"svm.c": (1, 2)}}
-    assert found.warnings == ()
-
-
-@pytest.mark.parametrize("asked", [{}, {"frames.scale": 1.0}])
-def test_a_result_that_does_not_know_its_settings_is_compared_without_a_word(asked):
-    sides = [a_side("base", [10] * 12, asked=asked), a_side("new", [12] * 12)]
-    found = compare(sides, SETTINGS)
-    assert found.warnings == ()
-    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
-
-
 def test_a_change_between_scales_is_not_judged_but_a_level_is():
     base = a_side("base", [10] * 12, asked={"frames.scale": 1.0})
     found = compare([base, a_side("new", [12] * 12, asked={"frames.scale": 0.5})], SETTINGS)
@@ -133,22 +107,6 @@ def test_nothing_in_common_is_an_error():
     late = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
     with pytest.raises(ComparisonError, match="no evaluated frame and stage in common"):
         compare([a_side("base", [10, 20]), late], SETTINGS)
-
-
-def test_frames_that_changed_most_are_named_in_both_directions():
-    base, new = a_side("base", [10] * 4), a_side("new", [10, 30, 10, 5])
-    moved = compare([base, new], SETTINGS).moved
-    assert [(row.frame, round(row.change, 2)) for row in moved] == [(1, 0.2), (3, -0.05)]
-
-
-def test_variants_of_one_result_are_compared_with_unfiltered():
-    names = ("filtered", "unfiltered", "other", "blind")
-    street = a_street(**{name: [10 + place] * 12 for place, name in enumerate(names)})
-    sides = variants_as_sides(street, names)
-    assert [side.label for side in sides] == ["unfiltered", "filtered", "other"]
-    found = compare(sides, SETTINGS, across_variants=True)
-    told = {row.variant: row.difference["ERR"].mean for row in found.changes}
-    assert told == pytest.approx({"filtered": -0.01, "other": 0.01})
 
 
 def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_same():
@@ -212,15 +170,6 @@ def a_fleet(label, errors, *, groups=None, digests=None):
 
 def noisy(drives, mean=10, seed=5):
     return mean + np.random.default_rng(seed).integers(-3, 4, (drives, 40))
-
-
-def test_over_drives_the_drive_is_the_unit():
-    found = compare([a_fleet("a", noisy(8)), a_fleet("b", noisy(8, 12, 6))], SETTINGS)
-    (change,) = found.changes
-    told = change.difference["ERR"]
-    assert (told.unit, told.units, change.drives, change.frames) == ("drives", 8, 8, 320)
-    assert change.new["ERR"] - change.base["ERR"] == pytest.approx(told.mean)
-    assert (found.moved, found.disagreements) == ((), ())
 
 
 def test_a_drive_of_a_fleet_has_the_numbers_of_the_comparison_of_its_two_results():
@@ -340,18 +289,6 @@ def test_a_condition_is_judged_where_half_of_the_shorter_range_is_common():
     found = compare([base, altered(new, stamp_ns=lambda s: s + 30 * 10**8)], SETTINGS)
     assert found.changes[0].frames == 20
     assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
-
-
-def test_a_condition_is_judged_where_one_result_covers_a_part_of_the_other():
-    found = compare([a_side("base", [10] * 50), a_side("new", [90] * 12)], SETTINGS)
-    (row,) = judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
-    assert row.holds
-
-
-def test_a_condition_on_what_is_not_there_is_an_error_not_a_pass():
-    found = compare([a_side("a", [1] * 12), a_side("b", [1] * 12)], SETTINGS)
-    with pytest.raises(ConditionError, match=r"post\.net; there are post\.filtered"):
-        judge(found, [Condition.parse("post.net.ERR > 1pp")], SETTINGS)
 
 
 def test_certainty_is_judged_by_the_interval_of_any_stage_and_rate():

@@ -84,13 +84,6 @@ def test_a_condition_holds_or_not(text, holds):
     assert Condition.parse(text).judge(MASK).holds is holds
 
 
-def test_a_judgement_has_the_numbers_that_it_rests_on():
-    judgement = Condition.parse("post.filtered.ERR > +0.5pp").judge(a_mask(-0.1, 1.6))
-    assert (judgement.result, judgement.before, judgement.after) == ("new", 0.100, 0.106)
-    assert (judgement.low, judgement.high) == (-0.001, 0.016)
-    assert judgement.condition.text == "post.filtered.ERR > +0.5pp"
-
-
 @pytest.mark.parametrize(
     ("limit", "interval", "holds"),
     [
@@ -109,10 +102,6 @@ def test_what_is_surely_so_is_so_of_the_whole_interval(limit, interval, holds):
     condition = Condition.parse(f"post.filtered.ERR {limit} surely")
     assert condition.surely
     assert condition.judge(a_mask(*interval)).holds is holds
-
-
-def test_the_plain_form_is_judged_by_the_change_itself_whatever_its_interval():
-    assert Condition.parse("post.filtered.ERR > +0.5pp").judge(a_mask(-9, 9)).holds
 
 
 def test_certainty_without_an_interval_is_not_judged():

@@ -10,7 +10,6 @@ from skimage.segmentation import find_boundaries
 
 from roadeval.data import IGNORE, FrameResult, Role, TruthBits, pack
 from roadeval.evaluation import score
-from roadeval.evaluation.region import disk
 from roadeval.evaluation.score import EdgesAndFlicker
 from roadeval.evaluation.score.counts import TRIMAP, boundary_iou, trimap
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
@@ -30,11 +29,6 @@ def edge_of(labels):
 def test_neither_the_border_nor_an_ignored_pixel_makes_an_edge():
     assert not edge_of(pixels("##", "##")).any()
     assert not edge_of(pixels("##?.", "##?.")).any()
-
-
-def test_the_neighbourhood_is_a_disk():
-    assert disk(1).tolist() == [1, 0]
-    assert disk(5).tolist() == [5, 4, 4, 4, 3, 0]
 
 
 def test_what_the_mask_does_among_ignored_pixels_does_not_count():
@@ -233,10 +227,6 @@ def told(*results):
 def flicker_of(*frames):
     found = told(*(shown(truth, mask) for truth, mask in frames))
     return {name: found[name] for name in ("flicker", "truth_flicker", "pairs")}
-
-
-def test_a_single_frame_has_none():
-    assert flicker_of((TRUTH, TRUTH)) == {"flicker": None, "truth_flicker": None, "pairs": 0}
 
 
 def test_nothing_is_compared_across_a_change_of_size():

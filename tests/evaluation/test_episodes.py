@@ -29,11 +29,6 @@ def test_an_episode_lasts_from_its_first_frame_to_the_first_one_below_the_limit(
     }
 
 
-def test_a_few_lost_frames_are_no_gap_within_a_second():
-    own = found([0, 0.1, 0.2, 1.2, 1.3], [0, 0.2, 0.2, 0, 0])
-    assert (own["seconds"], own["recovered"]) == (1.1, 1)
-
-
 def test_a_frame_whose_rate_is_undefined_says_nothing():
     own = found([0, 1, 2, 3], [0.2, math.nan, 0.2, 0])
     assert (own["episodes"], own["seconds"]) == (1, 3.0)

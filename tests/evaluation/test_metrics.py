@@ -9,19 +9,13 @@ from hypothesis import strategies as st
 from sklearn import metrics as theirs
 
 from roadeval.data import Counts
-from roadeval.evaluation.metric import Metric, Shown
+from roadeval.evaluation.metric import Metric
 from roadeval.evaluation.metrics import (
     ALL,
-    COMPARED,
-    FULL,
     OVERLAP,
-    SHORT,
-    SHORT_OVERLAP,
     of,
     table,
 )
-
-pixels = st.integers(0, 40)
 
 
 def test_the_papers_six_by_hand() -> None:
@@ -33,26 +27,6 @@ def test_the_papers_six_by_hand() -> None:
         "TNR": 80 / 90,
         "FPR": 10 / 90,
     }
-
-
-def test_people_read_errors_first_and_no_metric_beside_its_mirror_but_accuracy() -> None:
-    assert list(FULL) == ["ERR", "FPR", "FNR", "ACC"]
-    assert list(SHORT) == ["ERR", "FPR", "FNR"]
-    assert list(SHORT_OVERLAP) == ["IoU"]
-    assert COMPARED == ("ACC", "ERR", "FNR", "FPR")
-
-
-@pytest.mark.parametrize(
-    ("attributes", "place"),
-    [
-        ({}, Shown.EVERYWHERE),
-        ({"mirrors": "ERR"}, Shown.IN_FILES),
-        ({"mirrors": "ERR", "shown": Shown.IN_FULL}, Shown.IN_FULL),
-    ],
-)
-def test_a_metric_is_shown_everywhere_but_where_another_tells_the_same(attributes, place) -> None:
-    metric = Metric("X", "x", "TP", lambda counts: counts.tp, True, 50, **attributes)
-    assert metric.place == place
 
 
 @pytest.mark.parametrize("metric", ALL.values(), ids=ALL)

@@ -47,11 +47,6 @@ def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
     assert bands["band_0"][0, 0] == bands["band_4"][6, 0] == 1
 
 
-def test_more_bands_than_rows_leave_some_empty() -> None:
-    bands = bands_of((2, 3), 5)
-    assert sum(bands.values()).tolist() == [[1, 1, 1]] * 2
-
-
 def test_a_region_is_the_same_for_all_variants() -> None:
     mask, first, second = pixels("#."), pixels("##"), pixels("..")
     with_filter = a_variant("filtered", {"post": mask}, {"shadow": first})
@@ -72,24 +67,6 @@ def test_a_frame_has_true_shadow_only_if_the_log_has_it() -> None:
     found = of_frame(shadowed, 2)
     assert set(found) == every | {"true_shadow"}
     assert (found["true_shadow"] == pixels("#..#")).all()
-
-
-def test_interior_is_what_the_boundary_leaves() -> None:
-    found = of_frame(a_frame(pixels("...###")), 1)
-    assert (found["interior"] == pixels("##..##")).all()
-
-
-def test_regions_have_titles_in_the_reports_order():
-    names = ["band_0", "band_1", "band_2", "lit", "boundary", "wet_road"]
-    assert regions.titles(names, height=8) == {
-        "lit": "in light",
-        "boundary": "near the road's edge",
-        "band_0": "image rows 0\N{EN DASH}2, the top",
-        "band_1": "image rows 3\N{EN DASH}5",
-        "band_2": "image rows 6\N{EN DASH}7, the bottom",
-        "wet_road": "wet road",
-    }
-    assert regions.titles(["band_0"])["band_0"].startswith("image rows, part 1 of 1")
 
 
 def test_the_regions_that_make_up_a_frame_do_so_family_by_family():

@@ -20,8 +20,6 @@ FILTERED = a_variant(
 )
 UNFILTERED = a_variant("unfiltered", {"svm": TRUTH, "post": pixels("##..", "##..")})
 
-Counted = tuple[int, int, int, int]
-
 
 def a_board(prior: BlindPrior | None = None, window: int = 10) -> Scoreboard:
     settings = EvaluationSettings(window=window, boundary_width=1, bands=2)
@@ -54,19 +52,6 @@ def test_all_masks_are_counted_in_the_regions_that_the_filter_found() -> None:
     result = a_board().score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
     for tally in result.tallies:
         assert list(tally.regions) == ["lit", "boundary", "interior", "band_0", "band_1"]
-
-
-def test_error_maps_are_of_the_final_masks() -> None:
-    result = a_board().score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
-    assert result.errors["filtered"].array.tolist() == [[1, 1, 0, 0], [1, 3, 0, 4]]
-    assert result.errors["unfiltered"].array.tolist() == [[1, 1, 0, 0], [1, 1, 0, 4]]
-
-
-def test_scoring_changes_nothing() -> None:
-    board = a_board()
-    board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED,))
-    assert board.totals() == {}
-    assert board.roles() == {}
 
 
 @pytest.mark.parametrize("role", [Role.TRAINING, Role.GAP, Role.UNLABELLED])
@@ -102,17 +87,6 @@ def test_totals_and_windows_follow_the_order_of_the_variants() -> None:
     assert board.summary()["windows"] == 2
 
 
-def test_a_variant_may_not_be_called_blind() -> None:
-    with pytest.raises(ValueError, match="blind"):
-        Scoreboard(EvaluationSettings(), ["blind"], None)
-
-
-def test_seconds_are_averaged_over_all_frames() -> None:
-    board = a_drive(2, a_board())
-    board.add(board.score(a_frame(None), Role.UNLABELLED, (FILTERED,)))
-    assert board.summary()["seconds"]["filtered"] == pytest.approx({"svm": 0.002, "post": 0.002})
-
-
 def test_a_frame_that_ignores_every_pixel_has_undefined_rates_and_is_counted_so() -> None:
     board = a_board()
     frame = a_frame(np.full_like(TRUTH, 255))
@@ -121,30 +95,6 @@ def test_a_frame_that_ignores_every_pixel_has_undefined_rates_and_is_counted_so(
     assert totals["N"] == 0
     assert math.isnan(totals["ERR"])
     assert totals["undefined"]["ERR"] == 1
-
-
-class TestOracles:
-    variant = replace(FILTERED, oracles={"svm": {"post": Packed.of(pixels("##..", "##.#"))}})
-
-    def test_are_counted_apart_and_named_after_the_stage_that_was_replaced(self) -> None:
-        result = a_board().score(a_frame(TRUTH, 4), Role.EVALUATED, (self.variant,))
-        assert result.oracles["svm"][0].counts == Counts(tp=4, tn=3)
-
-    def test_are_never_among_the_results(self) -> None:
-        frame, own = a_frame(TRUTH), (self.variant, UNFILTERED)
-        with_oracles = a_board().score(frame, Role.EVALUATED, own)
-        without = a_board().score(frame, Role.EVALUATED, (FILTERED, UNFILTERED))
-        assert with_oracles.tallies == without.tallies
-        assert without.oracles == {}
-
-    def test_are_summed_up_by_variant_oracle_and_stage(self) -> None:
-        board = a_board()
-        for number in range(3):
-            result = board.score(a_frame(TRUTH, number), Role.EVALUATED, (self.variant,))
-            board.add(result)
-        assert board.oracles()["filtered"]["svm"]["post"]["TP"] == 12
-        assert board.summary()["oracles"]["filtered"]["svm"]["post"]["ERR"] == 0
-        assert list(board.totals()["filtered"]) == ["svm", "post"]
 
 
 # --- The mask that never looks at the image -------------------------------------------------------
@@ -174,17 +124,6 @@ def test_the_mask_fits_a_frame_of_another_size() -> None:
 def test_truths_of_several_sizes_make_one_prior() -> None:
     prior = BlindPrior.of_truths([pixels("..##"), pixels(*["....####"] * 2)])
     assert prior.road.tolist() == [[0, 0, 1, 1]]
-
-
-def test_a_prior_needs_a_truth() -> None:
-    with pytest.raises(ValueError, match="at least one"):
-        BlindPrior.of_truths([])
-
-
-def test_nobody_can_spoil_the_shared_mask() -> None:
-    mask = BlindPrior.of_truths([pixels("#.")]).mask((1, 2))
-    with pytest.raises(ValueError, match="read-only"):
-        mask.bits[0, 0] = 0
 
 
 # --- Rates with each seed of the training, from the frames' counts --------------------------------
@@ -218,33 +157,8 @@ def test_the_rates_stand_in_the_order_of_the_seeds_the_run_s_own_first():
     assert found["difference"]["post"]["ERR"] == [-1 / 8, 0, 2 / 8]
 
 
-def test_the_rates_are_means_over_the_frames():
-    frames = [
-        (with_seeds("filtered", RIGHT, seed_1=mask),) for mask in (RIGHT, ONE_WRONG, TWO_WRONG)
-    ]
-    found = a_board_of(*frames).repeats()
-    assert found["totals"]["filtered"]["post"]["ERR"] == [0, pytest.approx(1 / 8)]
-    assert found["difference"] == {}
-
-
-def test_masks_that_no_training_made_are_not_among_them():
-    net = a_variant("net", {"post": ONE_WRONG})
-    prior = BlindPrior.of_truths([FRAME_TRUTH])
-    found = a_board_of((with_seeds("filtered", RIGHT, seed_1=RIGHT), net), prior=prior).repeats()
-    assert list(found["totals"]) == ["filtered"]
-
-
-def test_without_a_further_seed_there_is_nothing():
-    assert a_board_of((with_seeds("filtered", RIGHT),)).repeats() == {}
-
-
 def test_a_frame_that_is_not_evaluated_counts_with_no_seed():
     board = a_board_of((with_seeds("filtered", RIGHT, seed_1=RIGHT),))
     training = (with_seeds("filtered", TWO_WRONG, seed_1=TWO_WRONG),)
     board.add(board.score(a_frame(FRAME_TRUTH, 1), Role.TRAINING, training))
     assert board.repeats()["totals"]["filtered"]["post"]["ERR"] == [0, 0]
-
-
-def test_without_a_filtered_variant_there_is_no_difference():
-    found = a_board_of((with_seeds("unfiltered", RIGHT, seed_1=ONE_WRONG),)).repeats()
-    assert found["difference"] == {}

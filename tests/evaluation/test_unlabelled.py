@@ -5,7 +5,6 @@ import pytest
 from scipy import stats
 
 from roadeval.data import Output, Packed, Role, StageResult, VariantResult
-from roadeval.evaluation import score
 from roadeval.evaluation.score import Scoreboard, sign_of
 from roadeval.evaluation.score.unlabelled import Unlabelled, chosen, doubts_of, entropy
 from roadeval.evaluation.settings import EvaluationSettings
@@ -32,11 +31,6 @@ def test_entropy_is_scipy_s_on_every_fourth_pixel():
     codes = np.random.default_rng(0).integers(0, 65536, (64, 96)).astype(np.uint16)
     p = codes[::4, ::4].ravel() / 65535
     assert entropy(codes) == pytest.approx(stats.entropy([p, 1 - p], base=2).mean(), abs=1e-6)
-
-
-def test_a_sure_mask_has_no_entropy_and_a_coin_toss_a_bit():
-    assert entropy(np.array([[0, 65535]], np.uint16)) == 0
-    assert entropy(np.full((8, 8), 32768, np.uint16)) == pytest.approx(1)
 
 
 def test_disagreement_is_the_mean_share_of_differing_pixels_over_the_others():
@@ -68,17 +62,6 @@ def test_frames_with_truth_and_training_frames_have_no_doubt():
     assert found.doubts == ()
 
 
-def test_rows_are_by_variant_and_pairs_are_counted_once():
-    board = a_board("a", "b")
-    seen(board, 0, variant("a", pixels("##..")), variant("b", pixels("#...")))
-    seen(board, 1, variant("a", pixels("##..")), variant("b", pixels("....")))
-    rows = board.unlabelled.rows()
-    assert rows["variant"].tolist() == ["a", "a", "b", "b"]
-    assert rows["frame"].tolist() == [0, 1, 0, 1]
-    assert rows["disagreement"].tolist() == [0.25, 0.5, 0.25, 0.5]
-    assert board.unlabelled.differing() == {("a", "b"): 0.375}
-
-
 def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
     board = a_board("sure", "plain")
     codes = np.full((1, 4), 20000, np.uint16)
@@ -89,14 +72,6 @@ def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
     rows = board.unlabelled.rows()
     assert (sign_of(rows, "sure"), sign_of(rows, "plain")) == ("entropy", "disagreement")
     assert sign_of(Unlabelled().rows(), "nobody") is None
-
-
-def test_the_rank_is_that_of_the_worst_frames_by_another_column():
-    board = a_board("a")
-    for number, level in enumerate([0, 30000, 10000]):
-        seen(board, number, variant("a", pixels("#..."), np.full((1, 4), level, np.uint16)))
-    rows = board.unlabelled.rows()
-    assert score.worst(rows, "a", 3, 0, by="entropy")["frame"].tolist() == [1, 2, 0]
 
 
 def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():

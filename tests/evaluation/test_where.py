@@ -8,7 +8,6 @@ from roadeval.evaluation.comparison import (
     Side,
     compare,
     disagreements,
-    region_counts,
     variants_as_sides,
 )
 from roadeval.evaluation.settings import EvaluationSettings
@@ -49,18 +48,6 @@ def pairs(rows):
     )
 
 
-def test_errors_are_of_the_frames_asked_for_in_their_order():
-    rows = regions({("a", "lit"): [1, 2, 3], ("a", "shadow"): [4, -1, 6], ("b", "lit"): [7, 8, 9]})
-    found = region_counts(rows, "a", "post", Rows({"frame": np.array([2, 0])}))
-    assert found["lit"].tolist() == [[50, 47, 3, 0], [50, 49, 1, 0]]
-    assert found["shadow"][:, 2].tolist() == [6, 4]
-
-
-def test_a_frame_that_the_table_lacks_has_no_pixels_there():
-    found = region_counts(regions({("a", "lit"): [1]}), "a", "post", Rows({"frame": np.arange(2)}))
-    assert found["lit"].sum(axis=1).tolist() == [100, 0]
-
-
 def a_run(first, second, **more):
     table = a_table({("first", "post"): first, ("second", "post"): second})
     return Side("street", [compared_drive({"frames": rows_of(table), **more})])
@@ -84,17 +71,6 @@ def test_a_mask_may_be_better_in_one_region_and_worse_in_another():
     assert (shadow.base, shadow.new) == (pytest.approx(0.105), pytest.approx(0.025))
     assert shadow.difference.comparisons == 2
     assert (lit.variant, lit.frames) == ("second", count)
-
-
-def test_of_two_results_the_same_variant_is_compared():
-    rows = regions({("first", "lit"): [10] * 20, ("second", "lit"): [20] * 20})
-    base = a_run([10] * 20, [20] * 20, regions=rows)
-    worse = regions({("first", "lit"): [15] * 20, ("second", "lit"): [20] * 20})
-    found = compare([base, a_run([15] * 20, [20] * 20, regions=worse)], SETTINGS)
-    assert [(row.variant, row.difference.mean) for row in found.regions] == [
-        ("first", pytest.approx(0.05)),
-        ("second", 0),
-    ]
 
 
 def test_over_drives_a_region_is_the_mean_of_the_drives_that_have_it():
@@ -122,15 +98,6 @@ def test_a_region_of_other_pixels_is_left_out():
     run = a_run([10] * 20, [20] * 20, regions=base)
     found = compare([run, a_run([10] * 20, [20] * 20, regions=other)], SETTINGS)
     assert [row.region for row in found.regions] == ["lit"]
-
-
-def test_bands_keep_their_place_where_one_is_left_out():
-    rows = {("first", f"band_{n}"): [10 if n != 1 else -1] * 20 for n in range(3)}
-    run = a_run([10] * 20, [20] * 20, regions=regions(rows))
-    found = compare([run, run], SETTINGS)
-    assert [row.title for row in found.regions] == [
-        *("image rows, part 1 of 3, the top", "image rows, part 3 of 3, the bottom")
-    ]
 
 
 def test_frames_of_most_disagreement_tell_who_is_right():

@@ -1,7 +1,5 @@
 """Rows of ten frames, against a plain groupby of pandas."""
 
-import math
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,24 +14,6 @@ def counts_of(*counts: tuple[int, int, int, int]) -> FrameCounts:
     for position, row in enumerate(counts):
         growing.add(position, [Tally("filtered", "post", Counts(*row))])
     return growing.so_far()["filtered", "post"]
-
-
-def test_a_window_averages_rates_and_pools_counts() -> None:
-    (row,) = score.cut(counts_of((0, 1, 1, 0), (0, 6, 2, 0)), [7, 9], size=10)
-    assert (row.number, row.first_frame, row.last_frame, row.frames) == (0, 7, 9, 2)
-    assert row.rates["FPR"] == (1 / 2 + 2 / 8) / 2
-    assert row.pooled["FPR"] == 3 / 10
-
-
-def test_an_undefined_rate_is_left_out_of_the_mean() -> None:
-    (row,) = score.cut(counts_of((3, 1, 0, 1), (0, 4, 0, 0)), [0, 1], size=10)
-    assert row.rates["TPR"] == row.pooled["TPR"] == 0.75
-
-
-def test_a_rate_undefined_in_the_whole_window_stays_undefined() -> None:
-    (row,) = score.cut(counts_of((0, 1, 1, 0)), [0], size=10)
-    assert math.isnan(row.rates["TPR"])
-    assert math.isnan(row.pooled["TPR"])
 
 
 def test_the_last_window_may_be_short() -> None:

@@ -118,12 +118,6 @@ def test_a_folder_without_drives_is_an_error(filled, word, message):
     assert "\n" not in str(error.value)
 
 
-def test_an_object_that_is_not_there_is_an_error(filled):
-    url = "s3://bucket/gone.mcap"
-    with pytest.raises(RoadevalError, match=f"{url}: there is no such"):
-        readable(url)
-
-
 def test_a_bucket_that_denies_access_is_an_error(filled, monkeypatch):
     monkeypatch.setenv("AWS_SKIP_SIGNATURE", "true")
     url = "s3://bucket/top.mcap"

@@ -88,11 +88,6 @@ def test_whole_numbers_of_thirty_two_bits_are_refused() -> None:
         images.to_rgb(file("TIFF", np.array([[70_000]], np.int32)), LIMITS)
 
 
-def test_what_is_decoded_may_be_written_to() -> None:
-    for data in (JPEG, PNG, file("PNG", scene()[..., 0])):
-        assert images.to_rgb(data, LIMITS).flags.writeable
-
-
 def test_a_mask_of_one_bit_is_black_and_white() -> None:
     mask = np.array([[True, False]])
     assert images.to_labels(file("PNG", mask), LIMITS).tolist() == [[255, 0]]

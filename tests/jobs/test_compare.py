@@ -10,13 +10,12 @@ import pytest
 
 from roadeval import compare, replay, replay_fleet
 from roadeval.errors import RoadevalError
-from roadeval.jobs.results.compare import as_json
 from roadeval.jobs.results.result import asked, contents
 from roadeval.pipeline import stages
 from roadeval.results.fleet import FleetFolder, frames_path
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import settings, write_log
-from tests.results.fleet.making import RUN, fleet_of
+from tests.results.fleet.making import fleet_of
 from tests.results.making import facts_of
 
 
@@ -41,13 +40,6 @@ def test_the_drives_that_are_worse_are_found_and_no_others(compared):
         "2 drives are left out of base (not scored in both): drive_0007, drive_0009",
     )
     assert compared.sides == ()
-
-
-def test_any_number_of_fleets_is_compared_with_the_first(fleets):
-    found = compare([*fleets, fleets[0]]).comparison
-    assert [result.label for result in found.results] == [str(fleets[0]), "new", f"{fleets[0]} (2)"]
-    finals = [change for change in found.changes if change.final and change.variant == "filtered"]
-    assert [change.difference["ERR"].mean == 0 for change in finals] == [False, True]
 
 
 def test_the_variants_of_one_fleet_are_compared_over_its_drives(fleets):
@@ -86,24 +78,6 @@ def _rename_drives(path):
     names = [name.replace("-0", "-f") for name in table["drive"].to_pylist()]
     place = table.column_names.index("drive")
     parquet.write_table(table.set_column(place, "drive", pa.array(names)), path)
-
-
-def test_conditions_are_judged_over_drives(fleets):
-    (why,) = compare(fleets, fail_if=["post.filtered.ERR > +0.5pp"]).held
-    assert "over 8 drives" in why
-    assert compare(fleets, fail_if=["post.filtered.ERR > 20%"]).held == []
-
-
-def test_settings_that_differ_are_told(fleets, tmp_path):
-    run = RUN | {"frames": {"scale": 1.0, "every": 2}, "preset": "gated"}
-    other = fleet_of(tmp_path / "other", 3, run=run)
-    found = compare([fleets[0], other])
-    assert found.content["changed"] == [
-        "Changed settings: preset paper to gated; frames.every 1 to 2."
-    ]
-    (warning,) = (each for each in found.comparison.warnings if "every" in each)
-    assert "`frames.every` 1 and 2" in warning
-    assert "preset" not in warning
 
 
 def test_code_networks_masks_and_truth_that_are_others_are_named():
@@ -147,28 +121,6 @@ def test_settings_that_change_no_number_are_left_aside():
     run = {"preset": "paper", "svm": {"c": 1}, "output": {"save": "a"}, "fleet": {"folds": 2}}
     assert asked(run) == {"preset": "paper", "svm.c": 1}
     assert asked({}) == {}
-
-
-def test_only_chosen_variants_are_compared(fleets):
-    found = compare(fleets, variants=["unfiltered"]).comparison
-    assert {change.variant for change in found.changes} == {"unfiltered"}
-    with pytest.raises(RoadevalError, match=r"base: no variant net; there are filtered"):
-        compare(fleets, variants=["net"])
-
-
-def test_a_variant_of_one_fleet_is_held_against_another_of_the_other(fleets):
-    found = compare([fleets[0], fleets[0]], variants=["unfiltered=filtered"]).comparison
-    alone = compare(fleets[0], variants=["unfiltered", "filtered"]).comparison
-    told, same = ([c.difference["ERR"].mean for c in each.changes] for each in (found, alone))
-    assert told == same
-
-
-def test_equal_fleets_give_equal_json_without_nan(fleets):
-    first, second = (as_json(compare([fleets[0], fleets[0]])) for _ in range(2))
-    assert first == second
-    content = json.loads(first, parse_constant=pytest.fail)
-    assert content["format"] == {"name": "roadeval-comparison", "version": 2}
-    assert {row["difference"]["mean"] for row in content["drives"]} == {0}
 
 
 def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):

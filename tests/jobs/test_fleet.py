@@ -1,20 +1,16 @@
 """A fleet that goes on in its folder: the result is that of one go, whatever has changed."""
 
 import errno
-import importlib
 import os
 import shutil
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.run import prepared
-from roadeval.pipeline import stages
 from tests.e2e.test_fleet import Here, ThreadTasks, run, tables, write
 
 
@@ -85,26 +81,6 @@ def test_of_a_log_that_is_none_any_more_no_results_are_left(logs, tmp_path):
     assert [name for name in files(tmp_path / "f") if own in name] == [f"records/{own}.json"]
 
 
-def test_masks_that_have_changed_and_kept_size_and_time_are_another_input(logs, tmp_path):
-    masks = tmp_path / "masks"
-    masks.mkdir()
-    with roadeval.logs.open_log(logs / "a.mcap") as log:
-        width, height = log.select().size
-    for number in range(14):
-        np.save(masks / f"{number}.npy", np.zeros((height, width), bool))
-    tables = {"training": {"frames": 4}, "masks": {"net": {"path": str(masks)}}}
-    config = roadeval.configure(tables)
-
-    def replayed():
-        return roadeval.replay_fleet(
-            logs / "a.mcap", tmp_path / "f", config, executor=Here()
-        ).replayed
-
-    assert (replayed(), replayed()) == (1, 0)
-    rewritten(masks / "13.npy", lambda content: content[:-1] + b"\1")
-    assert (replayed(), replayed()) == (1, 0)
-
-
 def test_other_versions_of_what_computes_replay_every_drive(logs, folder, monkeypatch):
     monkeypatch.setattr(prepared, "computing", lambda: {"opencv-python-headless": "4.14"})
     assert run(logs, folder, keep="worst:1")[0].replayed == 2
@@ -121,23 +97,6 @@ def test_a_worker_with_another_version_is_refused(logs, tmp_path, monkeypatch):
 
     with pytest.raises(RoadevalError, match=r"a worker has numpy 1\.0, and the command \d"):
         run(logs, tmp_path / "f", executor=Elsewhere())
-
-
-def test_the_file_of_a_method_is_part_of_what_is_asked(logs, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(tmp_path)
-
-    def replayed(bound):
-        (tmp_path / "fleetmine.py").write_text(f"def road(image): return image[..., 0] > {bound}\n")
-        importlib.invalidate_caches()
-        stages._somebodys.cache_clear()
-        sys.modules.pop("fleetmine", None)
-        tables = {"chain": ["fleetmine:road", "post"], "training": {"frames": 4}}
-        config = roadeval.configure(tables)
-        return roadeval.replay_fleet(
-            logs / "a.mcap", tmp_path / "f", config, executor=Here()
-        ).replayed
-
-    assert (replayed(20), replayed(20), replayed(200)) == (1, 0, 1)
 
 
 def test_a_model_that_changes_while_the_fleet_runs_ends_it(logs, tmp_path):

@@ -96,14 +96,6 @@ def test_of_twenty_one_labels_ten_train_what_must_learn(places, tmp_path):
     assert alone.summary["frames"]["evaluated"] == 21
 
 
-@pytest.mark.parametrize("only", [(), ("net",)])
-def test_no_truth_is_said(places, tmp_path, only):
-    done = replay(places, tmp_path, "", only)
-    assert done.summary["frames"]["evaluated"] == 0
-    assert any("there is no road truth to score against" in each for each in done.warnings)
-    assert done.summary["totals"] == {}
-
-
 def test_no_frames_for_training_are_enough_for_what_learns_nothing(places, tmp_path):
     done = replay(places, tmp_path, "6", ("net",), training={"frames": 0})
     assert done.summary["frames"]["evaluated"] == 6
@@ -213,27 +205,6 @@ def test_a_manifest_says_where_the_truth_of_a_drive_lies(fleet, tmp_path, monkey
     ]
     manifest.write_text("\n".join(entries))
     assert fleet(drives=[manifest])[0].counts == {"scored": 2}
-
-
-def test_a_manifest_names_the_classes_of_a_drive(fleet, tmp_path):
-    shutil.rmtree(tmp_path / "labels" / "two")
-    (tmp_path / "labels" / "two").mkdir()
-    ring = [[4, 12], [28, 12], [28, 24], [4, 24]]
-    for number, label in enumerate(("lane marking", "kerb", "road")):
-        shape = {"label": label, "points": ring, "shape_type": "polygon"}
-        text = json.dumps({"shapes": [shape], "imageWidth": 32, "imageHeight": 24})
-        (tmp_path / "labels" / "two" / f"{number}.json").write_text(text)
-    manifest = tmp_path / "fleet.toml"
-    labels = {"one": "road = [255]", "two": 'road = ["road", "lane marking"], ignore = ["kerb"]'}
-    manifest.write_text(
-        "".join(
-            f'[[drives]]\npath = "{name}.mcap"\ntruth.path = "{tmp_path}/labels/{name}"\n'
-            f"labels = {{ {own} }}\n"
-            for name, own in labels.items()
-        )
-    )
-    done, _ = fleet(drives=[manifest])
-    assert done.counts == {"scored": 2}, done.problems
 
 
 def test_train_and_info_take_truth_beside_the_log(places, tmp_path):

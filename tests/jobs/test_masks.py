@@ -102,14 +102,6 @@ def test_the_numbers_are_those_of_the_same_masks_in_the_log(outcome, name):
     assert outcome.summary["totals"]["inside"]["post"]["FP"] > 0
 
 
-def test_the_recording_holds_the_masks(outcome):
-    recording = roadeval.Recording(outcome.recording)
-    inside = recording.layer("inside", "post", 15)
-    np.testing.assert_array_equal(recording.layer("confidence", "post", 15), inside)
-    probability = recording.layer("confidence", "probability", 15)
-    assert np.abs(probability - (100 + 55 * inside) / 255).mean() < 0.05
-
-
 def test_a_frame_without_a_mask_is_left_out_of_its_variant_and_told(outcome):
     assert outcome.summary["totals"]["half"]["post"]["frames"] == 8
     assert outcome.summary["totals"]["number"]["post"]["frames"] == 15
@@ -133,14 +125,6 @@ def test_a_report_shows_frames_without_a_mask(outcome, tmp_path):
     assert roadeval.write_report(outcome.recording, tmp_path / "out.pdf").stat().st_size
 
 
-def test_the_summary_says_where_masks_lie_and_how_they_are_read(outcome, places):
-    stated = outcome.summary["masks"]
-    assert stated["confidence"]["meaning"] == "a confidence map: road is 0.5 or more"
-    assert stated["other"]["pairing"] == "26 messages, paired by header stamps"
-    assert stated["named"]["pairing"] == "26 labels, paired by name"
-    assert stated["number"]["path"] == str(places / "number")
-
-
 def test_curves_are_counted_on_the_evaluated_frames(outcome, places):
     recording = roadeval.Recording(outcome.recording)
     truths, levels = [], []
@@ -154,46 +138,6 @@ def test_curves_are_counted_on_the_evaluated_frames(outcome, places):
     assert own["post"]["AP"] == pytest.approx(average_precision_score(y, p), abs=1e-12)
     assert own["post"]["frames"] == 15
     assert own["post"]["threshold"] == pytest.approx(155 / 255)
-
-
-def test_curves_are_in_the_tables_and_the_recording(outcome):
-    table = roadeval.Recording(outcome.recording).table("probabilities")
-    assert set(table["variant"]) == {"confidence"}
-    assert table["level"].tolist() == [100, 155]
-    recorded = roadeval.Recording(outcome.recording)
-    assert recorded.summary["curves"] == outcome.summary["curves"]
-
-
-def test_workers_make_no_difference_to_curves(places, tmp_path):
-    table = masks(places, net={"path": "confidence", "threshold": 0.5})
-    found = [
-        roadeval.replay(
-            places / "drive.mcap",
-            settings(record="none", jobs=jobs).override({"masks": table}),
-            reports=tmp_path / str(jobs),
-        ).summary["curves"]
-        for jobs in (1, 3)
-    ]
-    assert found[0] == found[1]
-
-
-def test_variants_are_compared_where_they_differ(outcome):
-    found = roadeval.compare([outcome.reports], variants=["inside", "unfiltered"])
-    regions = {row.region for row in found.comparison.regions}
-    assert {"shadow", "lit", "boundary", "band_0"} <= regions
-    (first, *_) = found.comparison.disagreements
-    recording = roadeval.Recording(outcome.recording)
-    truth = recording.truth(first.frame)
-    inside, unfiltered = (
-        recording.layer(name, "post", first.frame) == truth for name in ("inside", "unfiltered")
-    )
-    known = truth != 255
-    assert first.base_right == pytest.approx((inside & ~unfiltered & known).sum() / known.sum())
-    assert first.new_right == pytest.approx((unfiltered & ~inside & known).sum() / known.sum())
-    table = roadeval.Recording(outcome.recording).table("disagreements")
-    pairs = set(zip(table["from_variant"], table["to_variant"], strict=True))
-    assert len(pairs) == 13 * 12 // 2
-    assert not {(one, other) for other, one in pairs} & pairs
 
 
 def test_a_variant_of_one_result_is_held_against_another_of_another(outcome, places, tmp_path):

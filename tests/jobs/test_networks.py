@@ -73,15 +73,6 @@ def test_the_report_tells_the_same(once, tmp_path):
         assert fact in text
 
 
-def test_it_is_called_a_network_where_others_are_with_and_without_the_filter():
-    titles = {each.name: each.layout().title for each in with_network("n.onnx").variants()}
-    assert titles == {
-        "filtered": "with Phase 2: shadow filter",
-        "unfiltered": "without the filter",
-        "mine": "Network",
-    }
-
-
 def test_mask_and_probability_are_layers_of_the_recording(once):
     to, _ = once
     recording = roadeval.Recording(to / "out.rrd")
@@ -91,22 +82,6 @@ def test_mask_and_probability_are_layers_of_the_recording(once):
     assert mask[20, 10] == 1
     assert mask[2, 10] == 0
     assert share.max() > share.min()
-
-
-def test_the_run_is_repeated_by_its_run_toml(once, folder, tmp_path):
-    to, _ = once
-    again = roadeval.load_config(to / "reports" / "run.toml")
-    run(folder / "drive.mcap", tmp_path, again)
-    for name in ("frames.csv", "windows.csv", "regions.csv"):
-        assert (tmp_path / "reports" / name).read_text() == (to / "reports" / name).read_text()
-
-
-def test_a_network_may_be_gone_once_it_runs(folder, tmp_path):
-    path = red_network(tmp_path / "n.onnx")
-    config = with_network(path)
-    gone = lambda _result: path.unlink(missing_ok=True)  # noqa: E731
-    outcome = roadeval.replay(folder / "drive.mcap", config, reports=tmp_path / "r", on_frame=gone)
-    assert outcome.summary["methods"]["mine"]["net"]["file"] == "n.onnx"
 
 
 def test_a_network_that_has_changed_since_is_refused(once, folder, tmp_path):
@@ -131,20 +106,6 @@ def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder
     assert known_by(folder / "red.onnx") == known_by(moved) != known_by(other)
 
 
-def test_post_processing_is_done_where_it_is_asked_for(folder, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(f"file = '{folder / 'red.onnx'}'\n[post]\noperations = ['open']\n")
-    variant = network_variant("mine", str(path))
-    assert variant.pipeline.settings["post"].operations == ("open",)
-    assert variant.pipeline.settings["post"].region == "all"
-
-
-def test_a_networks_file_is_found_from_the_folder_of_its_settings(folder, tmp_path):
-    (folder / "near.toml").write_text("file = 'red.onnx'\n")
-    found = network_variant("mine", str(folder / "near.toml")).pipeline.settings["net"]
-    assert found.file == str(folder / "red.onnx")
-
-
 # --- Nothing to learn -----------------------------------------------------------------------------
 
 
@@ -161,20 +122,6 @@ def test_a_network_alone_runs_on_a_drive_without_truth(folder, tmp_path):
     assert outcome.summary["training"]["source"] == "none"
     recording = roadeval.Recording(outcome.recording)
     assert recording.layer("unfiltered", "net", 0)[20, 10] == 1
-
-
-def test_a_model_that_knows_nothing_of_the_network_serves_the_rest(folder, tmp_path):
-    roadeval.train([folder / "drive.mcap"], tmp_path / "m.model", settings(train_frames=4))
-    config = with_network(folder / "red.onnx", model=tmp_path / "m.model")
-    assert "mine" in run(folder / "drive.mcap", tmp_path, config).summary["totals"]
-
-
-def test_a_model_can_be_trained_beside_a_network(folder, tmp_path):
-    config = with_network(folder / "red.onnx", train_frames=4)
-    model = roadeval.train([folder / "drive.mcap"], tmp_path / "m.model", config)
-    assert model.parameters["mine"] == {}
-    again = with_network(folder / "red.onnx", model=tmp_path / "m.model")
-    assert "mine" in run(folder / "drive.mcap", tmp_path, again).summary["totals"]
 
 
 def test_a_notebook_runs_a_network_on_an_image(folder):

@@ -1,24 +1,17 @@
 """The main job, on a small log of our own."""
 
-import json
-import re
 import shutil
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from rerun.chunk import RrdReader
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.jobs.progress import ignore
-from roadeval.jobs.run.prepared import prepare, process
 from roadeval.logs import LogConfig, TopicSettings, open_log
-from roadeval.pipeline.paper import svm
 from roadeval.report import figures as drawn
 from roadeval.results import schema
 from roadeval.results.folder import ResultsFolder
-from roadeval.training import learning
 from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
@@ -37,12 +30,6 @@ def run(drive: Path, folder: Path, **options):
     return roadeval.replay(drive, config, save=save, reports=folder / "reports")
 
 
-def identity_of(recording: Path) -> str:
-    """By which Rerun's viewer and catalogue tell recordings apart."""
-    (entry,) = RrdReader(recording).recordings()
-    return entry.recording_id
-
-
 def frames_of(folder: Path) -> pd.DataFrame:
     return pd.read_csv(folder / "reports" / "frames.csv")
 
@@ -53,46 +40,11 @@ def once(drive, tmp_path_factory):
     return folder, run(drive, folder, jobs=2)
 
 
-def test_every_frame_is_accounted_for(once):
-    _, outcome = once
-    assert outcome.summary["frames"] == {
-        "in_log": 26,
-        "read": 26,
-        "decoded": 26,
-        "labelled": 25,
-        "trained_on": 10,
-        "evaluated": 15,
-        "skipped": {"trained on": 10, "unlabelled": 1},
-    }
-    assert outcome.summary["windows"] == 2
-
-
 def test_training_and_unlabelled_frames_are_in_no_table(once):
     folder, _ = once
     assert sorted(set(frames_of(folder).frame)) == [*range(10, 20), *range(21, 26)]
     regions = pd.read_csv(folder / "reports" / "regions.csv")
     assert set(regions.frame) == set(frames_of(folder).frame)
-
-
-def test_the_summary_file_is_the_outcome_s_summary(once):
-    folder, outcome = once
-    written = json.loads((folder / "reports" / "summary.json").read_text())
-    assert written["format"] == {"name": "roadeval-summary", "version": 4}
-    assert written == json.loads(outcome.facts.text())
-
-
-def test_the_number_of_workers_changes_no_number_and_no_identity(drive, once, tmp_path):
-    outcome = run(drive, tmp_path, jobs=1)
-    for table in TABLES:
-        other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
-        assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
-    assert identity_of(outcome.recording) == identity_of(once[1].recording)
-
-
-def test_frames_after_training_can_be_left_out(drive, tmp_path):
-    outcome = run(drive, tmp_path, train_frames=4, gap=5)
-    assert outcome.summary["frames"]["skipped"]["gap after training"] == 5
-    assert frames_of(tmp_path).frame.min() == 9
 
 
 def test_training_frames_of_the_drive_itself_are_left_out_and_warned_of(drive, tmp_path):
@@ -104,88 +56,11 @@ def test_training_frames_of_the_drive_itself_are_left_out_and_warned_of(drive, t
     assert any(warned in text for text in outcome.summary["warnings"])
 
 
-@pytest.fixture(scope="module")
-def of_five(tmp_path_factory):
-    """A model of five frames of the drive."""
-    folder = tmp_path_factory.mktemp("five")
-    log = write_log(folder / "five.mcap", numbers=[0, 5, 10, 15, 21])
-    roadeval.train([log], folder / "m.model", settings(train_frames=5))
-    return folder / "m.model"
-
-
-def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatch):
-    roadeval.train([drive], tmp_path / "m.model")
-    bound = []
-
-    def table(machine, settings):
-        bound.append(machine)
-        return made(machine, settings)
-
-    made = svm.colour_table
-    monkeypatch.setattr(svm, "colour_table", table)
-    run(drive, tmp_path, model=tmp_path / "m.model", max_frames=3)
-    assert len(bound) == len({id(machine) for machine in bound}) == 2
-
-
-def test_a_model_of_another_drive_is_not_warned_of(drive, tmp_path):
-    half = settings(train_frames=5, end="1.25")
-    roadeval.train([drive], tmp_path / "m.model", half)
-    outcome = run(drive, tmp_path, model=tmp_path / "m.model", start="1.25")
-    assert outcome.summary["frames"]["evaluated"] > 0
-    assert not [text for text in outcome.warnings if "training frames lie" in text]
-
-
-def test_a_range_without_truth_is_replayed_by_the_patch(drive, tmp_path):
-    # Frame 20 alone has no truth.
-    outcome = run(drive, tmp_path, start="2.0", end="2.1")
-    assert outcome.summary["training"]["source"] == "patch"
-    assert outcome.summary["frames"]["evaluated"] == 0
-    assert any("no frame that is read has road truth" in text for text in outcome.warnings)
-
-
-def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
-    bare = write_log(tmp_path / "bare.mcap", truth=False)
-    patch = settings(source="patch")
-    assert roadeval.train([bare], tmp_path / "m.model", patch).source == "patch"
-    assert roadeval.train([bare, drive], tmp_path / "m.model", patch).source == "patch"
-    assert run(bare, tmp_path, model=tmp_path / "m.model").summary["training"]["frames"] == 10
-
-
 def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
     other = write_log(tmp_path / "other.mcap")
     monkeypatch.setattr("roadeval.training.learning.GREATEST_MEMORY", 15 * 10_000)
     with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
         roadeval.train([drive, other], tmp_path / "m.model")
-
-
-def test_a_drive_without_truth_is_no_help_to_others(drive, tmp_path):
-    bare = write_log(tmp_path / "bare.mcap", truth=False)
-    with pytest.raises(RoadevalError, match=r"bare\.mcap: no road truth to train on"):
-        roadeval.train([drive, bare], tmp_path / "m.model")
-    assert not (tmp_path / "m.model").exists()
-
-
-def test_a_model_made_for_other_settings_is_refused(drive, tmp_path):
-    roadeval.train([drive], tmp_path / "m.model")
-    with pytest.raises(RoadevalError, match=r"gamma 0.5 there, 3.0 here"):
-        run(drive, tmp_path, model=tmp_path / "m.model", svm={"gamma": 3.0})
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.model"]
-
-
-def test_a_further_variant_is_run_like_the_two(drive, tmp_path):
-    wide = {"shadow": {"ring_width": 3}}
-    outcome = run(drive, tmp_path, variants={"wide": wide}, max_frames=16)
-    assert set(outcome.summary["totals"]["wide"]) == {"similarity", "svm", "post"}
-    assert roadeval.Recording(outcome.recording).layer("wide", "rings", 12).max() == 2
-
-
-def test_a_mask_in_the_log_is_scored_as_a_variant_without_oracles(drive, tmp_path):
-    outcome = run(drive, tmp_path, masks={"net": "/net/road_mask_prediction"})
-    total = outcome.summary["totals"]["net"]["post"]
-    assert (total["ERR"], total["frames"]) == (0, 15)
-    assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
-    assert set(outcome.summary["oracles"]) == {"filtered", "unfiltered"}
-    assert outcome.summary["beyond"]["net"]["boundary_F"] == 1
 
 
 def test_folders_are_made_and_a_run_that_is_refused_leaves_nothing(drive, tmp_path):
@@ -265,28 +140,6 @@ def test_the_worst_frames_pictures_are_those_of_the_highest_err(drive, tmp_path,
     assert list(recording.frame_numbers) == sorted(worst.index[:4])
 
 
-def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
-    drive, tmp_path, monkeypatch
-):
-    from roadeval.evaluation.score import Scoreboard
-
-    add = Scoreboard.add
-
-    def fail(self, result):
-        if result.frame.number == 12:
-            raise KeyboardInterrupt
-        return add(self, result)
-
-    monkeypatch.setattr(Scoreboard, "add", fail)
-    with pytest.raises(KeyboardInterrupt):
-        run(drive, tmp_path)
-    (left,) = tmp_path.iterdir()
-    assert re.fullmatch(r"out\.[0-9a-f]{8}\.partial\.rrd", left.name)
-    partial = roadeval.Recording(left)
-    assert not partial.complete
-    assert partial.layer("unfiltered", "svm", 5).shape == (24, 32)
-
-
 @pytest.fixture
 def earlier(once, tmp_path):
     """A folder with the outputs of an earlier run, and what it holds."""
@@ -359,28 +212,6 @@ def test_a_run_that_fails_leaves_an_earlier_one_s_partial_recording(drive, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == [left.name]
 
 
-def test_a_name_for_a_recording_that_is_not_made_is_warned_of(drive, tmp_path):
-    config = settings(record="none", max_frames=12)
-    outcome = roadeval.replay(drive, config, save=tmp_path / "o.rrd", reports=tmp_path / "r")
-    said = f"`output.save` {tmp_path / 'o.rrd'} is not written: `output.record` is none"
-    assert said in outcome.warnings
-    assert [path.name for path in tmp_path.iterdir()] == ["r"]
-    unnamed = roadeval.replay(drive, config, reports=tmp_path / "r")
-    assert not [each for each in unnamed.warnings if "output.save" in each]
-
-
-def test_an_output_never_replaces_the_drive(tmp_path):
-    log = write_log(tmp_path / "small.mcap")
-    before = log.read_bytes()
-    with pytest.raises(RoadevalError, match="is an input or another output"):
-        roadeval.replay(log, save=tmp_path / "o.rrd", reports=tmp_path, mcap=log)
-    with pytest.raises(RoadevalError, match=r"name a file that ends in \.rrd"):
-        roadeval.replay(log, save=log, reports=tmp_path)
-    with pytest.raises(RoadevalError, match="is an input or another output"):
-        roadeval.train([log], log)
-    assert log.read_bytes() == before
-
-
 def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_warned_of():
     robust = {"variants": {"v": {"preset": "robust"}}}
     (pixels, most) = roadeval.configure(robust).ignored()
@@ -406,56 +237,6 @@ def test_a_recording_s_own_configuration_makes_the_run_again(once, drive, tmp_pa
     for table in TABLES:
         theirs = (folder / "reports" / f"{table}.csv").read_bytes()
         assert (tmp_path / f"{table}.csv").read_bytes() == theirs
-
-
-def test_the_summary_holds_the_run_s_configuration(drive, tmp_path):
-    config = settings(
-        truth="/truth/road",
-        road=[255],
-        start="0.2",
-        every=2,
-        max_frames=12,
-        record="none",
-        resize_truth=True,
-        train_frames=4,
-        variants={"wide": {"shadow": {"ring_width": 3}}},
-    )
-    roadeval.replay(drive, config, save=tmp_path / "o.rrd", reports=tmp_path)
-    written = json.loads((tmp_path / "summary.json").read_text())
-    outputs = {"save": str(tmp_path / "o.rrd"), "reports": str(tmp_path)}
-    whole = config.override({"output": outputs})
-    assert written["run"] == json.loads(json.dumps(whole.as_dict()))
-    assert written["settings"]["unfiltered"]["chain"] == ["similarity", "svm", "post"]
-    assert written["settings"]["wide"]["shadow"]["ring_width"] == 3
-
-
-def test_changes_are_what_the_recorded_masks_show(once):
-    folder, outcome = once
-    recording = roadeval.Recording(outcome.recording)
-    changes = ResultsFolder(folder / "reports").table("changes")
-    step = changes.query("from_stage == 'similarity' and to_variant == 'unfiltered'").iloc[0]
-    repaired = spoiled = 0
-    for number in frames_of(folder).frame.unique():
-        truth = recording.truth(number)
-        before, after = (
-            recording.layer("unfiltered", stage, number) for stage in ("similarity", "svm")
-        )
-        repaired += ((before != truth) & (after == truth)).sum()
-        spoiled += ((before == truth) & (after != truth)).sum()
-    assert repaired + spoiled > 0
-    assert (step.repaired, step.spoiled, step.N) == (repaired, spoiled, 15 * 24 * 32)
-
-
-def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_table(once):
-    folder, outcome = once
-    oracles = ResultsFolder(folder / "reports").table("oracles")
-    assert set(zip(oracles.variant, oracles.oracle, oracles.stage, strict=True)) == {
-        (variant, "svm", "post") for variant in ("filtered", "unfiltered")
-    }
-    assert set(oracles.frame) == set(frames_of(folder).frame)
-    total = outcome.summary["oracles"]["filtered"]["svm"]["post"]
-    assert total["frames"] == 15
-    assert total["FP"] == oracles[oracles.variant == "filtered"].FP.sum()
 
 
 def test_flicker_is_counted_from_each_evaluated_frame_to_the_next_one_read(once, drive, tmp_path):
@@ -492,27 +273,6 @@ def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
     assert "the model learnt from frames of" not in warnings
 
 
-def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
-    with pytest.raises(RoadevalError, match=r"`output\.mcap` and `frames\.scale` do not go"):
-        roadeval.replay(drive, settings(scale=0.5), mcap=tmp_path / "o.mcap")
-
-
-def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
-    class Seen:
-        def encode(self, result, position):
-            return result
-
-    options = settings(max_frames=14)
-    with open_log(drive) as log:
-        *_, (_, done) = process([prepare(log, options, ignore)], Seen(), ignore)
-    lean, whole = done.result, done.encoded
-    assert any(list(variant.layers()) for variant in whole.variants)
-    assert not any(list(variant.layers()) for variant in lean.variants)
-    assert lean.tallies == whole.tallies
-    for mine, its in zip(lean.variants, whole.variants, strict=True):
-        assert [name for name, _ in mine.masks()] == [name for name, _ in its.masks()]
-
-
 def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
     common = {"record": "none", "train_frames": 3, "max_frames": 12, "seed": 4}
     alone, other, both = (
@@ -535,17 +295,3 @@ def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
         for rate, values in rates.items():
             each = [run.summary["difference"][stage][rate]["mean"] for run in (alone, other)]
             assert values == each
-
-
-def test_without_truth_there_is_no_rate_for_seeds_to_spread(tmp_path, monkeypatch):
-    def counted(*given, **named):
-        fits.append(given)
-        return fit(*given, **named)
-
-    fits, fit = [], learning.fit
-    monkeypatch.setattr(learning, "fit", counted)
-    bare = write_log(tmp_path / "bare.mcap", truth=False, numbers=range(4))
-    outcome = run(bare, tmp_path, seeds=3, train_frames=2, record="none")
-    assert len(fits) == 1
-    assert "seeds" not in outcome.summary
-    assert outcome.warnings[0].startswith("there is no road truth to score against")

@@ -55,12 +55,6 @@ def test_several_results_are_one_table_with_their_drives(made):
     assert one == other
 
 
-def test_a_fleet_s_drive_has_the_rows_of_its_frames(made):
-    (mine,), (fleets,) = (roadeval.Result(path).parts for path in (made.alone, made.many))
-    assert mine.digest == fleets.digest
-    np.testing.assert_array_equal(mine.rows("frames")["TP"], fleets.rows("frames")["TP"])
-
-
 def test_what_is_no_result_is_refused_in_one_line(tmp_path):
     with pytest.raises(roadeval.RoadevalError, match="no results here"):
         roadeval.Result(tmp_path)

@@ -36,11 +36,6 @@ def test_a_drive_may_have_labels_of_its_own(drives, tmp_path):
     assert (model.prior == train(drives[:1], tmp_path).prior).all()
 
 
-def test_labels_for_one_drive_alone_are_not_guessed_at(drives, tmp_path):
-    with pytest.raises(RoadevalError, match=r"mask.mcap: `labels.road` 3 does not occur .*0 255$"):
-        train(drives[:1], tmp_path, road=[3])
-
-
 def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
     wrong = described(drives[0], "labels = { road = [4] }")
     with pytest.raises(RoadevalError, match=r"mask.mcap: `labels.road` 4 does not occur .*0 255$"):
@@ -88,7 +83,3 @@ def test_a_drive_of_which_no_training_frame_can_be_decoded_is_refused(tmp_path):
     broken = write_log(tmp_path / "broken.mcap", broken=0)
     with pytest.raises(RoadevalError, match=r"broken.mcap: no training frame .*: frame 0: 8 bytes"):
         train([broken], tmp_path, max_frames=1)
-
-
-def test_one_drive_needs_no_list(drives, tmp_path):
-    assert train(str(drives[0]), tmp_path).digests == train(drives[:1], tmp_path).digests

@@ -9,7 +9,6 @@ import pytest
 
 import roadeval
 from roadeval.config import ConfigError, configure, network_variant
-from roadeval.jobs.run import prepared
 from roadeval.jobs.run.prepared import prepare
 from roadeval.logs import LogWriter, open_log
 from roadeval.networks import network as networks
@@ -102,15 +101,6 @@ def test_a_network_that_is_blind_to_shade_is_mended(once):
     assert err(rows, "mine") > 0.2
     assert err(rows, "mine_tuned") < err(rows, "mine") / 5
     assert err(rows, "mine_tuned", "net") == err(rows, "mine")
-
-
-def test_it_says_where_it_has_learnt(once):
-    outcome, _ = once
-    (told,) = [each for each in outcome.warnings if each.startswith("mine_tuned")]
-    assert told == (
-        "mine_tuned: learnt on this drive's first 10 labelled frames, on top of what mine says: "
-        "its rates are not those of mine on other drives"
-    )
 
 
 def test_the_verdict_says_what_tuning_brings_to_its_method(once):
@@ -250,13 +240,6 @@ def test_a_training_frame_without_a_mask_ends_the_run(folder, tmp_path):
         replay(drive, config.with_tuned(["mine"]), tmp_path / "r")
 
 
-def test_confidences_beside_the_log(folder, tmp_path):
-    masks = {"mine": confidences(tmp_path / "shares")}
-    config = small(configure({**SMALL, "masks": masks}).with_tuned(["mine"]))
-    _, rows = replay(folder / "drive.mcap", config, tmp_path / "r")
-    assert err(rows, "mine_tuned") < err(rows, "mine") / 5
-
-
 def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
     config = with_network(folder)
     roadeval.train(folder / "drive.mcap", tmp_path / "mine.model", config)
@@ -289,18 +272,6 @@ def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path,
     assert (errs.mine_tuned < errs.mine / 3).all()
 
 
-def test_a_function_of_ones_own_is_tuned(folder, tmp_path, monkeypatch):
-    (tmp_path / "redness.py").write_text(
-        "def road(image):\n    return image[..., 0].astype(float) / 255 > 0.41\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    chain = {"chain": ["redness:road", "post"], "post": {"operations": [], "region": "all"}}
-    config = small(configure({**SMALL, "variants": {"mine": chain}}).with_tuned(["mine"]))
-    _, rows = replay(folder / "drive.mcap", config, tmp_path / "r")
-    assert err(rows, "mine_tuned") < err(rows, "mine") / 5
-    assert err(rows, "mine_tuned", "road") > 0.2
-
-
 def test_a_model_is_refused_with_another_network(folder, tmp_path):
     config = with_network(folder)
     roadeval.train(folder / "drive.mcap", tmp_path / "mine.model", config)
@@ -308,15 +279,6 @@ def test_a_model_is_refused_with_another_network(folder, tmp_path):
     other = with_network(tmp_path, training={"model": str(tmp_path / "mine.model")})
     with pytest.raises(roadeval.RoadevalError, match="other settings of net"):
         replay(folder / "drive.mcap", other, tmp_path / "r")
-
-
-def test_one_frame_in_a_notebook(folder):
-    config = with_network(folder).resolved()
-    with open_log(folder / "drive.mcap", config) as log:
-        run = prepared.prepare(log, config, lambda _: None)
-    image, road = picture(FRAMES)
-    found = roadeval.run_frame(image, run.model, config, variant="mine_tuned").final()
-    assert (found != road).mean() < 0.1
 
 
 @pytest.mark.parametrize(

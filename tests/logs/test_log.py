@@ -1,7 +1,5 @@
 """Frames and truth out of a log."""
 
-import json
-import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +16,6 @@ from roadeval.logs import (
     LogError,
     LogWriter,
     TopicSettings,
-    describe,
     open_log,
 )
 from roadeval.logs.container import records
@@ -47,13 +44,6 @@ def test_frames_come_with_image_truth_and_times(tmp_path: Path) -> None:
     assert frames[0].truth[:, 0].tolist() == [0, 0, 0, 1, 1, 1]
 
 
-def test_labels_logged_after_all_images_are_found(tmp_path: Path) -> None:
-    path = drive(tmp_path / "late.mcap", STAMPS, STAMPS[::2], delay=3600 * SECOND)
-    with open_log(path) as log:
-        frames = log.frames(log.select())
-        assert [frame.labelled for frame in frames] == [True, False] * 5
-
-
 def test_a_topic_is_not_scored_against_itself(tmp_path: Path) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
     for asked, reason in (
@@ -72,20 +62,6 @@ def test_a_range_is_half_open_and_keeps_the_numbers(tmp_path: Path) -> None:
     assert numbers(path, start="0.2", end="0.5") == [2, 3, 4]
     assert numbers(path, start=str(STAMPS[7])) == [7, 8, 9]
     assert numbers(path, start="0.1", every=3, max_frames=2) == [1, 4]
-
-
-def test_an_empty_range_says_where_the_images_lie(tmp_path: Path) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS)
-    with pytest.raises(LogError, match=r"no frame in this range.*from 0.000 to 0.900"):
-        numbers(path, start="5")
-
-
-def test_frames_are_ordered_by_log_time(tmp_path: Path) -> None:
-    messages = [("/cam", time, compressed(time, jpeg(grey(time)))) for time in (50, 10, 30)]
-    path = ros2_log(tmp_path / "a.mcap", messages)
-    with open_log(path) as log:
-        times = [(f.number, f.log_time_ns) for f in log.frames(log.select())]
-    assert times == [(0, 10), (1, 30), (2, 50)]
 
 
 def test_log_times_take_the_place_of_zero_stamps(tmp_path: Path) -> None:
@@ -141,22 +117,6 @@ def test_chunks_too_big_for_memory_are_read_all_the_same(
     assert log.damage == ()
 
 
-def test_a_bad_image_costs_its_frame_and_is_named(tmp_path: Path) -> None:
-    messages = [("/cam", i, compressed(i, jpeg(grey(9)))) for i in range(3)]
-    messages[1][2]["data"] = b"no image"
-    path = ros2_log(tmp_path / "bad.mcap", messages)
-    with open_log(path) as log:
-        stream = log.frames(log.select())
-        first, second, third = stream
-        first.decode()
-        with pytest.raises(
-            FrameError, match="frame 1: 8 bytes that are no image of a known format"
-        ):
-            second.decode()
-        third.decode()
-    assert list(stream.accounting.undecodable) == [1]
-
-
 def test_a_stamp_that_cannot_be_read_is_told_from_every_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -185,23 +145,6 @@ def test_a_stamp_beyond_all_clocks_cannot_be_read(
             reader, "_decoder", lambda _: SimpleNamespace(stamp=lambda _data: stamp)
         )
         assert reader.stamp(0) == (stamp if stamp == 2**63 - 1 else UNREADABLE)
-
-
-def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -> None:
-    messages = [
-        ("/cam", 1, compressed(1, jpeg(grey(9)))),
-        ("/labels", 1, raw(1, grey(255, width=4, height=3), "mono8")),
-    ]
-    path = ros2_log(tmp_path / "small.mcap", messages)
-    with (
-        open_log(path) as log,
-        pytest.raises(LogError, match=r"/labels is 4x3, but /cam is 8x6: .*`topics.resize_truth`"),
-    ):
-        log.select()
-    with open_log(path, LogConfig(topics=TopicSettings(resize_truth=True))) as log:
-        frame = next(log.frames(log.select())).decode()
-    assert frame.truth is not None
-    assert frame.truth.shape == (6, 8)
 
 
 def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> None:
@@ -252,36 +195,7 @@ def test_real_drives(
     check_drive(folder / f"{name}.mcap", labels, frames, labelled=labelled)
 
 
-def test_a_pipe_is_no_log_and_never_waited_for(tmp_path: Path) -> None:
-    pipe = tmp_path / "drive.mcap"
-    os.mkfifo(pipe)
-    for path in (pipe, tmp_path):
-        with pytest.raises(LogError, match=r"is a pipe, not a file"):
-            open_log(path)
-
-
-def test_a_device_is_no_log() -> None:
-    with pytest.raises(LogError, match="/dev/null: is a device"):
-        open_log("/dev/null")
-
-
 # --- All that there is to say about a log, as plain data ------------------------------------------
-
-BEGIN = 1_700_000_000 * SECOND
-
-
-def test_a_log_is_described_for_machines(tmp_path: Path) -> None:
-    stamps = [BEGIN + i * SECOND for i in (0, 1, 2, 3, 9)]
-    path = drive(tmp_path / "drive.mcap", stamps, stamps[:2])
-    found = json.loads(json.dumps(describe(path).as_dict()))
-    camera, labels = found["topics"]
-    assert (camera["name"], camera["kind"], camera["format"]) == ("/camera", "compressed", "jpeg")
-    assert (camera["count"], camera["rate_hz"], camera["size"]) == (5, 1.0, [8, 6])
-    assert camera["gaps"] == [[stamps[3], stamps[4]]]
-    assert (labels["channels"], labels["count"]) == (1, 2)
-    assert found["bytes"] == path.stat().st_size
-    assert found["picks"][0] == "image: /camera (the only camera image)"
-    assert (found["problem"], found["damage"], found["losses"]) == ("", [], [])
 
 
 @pytest.mark.parametrize("apart", [0, 50])

@@ -32,11 +32,6 @@ def test_everything_is_stated_of_a_network_of_two_classes(tmp_path):
     assert found.activation == "softmax"
 
 
-def test_stated_settings_stay_as_they_are(tmp_path):
-    found = read(network(tmp_path / "n.onnx"))
-    assert Network.of(found).settings == found
-
-
 def test_another_file_than_the_stated_one_is_refused(tmp_path):
     found = read(network(tmp_path / "n.onnx"))
     network(tmp_path / "n.onnx", last="Softmax")
@@ -58,14 +53,6 @@ def test_what_an_output_means_follows_from_its_classes_and_what_makes_it(
 ):
     found = read(network(tmp_path / "n.onnx", classes=classes, last=last))
     assert (found.activation, found.decide) == (activation, decide)
-
-
-def test_results_tell_licence_inputs_outputs_and_road(tmp_path):
-    path = network(tmp_path / "n.onnx", classes=3, metadata={"license": "MIT"})
-    facts = Network.of(NetSettings(file=str(path), road=(0,))).facts()
-    assert facts["licence"] == "MIT"
-    assert facts["road"] == ["0"]
-    assert facts["inputs"] == ["image float32 (1, 3, 12, 16)"]
 
 
 def test_weights_beside_the_file_are_used(tmp_path):

@@ -31,28 +31,10 @@ def with_weights_beside(folder):
     return path
 
 
-def test_inputs_and_outputs_are_listed_without_the_weights(tmp_path):
-    file = read(network(tmp_path / "n.onnx", spare=True))
-    assert str(file.question("what?")).endswith(
-        "what? (inputs: image float32 (1, 3, 12, 16); "
-        "outputs: road float32 (1, 2, 6, 8), r1 float32 (1, 4, 6, 8))"
-    )
-
-
-def test_metadata_are_texts_by_name(tmp_path):
-    file = read(network(tmp_path / "n.onnx", metadata={"license": "MIT", "names": "{}"}))
-    assert file.metadata == {"license": "MIT", "names": "{}"}
-
-
 @pytest.mark.parametrize("last", ["Softmax", "Sigmoid", None])
 def test_the_operator_that_makes_an_output_is_found_behind_those_that_move_it(last, tmp_path):
     path = network(tmp_path / "n.onnx", last=last, input_shape=(1, 12, 16, 3))
     assert read(path).makers == {"road": last or "Conv"}
-
-
-def test_the_digest_is_that_of_the_bytes(tmp_path):
-    path = network(tmp_path / "n.onnx")
-    assert read(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def test_weights_beside_the_file_are_part_of_the_digest(tmp_path):

@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import View
 from roadeval.pipeline.stages import STAGES
@@ -43,17 +42,6 @@ def test_stages_after_the_filter_see_what_it_made(chains):
     assert_same(after, alone)
 
 
-def test_a_chain_without_filters_leaves_the_image_alone(chains):
-    image = noise(5, 6)
-    assert chains[1].filtered(image) is image
-
-
-def test_a_stage_runs_when_it_is_asked_for(chains):
-    steps = chains[0].run(View.of(noise(20, 30)))
-    assert [next(steps)[0], next(steps)[0]] == ["shadow", "similarity"]
-    assert [name for name, _ in steps] == ["svm", "post"]
-
-
 def test_layers_are_the_ones_announced_in_shape_and_type(chains):
     image = noise(30, 40)
     for names, chain in zip((NAMES, NAMES[1:]), chains, strict=True):
@@ -73,10 +61,6 @@ def test_a_stages_mask_is_the_layer_of_its_name(chains):
         if output.mask is not None:
             layers = {layer.spec.name: layer.array for layer in output.layers}
             np.testing.assert_array_equal(layers[name], output.mask.pixels())
-
-
-def test_stages_that_yield_masks_are_all_but_the_filters():
-    assert Pipeline.default(NAMES).masks() == ("similarity", "svm", "post")
 
 
 @pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
@@ -118,12 +102,6 @@ def test_what_was_handed_out_is_not_changed_by_the_next_image(chains):
 
 
 # --- Pipelines ------------------------------------------------------------------------------------
-
-
-def test_a_stage_is_found_in_the_file_that_bears_its_name():
-    for name, stage in STAGES.items():
-        homes = [room for room in (paper, beyond) if hasattr(room, name)]
-        assert [getattr(room, name).STAGE for room in homes] == [stage]
 
 
 def test_without_its_filters_a_pipeline_keeps_the_other_settings():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import Packed
-from roadeval.pipeline.chain import Chain, Pipeline
+from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.stage import Output, View
 from roadeval.pipeline.stages import STAGES
@@ -97,20 +97,6 @@ def test_a_perfect_filter_leaves_a_frame_without_shadow_as_it_is(chain):
         assert_same(told[name], mask, name)
 
 
-def test_running_oracles_changes_no_output(chain):
-    outputs = [output for _, output in chain.run(SEEN)]
-    before = [None if o.mask is None else o.mask.pixels() for o in outputs]
-    dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK))
-    for mask, output in zip(before, outputs, strict=True):
-        if mask is not None:
-            np.testing.assert_array_equal(mask, output.mask.pixels())
-
-
-def test_every_machine_and_every_filter_has_an_oracle():
-    named = {name for name, stage in STAGES.items() if stage.oracle}
-    assert named == {"shadow", "gated", "svm", "trees"}
-
-
 # --- A chain that takes over what another of the same stages has computed -------------------------
 
 PICTURE = View.of(noise(40, 60))
@@ -153,9 +139,3 @@ def test_other_parameters_give_their_own_masks():
 
 def wide():
     return type(SETTINGS["paper"]["svm"])(gamma=0.01, c=0.1)
-
-
-def test_a_chain_that_learns_nothing_has_nothing_to_repeat():
-    chain = Pipeline.default(["shadow"]).bind({})
-    outputs = [output for _, output in chain.run(PICTURE)]
-    assert dict(chain.repeated(PICTURE, outputs)) == {}

@@ -31,19 +31,6 @@ def test_a_patch_is_symmetric_never_empty_and_as_wide_as_stated(shape, patch):
         assert abs(drawn[rows[-1]].sum() - patch.bottom_width * width) <= 2
 
 
-def test_the_default_patch_lies_before_the_vehicle():
-    drawn = patch_mask(480, 640, ReferencePatch())
-    assert drawn.mean() == pytest.approx(0.3 * 0.2, rel=0.02)
-    assert not drawn[: 480 // 2].any()
-
-
-def test_a_patch_is_shared_and_cannot_be_written():
-    first = patch_mask(20, 30, ReferencePatch())
-    assert patch_mask(20, 30, ReferencePatch()) is first
-    with pytest.raises(ValueError, match="read-only"):
-        first[0, 0] = 1
-
-
 def test_an_upside_down_patch_is_refused():
     with pytest.raises(ValueError, match="top must lie above bottom"):
         ReferencePatch(top=0.9, bottom=0.5)

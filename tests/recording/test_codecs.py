@@ -2,22 +2,20 @@
 
 import io
 import zlib
-from dataclasses import replace
 from io import BytesIO
 
 import cv2
 import numpy as np
 import pytest
-import rerun as rr
 from PIL import Image
 
 from roadeval import images
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec, Packed
 from roadeval.images import Limits, to_labels
 from roadeval.recording import codecs as pngs
-from roadeval.recording.codecs import codec, codecs_of
-from roadeval.recording.layout import CAMERA, SHADOW_TRUTH
-from tests.recording.making import NDI, POST, RINGS, layout
+from roadeval.recording.codecs import codec
+from roadeval.recording.layout import SHADOW_TRUTH
+from tests.recording.making import NDI, POST, RINGS
 
 HEIGHT, WIDTH = 9, 13
 DRAW = np.random.default_rng(0)
@@ -37,21 +35,11 @@ def test_masks_and_labels_come_back_equal(spec):
     np.testing.assert_array_equal(there_and_back(spec, array), array)
 
 
-def test_the_value_for_ignored_pixels_comes_back():
-    array = np.full((HEIGHT, WIDTH), 255, np.uint8)
-    np.testing.assert_array_equal(there_and_back(RINGS, array), array)
-
-
 def test_an_exact_number_map_comes_back_to_the_nearest_of_256_levels():
     ndi = DRAW.uniform(-1, 1, (HEIGHT, WIDTH)).astype(np.float32)
     back = there_and_back(NDI, ndi)
     assert back.dtype == np.float32
     assert np.abs(back - ndi).max() <= 1 / 255 + 1e-6
-
-
-def test_numbers_outside_their_range_are_clipped():
-    outside = np.array([[-7.0, 7.0], [-1.0, 1.0]], np.float32)
-    np.testing.assert_allclose(there_and_back(NDI, outside), [[-1, 1], [-1, 1]], atol=1e-6)
 
 
 def test_a_number_map_that_need_not_be_exact_comes_back_nearly_and_at_full_size():
@@ -93,47 +81,6 @@ def test_a_damaged_picture_is_refused(spec):
     payload[len(payload) // 2] ^= 1
     with pytest.raises(ValueError, match="a damaged PNG"):
         chosen.decode(bytes(payload))
-
-
-def test_labels_are_logged_as_one_byte_a_pixel_and_hide_what_lies_below():
-    told = {
-        batch.component_descriptor().component: batch.as_arrow_array().to_pylist()[0]
-        for style in codec(RINGS, WIDTH, HEIGHT).style()
-        for batch in style.as_component_batches()
-    }
-    assert told["SegmentationImage:opacity"] == 1
-    assert told["SegmentationImage:format"] == {
-        "width": WIDTH,
-        "height": HEIGHT,
-        "pixel_format": None,
-        "color_model": rr.ColorModel.L.value,
-        "channel_datatype": rr.ChannelDatatype.U8.value,
-    }
-
-
-def test_the_camera_is_drawn_below_every_layer():
-    def order(codec):
-        orders = [
-            batch.as_arrow_array().to_pylist()[0]
-            for style in codec.style()
-            for batch in style.as_component_batches()
-            if batch.component_descriptor().component.endswith(":draw_order")
-        ]
-        return orders[0] if orders else None
-
-    codecs = codecs_of(layout())
-    camera = order(codecs.pop(CAMERA))
-    orders = {path: order(codec) for path, codec in codecs.items()}
-    assert all(above > camera for above in orders.values() if above is not None)
-    assert None not in (orders["/filtered/post"], orders["/truth"])
-
-
-def test_a_number_map_that_need_not_be_exact_has_each_fifth_level_alone():
-    spec = replace(NDI, exact=False)
-    codes = np.repeat(np.repeat(np.arange(256, dtype=np.uint8)[None], 2, axis=0), 2, axis=1)
-    with Image.open(BytesIO(codec(spec, 512, 2).encode(codes))) as picture:
-        levels = np.array(picture)
-    np.testing.assert_array_equal(levels[0], np.rint(np.arange(256) / 5) * 5)
 
 
 def test_a_map_of_a_large_image_has_the_means_of_blocks_to_a_127th():
@@ -205,34 +152,6 @@ def test_levels_come_back_by_another_library(shape):
     np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), levels)
     read = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(read[..., ::-1] if levels.ndim == 3 else read, levels)
-
-
-def test_a_row_of_levels_is_stored_as_what_the_nearest_of_three_neighbours_leaves():
-    png = pngs.encode_levels(np.array([[10, 13, 13], [20, 30, 9]], np.uint8))
-    # Above 30 is 13, left 20, the corner 10: 20 is nearest to 20 + 13 - 10. For 9 it is 30.
-    assert list(_rows(png)) == [4, 10, 3, 0, 4, 10, 10, (9 - 30) % 256]
-
-
-def test_a_row_of_labels_is_stored_without_a_filter():
-    labels = np.array([[0, 1, 2], [3, 0, 1]], np.uint8)
-    png = pngs.encode_labels(labels, [(i, 0, 0, 255) for i in range(4)])
-    assert list(_rows(png)) == [0, 0b00_01_10_00, 0, 0b11_00_01_00]
-
-
-def _rows(png):
-    start = png.index(b"IDAT") + 4
-    return zlib.decompress(png[start:-16])
-
-
-@pytest.mark.parametrize("view", [np.asfortranarray, lambda a: a[::-1], lambda a: a[:, ::2]])
-@pytest.mark.parametrize("shape", [(9, 14), (9, 14, 3)])
-def test_images_may_have_any_layout(view, shape):
-    levels = view(np.random.default_rng(0).integers(0, 4, shape).astype(np.uint8))
-    png = pngs.encode_levels(levels)
-    np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), levels)
-    labels = levels if levels.ndim == 2 else levels[..., 1]
-    png = pngs.encode_labels(labels, [(i, 0, 0, 255) for i in range(4)])
-    np.testing.assert_array_equal(decode(png), labels)
 
 
 @pytest.mark.parametrize("noise", [2, 5])

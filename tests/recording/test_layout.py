@@ -10,21 +10,6 @@ from roadeval.recording import Layout, RecordingError, RecordRule
 from tests.recording.making import VARIANT, layout, paths_of
 
 
-def paths(**changes):
-    return [path for path, _ in layout(**changes).images()]
-
-
-def test_true_shadow_is_there_only_where_the_log_has_it():
-    assert "/true_shadow" in paths(has_shadow_truth=True)
-    assert "/true_shadow" not in paths()
-
-
-def test_the_baseline_is_scored_without_being_a_variant():
-    assert list(layout().scored()) == [("filtered", "post"), ("blind", "post")]
-    assert list(layout(baseline=False).scored()) == [("filtered", "post")]
-    assert not list(layout(has_truth=False).scored())
-
-
 def test_a_layout_survives_its_json():
     whole = layout(first_frame=10, rate_hz=15.0, properties={"version": "1", "frames": 3})
     assert Layout.from_json(whole.to_json()) == whole

@@ -16,9 +16,8 @@ import numpy as np
 import pytest
 
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, views
-from roadeval.recording.recorder import LEAST_FREE, UNWRITTEN
-from roadeval.recording.rows import CHUNK_BYTES, PendingRows
-from roadeval.recording.rrd_file import RrdFile
+from roadeval.recording.recorder import LEAST_FREE
+from roadeval.recording.rows import PendingRows
 from tests.recording.making import (
     RESULTS,
     layout,
@@ -55,12 +54,6 @@ def test_an_interrupt_before_the_first_frame_leaves_nothing(place, tmp_path, mon
     with pytest.raises(KeyboardInterrupt), Recorder(tmp_path / "out.rrd", layout()):
         pass
     assert not list(tmp_path.iterdir())
-
-
-def test_when_the_run_took_place_is_not_recorded(recording):
-    file = RrdFile(recording.path)
-    assert file.static("/__properties", "RecordingInfo:start_time") is None
-    assert file.static("/__properties", "RecordingInfo:name") == "street"
 
 
 def test_flushed_frames_wait_no_more(drive, tmp_path):
@@ -192,24 +185,6 @@ def test_what_waits_has_its_room_on_the_disk_beside_the_least(drive, tmp_path, m
             recorder.check_disk_space()
 
 
-def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
-    sent = []
-    flush = Recorder._flush_stream
-
-    def counted(recorder):
-        sent.append(recorder._unwritten)
-        flush(recorder)
-
-    monkeypatch.setattr(Recorder, "_flush_stream", counted)
-    with _recorder(tmp_path / "out.rrd") as recorder:
-        first = recorder.encode(result(0), 0)
-        large = replace(first, payloads=dict.fromkeys(first.payloads, bytes(CHUNK_BYTES - 1)))
-        for number in range(2):
-            recorder.write(replace(large, when=(number,) * 3))
-    assert len(first.payloads) > 4
-    assert max(sent) < UNWRITTEN + 2 * CHUNK_BYTES
-
-
 @pytest.mark.parametrize(("rule", "shown"), [("all", 1000), ("every:4", 250), ("worst:50", 50)])
 def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
     tmp_path, monkeypatch, rule, shown
@@ -224,11 +199,6 @@ def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
             assert recorder.forecast(large, 1000).startswith(expected)
             assert recorder.forecast(large, 1000) == ""
             leave_free(monkeypatch, 10**12)
-
-
-def test_a_small_recording_that_fits_is_not_worth_a_word(tmp_path):
-    with _recorder(tmp_path / "out.rrd") as recorder:
-        assert recorder.forecast(recorder.encode(result(0), 0), 10) == ""
 
 
 def leave_free(monkeypatch, size):

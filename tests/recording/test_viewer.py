@@ -27,12 +27,6 @@ def test_without_a_driver_the_package_that_brings_one_is_named(tmp_path, monkeyp
         viewer.screenshot(tmp_path / "x.rrd", tmp_path / "x.png")
 
 
-def test_a_driver_that_somebody_chose_is_not_questioned(tmp_path, monkeypatch):
-    monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
-    monkeypatch.setattr(viewer, "DRIVERS", tmp_path)
-    assert viewer._driver() == {}
-
-
 def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine_alone(
     fake, tmp_path
 ):
@@ -135,13 +129,6 @@ def test_a_window_that_was_closed_is_opened_again(windows):
     windows[0]["process"].code = 0
     window.show(Path("a.rrd"), 2)
     assert [each["frames"] for each in windows] == [[1], [2]]
-
-
-def test_it_ends_with_whoever_started_it(windows):
-    window = WindowViewer()
-    window.show(Path("a.rrd"), 1)
-    window.close()
-    assert windows[0]["ended"]
 
 
 def test_without_a_screen_it_says_what_to_do(windows, monkeypatch):

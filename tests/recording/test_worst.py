@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import Doubt
-from roadeval.recording import EncodedFrame, Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
 from roadeval.recording import recorder as recorder_module
 from roadeval.recording.recorder import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
@@ -146,15 +146,3 @@ def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp
     with pytest.raises(RecordingError, match="the disk is full"):
         fill(recorder)
     assert Recording(recorder.partial).frame_numbers == (0,)
-
-
-PAYLOADS = {"/camera": b"jpeg", "/filtered/post": b""}
-
-
-def test_a_frame_comes_back_with_its_images_alone():
-    worst = WorstFrames(1)
-    worst.offer(EncodedFrame((7, 70, 70), PAYLOADS, scalars={"/metrics": 0.5}))
-    (back,) = worst.take()
-    assert (back.when, back.payloads) == ((7, 70, 70), PAYLOADS)
-    assert list(back.payloads) == list(PAYLOADS)
-    assert not back.scalars

@@ -3,24 +3,10 @@
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-import pytest
-
-from roadeval.data import colours
-from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.stats import Difference
 from roadeval.report.chart import ChartKind, looks, looks_of_results
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import DRAWN, MEAN, ForestRow
-from tests.evaluation.making import a_table, rows_of
-
-FILTERED, UNFILTERED = (colours.hex_of(c) for c in (colours.FILTERED, colours.UNFILTERED))
-CHANGE = Difference(0.01, -0.02, 0.04, 0.5, 0.95, "frames", 12)
-
-
-def numbers(series):
-    return [*zip(series.x, series.y, strict=True)]
-
 
 # --- Looks ----------------------------------------------------------------------------------------
 
@@ -41,43 +27,6 @@ def test_of_several_results_a_variant_keeps_its_hue_and_a_result_its_dash():
     assert found["new: robust"].dash == found["new: filtered"].dash == "dashed"
 
 
-# --- Rates ----------------------------------------------------------------------------------------
-
-
-def test_lines_go_along_the_drive_whatever_the_table_s_order():
-    rows = rows_of(a_table({("net", "svm"): [90, 90, 90], ("net", "post"): [10, 20, 30]}))
-    (chart,) = charts.over_frames(rows.take(np.array([4, 3, 2, 5, 0, 1])), ["ERR"])
-    (line,) = chart.series
-    assert numbers(line) == [(0, 10), (1, 20), (2, 30)]
-
-
-def test_stages_of_variants_stand_in_the_order_of_their_chains():
-    chains = {"filtered": ("svm", "post"), "robust": ("trees", "post")}
-    totals = {
-        name: dict.fromkeys(chain, dict.fromkeys(SHORT, 0.1)) for name, chain in chains.items()
-    }
-    assert charts.stages(totals)[0].names == ["svm", "trees", "post"]
-
-
-def test_a_rate_that_is_better_higher_need_not_begin_at_zero(monkeypatch):
-    monkeypatch.setattr(charts, "SHORT", {name: METRICS[name] for name in ("ERR", "ACC")})
-    made = charts.stages({"filtered": {"post": {"ERR": 0.1, "ACC": 0.9}}})
-    assert [chart.from_zero for chart in made] == [True, False]
-
-
-# --- Differences ----------------------------------------------------------------------------------
-
-
-def test_the_differences_of_frames_have_their_mean_across():
-    mean = replace(CHANGE, mean=-0.05, low=None, high=None)
-    frames, changes = np.array([7, 9]), np.array([0.1, -0.2])
-    chart = charts.difference(frames, changes, "filtered", "unfiltered", mean)
-    (own,) = chart.series
-    assert [*own.points()] == [(7, pytest.approx(10)), (9, pytest.approx(-20))]
-    assert own.look.colour == FILTERED
-    assert (chart.level.name, chart.level.value) == ("mean", -5)
-
-
 # --- Drive by drive -------------------------------------------------------------------------------
 
 OVER = Difference(0.01, -0.01, 0.03, 0.2, 0.95, "drives", 3)
@@ -96,13 +45,6 @@ def test_few_drives_have_a_row_each_and_below_them_the_mean():
     assert (mean.x, mean.y, mean.low, mean.high) == ([3], [1], [-1], [3])
 
 
-def test_it_is_told_that_the_mean_has_no_interval():
-    over = replace(OVER, low=None, high=None)
-    figure = charts.forest(drives(3), over, "change")
-    assert np.isnan(figure.charts[0].series[-1].low).all()
-    assert "The mean has no interval" in figure.caption
-
-
 def test_of_many_drives_the_worst_and_the_best_have_a_row():
     figure = charts.forest(drives(DRAWN + 4), OVER, "change")
     (chart,) = figure.charts
@@ -110,11 +52,6 @@ def test_of_many_drives_the_worst_and_the_best_have_a_row():
     assert len(chart.names) == DRAWN + 1
     assert chart.names[half - 1 : half + 1] == [f"drive_{half + 4}", f"drive_{half - 1}"]
     assert "Of all drives the 20 worst and the 20 best." in figure.caption
-
-
-def test_the_group_of_a_drive_stands_beside_its_name():
-    (chart,) = charts.forest(drives(1, "monday"), OVER, "change").charts
-    assert chart.names[0] == "drive_0 (monday)"
 
 
 def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
@@ -125,6 +62,3 @@ def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
     assert -2 < low < -1
     assert 3 < high < 4
     assert "1 interval reaches beyond the edge" in figure.caption
-
-
-# --- Legends --------------------------------------------------------------------------------------

@@ -41,10 +41,6 @@ def test_charts_along_the_drive_share_one_range_and_others_have_none():
     assert drawn(named, span).x == Span(-0.3, 1.3)
 
 
-def test_without_a_frame_there_still_is_a_range():
-    assert drawn(lines()).x == span_of_frames([]) == Span(0, 1)
-
-
 @pytest.mark.parametrize(
     ("low", "high", "expected"),
     [(0, 9, [0, 2.5, 5, 7.5]), (-1, 1, [-1, -0.5, 0, 0.5, 1]), (0, 0.03, [0, 0.01, 0.02, 0.03])],
@@ -108,6 +104,3 @@ def test_an_interval_beyond_the_chart_ends_in_an_arrow_at_its_edge(low, high, cu
     (mark,) = made.rows[0].marks
     assert (mark.cut, (mark.low, mark.high)) == (cut, ends)
     assert f"({low:.2f} to {high:.2f})" in mark.text
-
-
-# --- Heat maps ------------------------------------------------------------------------------------

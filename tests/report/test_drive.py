@@ -3,8 +3,7 @@
 from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.frames import FrameBrowser
-from roadeval.results.facts import FrameAccount
-from tests.report.making import VARIANTS, some_findings
+from tests.report.making import VARIANTS
 from tests.report.sections.test_drive import findings as thresholded
 
 
@@ -27,9 +26,3 @@ def test_a_page_has_the_sections_of_the_report():
     paper, page = sections(findings), headings(page_document(findings, frames))
     assert "Over thresholds" in page
     assert {*paper} - {*page} == {"The worst frames"}
-
-
-def test_of_a_run_that_was_cut_the_evaluated_frames_are_counted():
-    account = FrameAccount(evaluated=17, trained_on=10)
-    findings = some_findings(totals={}, frames=account)
-    assert document(findings).subtitle.startswith("17 frames")

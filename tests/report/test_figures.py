@@ -112,13 +112,6 @@ def names(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.texts[2:]]
 
 
-def test_a_variant_without_post_is_shown_by_its_last_stage() -> None:
-    table = a_table(2, ("net",)).query("stage == 'svm'")
-    (ax,) = error_rate("drive", rows_of(table)).axes
-    assert len(ax.lines) == 1
-    assert "svm" in texts(error_rate("drive", rows_of(table)))
-
-
 @pytest.mark.parametrize("rows", [1, 12, 3600])
 def test_labels_never_touch_each_other(rows: int) -> None:
     (ax,) = drawn(error_rate("drive", rows_of(a_table(rows)))).axes
@@ -143,20 +136,10 @@ def test_an_undefined_rate_leaves_a_gap() -> None:
     assert np.isnan(line.get_ydata()).tolist() == [False, True, False]
 
 
-def test_rates_of_nothing_but_zero_have_an_axis_of_half_a_percent() -> None:
-    (ax,) = error_rate("drive", rows_of(a_table(3).assign(ERR=0.0))).axes
-    assert ax.get_ylim() == (0, 0.5)
-
-
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
     ax = drawn(fp_fn_rate("drive", rows_of(table))).axes[1]
     assert ax.texts[0].get_text() == "undefined on every frame"
-
-
-def test_a_short_last_row_is_told() -> None:
-    assert "10 frames, the last of 1;" in texts(error_rate("d", rows_of(a_table(3, last=1))))
-    assert "the last" not in texts(error_rate("d", rows_of(a_table(3))))
 
 
 def test_a_long_drive_is_drawn_as_means_of_rows() -> None:

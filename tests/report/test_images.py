@@ -6,7 +6,7 @@ import pytest
 
 from roadeval.data import ERRORS, LayerKind, LayerSpec
 from roadeval.data.colours import MOST_ERRORS, NEVER_LABELLED, VERMILLION
-from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, painted, shrink
+from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, painted
 
 GREY = np.full((2, 4, 3), 100, np.uint8)
 
@@ -36,10 +36,6 @@ def test_a_map_of_numbers_spans_its_range_and_is_clipped_to_it():
 def test_a_picture_is_brought_down_but_never_up(width, wanted):
     decoded = cv2.imdecode(np.frombuffer(jpeg(LayerImage("", GREY), width).content, np.uint8), 1)
     assert (decoded.shape[1], decoded.shape[0]) == wanted
-
-
-def test_a_very_wide_image_keeps_a_row():
-    assert shrink(np.zeros((1, 1000, 3), np.uint8), 10).shape == (1, 10, 3)
 
 
 def test_a_heat_map_goes_from_white_to_the_darkest_shade():

@@ -4,31 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import Condition, DriveChange
+from roadeval.evaluation.comparison import Condition
 from roadeval.results.comparison import (
     as_dict,
     changed_settings,
     headline,
     judged,
     verdict,
-    where,
 )
-from roadeval.results.sentences import sentence
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 WORSE = a_difference(1.2, 0.5, 2)
-
-
-def test_the_verdict_is_the_sentence_on_the_final_mask_and_leaves_the_baseline_out():
-    rows = (
-        a_change(a_difference(9, 8, 10), final=False),
-        a_change(WORSE),
-        a_change(a_difference(0, 0, 0), "blind"),
-    )
-    found = a_comparison(*rows)
-    ends = 0.1, 0.1 + WORSE.mean
-    told = sentence(WORSE, "new instead of base", "ERR of post", levels=ends)
-    assert verdict(found) == told
 
 
 def test_of_several_variants_each_is_named():
@@ -76,18 +62,6 @@ def test_changed_settings_are_told_of_each_result_and_some_of_many():
 )
 def test_the_headline_says_whether_limits_were_kept(holds, said):
     assert headline(holds) == said
-
-
-def test_drives_that_changed_are_counted_by_direction():
-    def a_drive(mean, q):
-        about = ("new", "filtered", "post", "street", 40)
-        return DriveChange(*about, 0.1, 0.1 + mean, a_difference(100 * mean, 0, 1), q)
-
-    rows = (a_drive(0.02, 0.01), a_drive(-0.02, 0.02), a_drive(0.01, 0.3), a_drive(0.01, None))
-    assert where(a_comparison(a_change(WORSE), drives=rows)) == [
-        "filtered of new: ERR surely changed on 2 of 3 drives (worse on 1, better on 1; false "
-        "discovery rate 5 %)"
-    ]
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,10 @@
 import json
 import math
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import pytest
 
-from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.facts import Facts, LogFacts, as_parts, digest_of, json_text, plain
+from roadeval.results.facts import Facts, LogFacts, as_parts, digest_of
 from roadeval.results.tables import ResultsError
 from tests.evaluation.test_effects import a_mask, effects_of
 from tests.results.making import facts_of
@@ -40,16 +38,6 @@ def test_what_is_read_is_what_was_written():
     assert Facts.parse(WRITTEN.text(), "here").effects == EFFECTS
 
 
-def test_differences_are_written_by_their_base():
-    parts = as_parts(EFFECTS)
-    assert {name: [*part] for name, part in parts.items()} == {
-        "difference": ["post"],
-        "against_unfiltered": ["net", "net_tuned"],
-        "against_blind": ["filtered", "unfiltered", "net", "net_tuned"],
-        "against_method": ["net_tuned"],
-    }
-
-
 def test_undefined_numbers_are_null_and_read_as_undefined():
     (effect,) = (e for e in EFFECTS if (e.base, e.variant) == ("unfiltered", "filtered"))
     nothing = replace(effect.rates["ERR"], mean=math.nan, units=0)
@@ -58,19 +46,6 @@ def test_undefined_numbers_are_null_and_read_as_undefined():
     read = Facts.parse(facts.text(), "here").difference["post"]["ERR"]
     assert math.isnan(read.mean)
     assert asdict(read) | {"mean": 0} == asdict(nothing) | {"mean": 0}
-
-
-def test_what_a_run_does_not_have_is_left_out():
-    content = json.loads(WRITTEN.text())
-    assert [*content][:3] == ["format", "verdict", "drive"]
-    assert not content.keys() & {"curves", "seeds", "methods", "masks", "files"}
-    with_seeds = replace(WRITTEN, seeds={"seeds": [0, 1]})
-    assert json.loads(with_seeds.text())["seeds"] == {"seeds": [0, 1]}
-
-
-def test_settings_of_another_version_are_read_as_far_as_they_are_known():
-    assert WRITTEN.evaluation == EvaluationSettings(window=7)
-    assert facts_of().evaluation == EvaluationSettings()
 
 
 @pytest.mark.parametrize("given", [{"confidence": 2}, {"window": None}, 5, None])
@@ -154,12 +129,6 @@ def test_a_number_that_was_changed_is_damage():
 def test_where_files_lie_may_change():
     moved = Facts.parse(changed(run={"output": {"save": "elsewhere.rrd"}}), "here")
     assert moved.run["output"]["save"] == "elsewhere.rrd"
-
-
-def test_a_digest_is_that_of_what_json_gives_back():
-    written = {"totals": {"a": (1, math.nan, Path("b"), 1 / 3, "\u00e9\udce9")}, "run": 5}
-    read = json.loads(json_text(plain(written)))
-    assert digest_of(written, ("totals",)) == digest_of(read, ("totals", "other"))
 
 
 @pytest.mark.parametrize("digest", ["x", {}, {"parts": 5, "sha256": ""}, {"parts": [[]]}])

@@ -17,7 +17,7 @@ from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
-from roadeval.results.facts import Facts, FrameAccount, digest_of
+from roadeval.results.facts import Facts, FrameAccount
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
 from roadeval.results.tables import ResultsError
@@ -69,26 +69,6 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
-    write(tmp_path)
-    first = {path.stem: path.read_text().splitlines()[0] for path in tmp_path.glob("*.csv")}
-    assert first == {
-        "edges": "drive,camera,frame,variant,stage,measure,where,mask_m,truth_m",
-        "metres": "drive,camera,variant,measure,where,frames,missing,value,p95,low,high",
-        "frames": "drive,camera,frame,stamp_ns,log_time_ns,variant,stage,TP,TN,FP,FN,N,"
-        "ACC,ERR,TPR,FNR,TNR,FPR",
-        "windows": "drive,camera,window,first_frame,last_frame,frames,variant,stage,"
-        "ACC,ERR,TPR,FNR,TNR,FPR,"
-        "pooled_ACC,pooled_ERR,pooled_TPR,pooled_FNR,pooled_TNR,pooled_FPR",
-        "regions": "drive,camera,frame,variant,stage,region,TP,TN,FP,FN,N",
-        "oracles": "drive,camera,frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
-        "disagreements": "drive,camera,frame,from_variant,to_variant,repaired,spoiled,N",
-        "changes": "drive,camera,from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
-        "heat": "drive,camera,variant,top,left,side,labelled,FP,FN",
-        "probabilities": "drive,camera,variant,stage,level,road,other",
-    }
-
-
 OF = "street,/camera/image,"
 
 
@@ -97,57 +77,6 @@ def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
     assert line == f"{OF}6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
     assert math.isnan(ResultsFolder(tmp_path).table("frames").loc[2, "TPR"])
-
-
-def test_numbers_read_back_bit_by_bit(tmp_path: Path) -> None:
-    board = a_board()
-    tallies = [tally for result in scored(board) for tally in result.tallies]
-    write(tmp_path)
-    frames = ResultsFolder(tmp_path).table("frames")
-    assert frames["ERR"].tolist() == [tally.rates["ERR"] for tally in tallies]
-    assert frames["TP"].tolist() == [tally.counts.tp for tally in tallies]
-    windows = ResultsFolder(tmp_path).table("windows")
-    assert windows["pooled_ACC"].tolist() == [row.pooled["ACC"] for row in board.windows()]
-
-
-def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
-    board = Scoreboard(EvaluationSettings(), ["007"], None)
-    with ResultsWriter(tmp_path) as writer:
-        variant = a_variant("007", {"post": MASK})
-        result = board.score(a_frame(TRUTHS[0]), Role.EVALUATED, (variant,))
-        board.add(result)
-        writer.append(lines(result))
-        writer.finish(the_rest(board), RUN_TOML)
-    assert ResultsFolder(tmp_path).table("frames")["variant"].tolist() == ["007"]
-
-
-def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
-    write(tmp_path)
-    results = ResultsFolder(tmp_path)
-    between = results.table("changes").set_index(["from_variant", "to_variant"])
-    assert between["N"].to_dict() == {("filtered", "blind"): 23, ("blind", "filtered"): 23}
-    heat, frames = results.table("heat"), results.table("frames")
-    own = frames[frames["variant"] == "filtered"]
-    assert heat[["labelled", "FP", "FN"]].sum().tolist() == own[["N", "FP", "FN"]].sum().tolist()
-
-
-def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_removed(
-    tmp_path: Path,
-) -> None:
-    write(tmp_path)
-    board = Scoreboard(EvaluationSettings(), ["net"], None)
-    with ResultsWriter(tmp_path) as writer:
-        result = board.score(
-            a_frame(TRUTHS[0]), Role.EVALUATED, (a_variant("net", {"post": MASK}),)
-        )
-        board.add(result)
-        writer.append(lines(result))
-        writer.append(sum_lines(board))
-        writer.finish(the_rest(board), RUN_TOML)
-    assert names(tmp_path) == {
-        *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "run.toml", "summary.json"),
-    }
-    assert ResultsFolder(tmp_path).table("oracles").empty
 
 
 def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
@@ -209,13 +138,6 @@ def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: A
     assert names(tmp_path) == {"results", "notes.txt"}
 
 
-def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
-    (tmp_path / "old").mkdir()
-    with suppress(ResultsError), ResultsWriter(tmp_path / "old"):
-        raise ResultsError
-    assert names(tmp_path) == {"old"}
-
-
 @pytest.mark.parametrize("table", OF_A_DRIVE)
 def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, table: str) -> None:
     write(tmp_path)
@@ -265,25 +187,6 @@ def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:
         assert told.rows == len(ResultsFolder(tmp_path).table(name))
 
 
-def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: Path) -> None:
-    board = Scoreboard(EvaluationSettings(window=2), ["net", "filtered", "late"], None)
-    with ResultsWriter(tmp_path) as writer:
-        for number, truth in enumerate(TRUTHS):
-            variants = [a_variant("filtered", {"svm": MASK, "post": MASK})]
-            variants += [a_variant("net", {"post": MASK})] if number == 0 else []
-            variants += [a_variant("late", {"post": MASK})] if number == 2 else []
-            result = board.score(a_frame(truth, number), Role.EVALUATED, tuple(variants))
-            board.add(result)
-            writer.append(lines(result))
-        writer.append(sum_lines(board))
-        writer.finish(the_rest(board), RUN_TOML)
-    tables = {name: ResultsFolder(tmp_path).table(name) for name in OF_A_DRIVE}
-    assert len(tables["frames"]) == 3 * 2 + 1 + 1
-    assert not {("net", "late"), ("late", "net")} & set(
-        zip(tables["changes"]["from_variant"], tables["changes"]["to_variant"], strict=True)
-    )
-
-
 def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
     tmp_path: Path,
 ) -> None:
@@ -302,19 +205,3 @@ def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Pat
     ):
         pass
     assert "\n" not in str(caught.value)
-
-
-def test_a_folder_without_results_says_how_to_make_some(tmp_path: Path) -> None:
-    with pytest.raises(ResultsError, match=r"no results here.*roadeval replay"):
-        ResultsFolder(tmp_path)
-
-
-FORM = '{"format": {"name": "roadeval-summary"'
-SHORT = json.dumps({"format": Facts.FORMAT, "digest": digest_of({}, ())})
-
-
-@pytest.mark.parametrize("text", ["{", "[]", FORM + "}}", SHORT])
-def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(ResultsError, match=r"damaged|not of format"):
-        ResultsFolder(tmp_path)

@@ -35,24 +35,12 @@ def test_a_name_is_text_whatever_it_looks_like(name):
     assert read_table("oracles", HEADER + line(variant=name))["variant"].tolist() == [name]
 
 
-def test_a_rate_that_is_undefined_everywhere_is_a_number_all_the_same():
-    table = read_table("oracles", HEADER + line(err=""))
-    assert math.isnan(table["ERR"][0])
-    assert kinds(table) == KINDS
-
-
 @pytest.mark.parametrize("text", ["", HEADER])
 def test_a_table_without_rows_has_its_columns(text):
     table = read_table("oracles", text)
     assert table.empty
     assert tuple(table.columns) == TABLES["oracles"].names
     assert kinds(table) == KINDS
-
-
-def test_a_file_is_read_like_its_text(tmp_path):
-    text = HEADER + line()
-    (tmp_path / "oracles.csv").write_text(text)
-    assert read_table("oracles", tmp_path / "oracles.csv").equals(read_table("oracles", text))
 
 
 def test_a_file_that_is_not_there_has_no_rows(tmp_path):

@@ -5,18 +5,16 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.data import Counts, Tally
+from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.score import Effect
 from roadeval.evaluation.stats import Difference
 from roadeval.results.facts import FrameAccount
 from roadeval.results.sentences import (
-    NOTHING_SCORED,
     account,
     correction,
     levels,
     notes,
-    notes_of,
     sentence,
     verdict,
 )
@@ -145,8 +143,6 @@ def test_the_account_says_how_many_frames_were_evaluated_and_why_not_others(fram
 
 
 # --- The verdict ----------------------------------------------------------------------------------
-
-BLIND = "blind, which never looks at the image"
 
 
 def against(base, **found):
@@ -283,38 +279,12 @@ def test_what_costs_most_is_the_step_that_adds_most(plain, filtered, final, cost
     assert verdict(totals, []).endswith(f" pp; {costs}.")
 
 
-@pytest.mark.parametrize(
-    "totals",
-    [
-        pytest.param({"robust": FILTER_CHAIN["unfiltered"]}, id="one variant"),
-        pytest.param({"filtered": FILTER_CHAIN["filtered"]}, id="the filter alone"),
-        pytest.param(drive(net=0.054, filtered=0.1, unfiltered=0.2), id="networks, of one stage"),
-        pytest.param(
-            FILTER_CHAIN | {"unfiltered": {"svm": total(math.nan), "post": total(0.062)}},
-            id="an undefined rate",
-        ),
-        pytest.param({}, id="no truth"),
-    ],
-)
-def test_without_a_pair_of_stages_nothing_is_said_of_steps(totals):
-    assert "Step by step" not in verdict(totals, [])
-
-
-def test_where_nothing_was_scored_the_verdict_says_so():
-    assert verdict({}, []) == NOTHING_SCORED
-
-
 # --- Notes on a frame -----------------------------------------------------------------------------
 
 
 def with_error(percent: int, road: int = 50) -> dict[str, float]:
     """Rates of a frame of 100 pixels, of which ``percent`` are called road wrongly."""
     return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
-
-
-def test_a_fine_frame_needs_no_note() -> None:
-    finals = {"filtered": with_error(8), "unfiltered": with_error(9)}
-    assert tuple(notes(finals, with_error(7))) == ()
 
 
 @pytest.mark.parametrize(
@@ -340,11 +310,3 @@ def test_losing_to_blind_is_noted() -> None:
     assert tuple(notes({"net": with_error(14)}, with_error(7))) == (
         "net is 7.0 pp worse than blind (ERR 7.0 %).",
     )
-
-
-def test_the_last_stage_of_each_variant_counts_and_blind_is_none_of_them() -> None:
-    named = [("net", "svm", 40), ("net", "post", 14), ("blind", "post", 7)]
-    tallies = [Tally(v, s, Counts(), rates=with_error(percent)) for v, s, percent in named]
-    finals = {"net": with_error(14)}
-    assert notes_of(tallies) == tuple(notes(finals, with_error(7)))
-    assert notes_of(()) == ()

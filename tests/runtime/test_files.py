@@ -72,12 +72,6 @@ def test_what_is_no_file_is_not_replaced(make, kind, link, tmp_path, monkeypatch
     assert os.path.samestat((tmp_path / "taken").stat(), before)
 
 
-@pytest.mark.parametrize("path", ["/dev/null", "/dev/full", "/", ".", ".."])
-def test_devices_and_folders_are_known(path):
-    with pytest.raises(OSError, match=r"is a (device|folder)"):
-        files.check_output(Path(path))
-
-
 @pytest.mark.parametrize(("name", "error"), [("a\0b", "null"), (245 * "a", "too long")])
 def test_a_name_that_no_file_can_have_or_none_of_a_run_s_own_is_an_os_error(name, error, tmp_path):
     with pytest.raises(OSError, match=error):
@@ -134,8 +128,3 @@ def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
     with files.claimed_file(tmp_path / "new" / "deep" / "file"):
         (tmp_path / "new" / "other").touch()
     assert names(tmp_path / "new") == ["other"]
-
-
-def test_one_path_is_a_list_of_one():
-    assert files.listed("out.rrd") == ["out.rrd"]
-    assert files.listed(("a.rrd", Path("b.rrd"))) == ["a.rrd", Path("b.rrd")]

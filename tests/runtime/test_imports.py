@@ -97,10 +97,6 @@ def test_who_needs_all_of_the_library_waits_until_the_module_is_loaded():
     )
 
 
-def test_two_threads_that_need_the_module_both_get_all_of_it():
-    run(f"{LIBSVM}{TOGETHER}\nassert libsvm().fit\nalone.join()")
-
-
 PACKAGES = (
     "roadeval",
     *(f"roadeval.{room}" for room in ("config", "logs", "recording", "training")),
@@ -120,13 +116,6 @@ def test_every_public_name_is_there_and_no_other(name):
 def test_a_package_by_itself_imports_no_library(name):
     code = f"import sys, {name}; print({{'numpy', 'pydantic', 'rerun'}} & {{*sys.modules}} or '')"
     assert not run(code)
-
-
-def test_results_are_compared_without_rerun_and_without_matplotlib():
-    libraries = "{'rerun', 'matplotlib'}"
-    assert not run(
-        f"import sys, roadeval.jobs.results.compare; print({libraries} & {{*sys.modules}} or '')"
-    )
 
 
 LEFT_OUT = "import sys; from roadeval.runtime.imports import leave_out_pandas; leave_out_pandas()\n"
@@ -154,8 +143,3 @@ print(pd.read_parquet({str(tmp_path / "a.parquet")!r}).equals(frame))
 print(pa.Table.from_pandas(frame).to_pandas().equals(frame))
 """
     assert run(LEFT_OUT + code).split() == ["True", "True"]
-
-
-def test_pandas_that_is_there_already_is_found():
-    code = 'import pyarrow as pa\nprint(pa.array(pd.Series([1.0, float("nan")])).null_count)'
-    assert run(f"import pandas as pd; {LEFT_OUT}{code}") == "1"

@@ -26,13 +26,6 @@ def test_a_fitted_variant_finds_the_road_in_a_new_frame():
         assert wrong < 0.06, name
 
 
-def test_each_variant_learns_from_its_own_images():
-    model = fit(FRAMES, pipelines(), TrainingSettings())
-    filtered, unfiltered = model.parameters["filtered"], model.parameters["unfiltered"]
-    # The filter takes the verge for shadow: only the unfiltered machine ever saw green.
-    assert filtered["svm"].mean[1] != unfiltered["svm"].mean[1]
-
-
 def test_road_colour_is_the_mean_of_the_sampled_road_pixels():
     model = fit(FRAMES, pipelines(), TrainingSettings(pixels_per_class=10_000))
     road = np.concatenate([f.image[f.truth == 1] for f in FRAMES]).astype(float)
@@ -47,11 +40,6 @@ def test_training_twice_gives_the_same_model():
     machines = [m.parameters["filtered"]["svm"] for m in (first, second)]
     np.testing.assert_array_equal(machines[0].vectors, machines[1].vectors)
     np.testing.assert_array_equal(machines[0].weights, machines[1].weights)
-
-
-def test_no_frames_are_an_error():
-    with pytest.raises(TrainingError, match="no frame to train on"):
-        fit([], pipelines(), TrainingSettings())
 
 
 def test_one_class_alone_is_an_error_that_names_the_frames():
@@ -70,11 +58,6 @@ def test_a_collapsed_classifier_is_reported():
     assert any("x: svm has collapsed: it calls 0.0% of its own" in w for w in warnings)
 
 
-def test_a_sound_classifier_is_not_reported():
-    only = {"unfiltered": pipelines()["unfiltered"]}
-    assert fit(FRAMES, only, TrainingSettings()).warnings == ()
-
-
 # --- Which pixels train ---------------------------------------------------------------------------
 
 HALF = np.repeat([[1], [0]], [4, 4], axis=0).repeat(10, axis=1).astype(np.uint8)
@@ -91,11 +74,6 @@ def test_both_classes_are_drawn_equally_from_every_frame():
 def test_drawn_pixels_bear_their_label():
     pixels = sample([HALF], TrainingSettings(pixels_per_class=7))
     np.testing.assert_array_equal(HALF[pixels.row, pixels.column] == 1, pixels.road)
-
-
-def test_no_pixel_is_drawn_twice():
-    pixels = sample([HALF], TrainingSettings(pixels_per_class=40))
-    assert len(set(zip(pixels.row.tolist(), pixels.column.tolist(), strict=True))) == 80
 
 
 def test_ignored_pixels_are_never_drawn():
@@ -123,10 +101,6 @@ def test_a_frame_without_road_still_gives_its_other_pixels():
 def test_the_sample_is_bounded_however_many_frames_there_are(frames):
     pixels = sample([HALF] * frames, TrainingSettings(max_pixels=40))
     assert len(pixels.road) <= 40
-
-
-def test_one_class_alone_gives_no_sample():
-    assert len(sample([np.ones((4, 4), np.uint8)], TrainingSettings()).road) == 0
 
 
 def test_the_seed_settles_the_draw():
@@ -173,13 +147,6 @@ def test_the_further_one_may_reach_the_more_is_road():
     assert found[1] > 0.99
 
 
-def test_nothing_above_the_horizon_is_road():
-    grey = np.full((40, 60, 3), 120, np.uint8)
-    truth = patch_truth(grey, TrainingSettings(horizon=0.4))
-    assert (truth[:16] == NON_ROAD).all()
-    assert (truth[16:] == ROAD).all()
-
-
 @pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])
 def test_the_patch_is_road_whatever_it_shows(shape):
     image = np.random.default_rng(0).integers(0, 256, (*shape, 3), dtype=np.uint8)
@@ -189,11 +156,6 @@ def test_the_patch_is_road_whatever_it_shows(shape):
 
 
 # --- What cannot be asked of a training -----------------------------------------------------------
-
-
-def test_the_settings_of_each_seed_are_those_of_one_training():
-    each = list(TrainingSettings(seed=2, seeds=3, frames=4).by_seed())
-    assert each == [TrainingSettings(seed=seed, frames=4) for seed in (2, 3, 4)]
 
 
 @pytest.mark.parametrize(
@@ -207,8 +169,3 @@ def test_the_settings_of_each_seed_are_those_of_one_training():
 def test_seeds_that_cannot_be_are_refused(given, said):
     with pytest.raises(ConfigError, match=said):
         configure({"training": given})
-
-
-def test_a_model_file_may_be_used_and_a_single_seed_be_the_last():
-    assert TrainingSettings(model="city.model").seeds == 1
-    assert TrainingSettings(seed=1_000_000_000).seeds == 1

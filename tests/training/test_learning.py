@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from weakref import WeakSet
 
 import pytest
 
@@ -115,36 +114,6 @@ def test_every_further_seed_trains_as_it_would_by_itself():
     assert means[0][0] != means[0][1] != means[0][2]
 
 
-def test_what_a_further_seed_warns_of_is_told_with_it(monkeypatch):
-    def collapsing(frames, pipelines, settings, **given):
-        told = ("filtered: svm has collapsed",) if settings.seed != 4 else ()
-        return replace(made(frames, pipelines, settings, **given), warnings=told)
-
-    made = learning.fit
-    monkeypatch.setattr(learning, "fit", collapsing)
-    (first, *others), _ = with_seeds(log(4), frames=2, seed=3, seeds=3)
-    own, of_5 = "filtered: svm has collapsed", "seed 5: filtered: svm has collapsed"
-    assert first.warnings == (own, of_5)
-    assert len(others) == 2
-
-
-def test_frames_along_a_drive_are_not_held_before_some_are_chosen():
-    alive, most, asked = WeakSet(), [], []
-
-    def frames(only=None):
-        asked.append(only)
-        for number in range(40) if only is None else sorted(only):
-            each = Logged(frame(number))
-            alive.add(each)
-            most.append(len(alive))
-            yield each
-
-    wanted = TrainingSettings(frames=4, placement="spread")
-    from_log(frames, PIPELINES, wanted, lambda done: None, labelled=True)
-    assert asked == [None, {0, 10, 20, 30}]
-    assert max(most) <= 3
-
-
 def test_frames_right_after_training_can_be_left_out():
     frames = log(8)
     _, schedule = learn(frames, frames=2, gap=3)
@@ -157,13 +126,6 @@ def test_a_frame_that_cannot_be_decoded_is_replaced_by_the_next():
     model, schedule = learn(frames, frames=2)
     assert model.digests == {frames[0].frame.digest(), frames[2].frame.digest()}
     assert schedule.first == 3
-
-
-def test_without_truth_the_first_frames_train():
-    frames = log(5, unlabelled=tuple(range(5)))
-    model, schedule = learn(frames, labelled=False, frames=2)
-    assert model.source == "patch"
-    assert roles(frames, schedule) == "ttuuu"
 
 
 def test_where_the_truth_labels_nothing_in_the_range_the_first_frames_train():
@@ -213,23 +175,6 @@ def test_training_frames_are_spread_over_a_drive():
     assert chosen == [1, 5, 10, 15]
 
 
-def test_training_frames_reach_the_end_of_a_drive_hardly_longer_than_their_number():
-    chosen = [f.number for f in spread(lambda: log(19), 10, labelled=True)]
-    assert len(chosen) == 10
-    assert chosen[-1] >= 17
-
-
-def test_a_short_drive_gives_what_it_has():
-    assert len(list(spread(lambda: log(3), 10, labelled=True))) == 3
-
-
-def test_all_frames_are_spread_where_the_truth_is_not_asked_for_or_there_is_none():
-    half = log(20, unlabelled=tuple(range(10)))
-    assert [f.number for f in spread(lambda: half, 4, labelled=False)] == [0, 5, 10, 15]
-    bare = log(20, unlabelled=tuple(range(20)))
-    assert [f.number for f in spread(lambda: bare, 4, labelled=True)] == [0, 5, 10, 15]
-
-
 LABELLED = [frame(n) for n in range(2)]
 BARE = [frame(n, labelled=False) for n in range(2, 4)]
 
@@ -243,11 +188,6 @@ def test_drives_without_truth_train_by_the_patch_and_this_is_said():
     model = of_drives("auto", a=BARE)
     assert model.source == "patch"
     assert "no drive has road truth in the range: the model learnt from" in model.warnings[0]
-
-
-def test_who_asks_for_the_patch_gets_it_without_a_word():
-    model = of_drives("patch", a=BARE, b=LABELLED)
-    assert (model.source, model.warnings) == ("patch", ())
 
 
 @pytest.mark.parametrize(
@@ -321,11 +261,6 @@ def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
         TrainingError, match=r"no stage of it can learn further \(similarity, svm\)"
     ):
         adapt(log(4), path, PIPELINES, frames=2)
-
-
-def test_adapting_needs_a_model():
-    with pytest.raises(ValueError, match=r"training.adapt. needs .training.model."):
-        TrainingSettings(adapt=True)
 
 
 def test_where_no_image_can_be_decoded_the_first_reason_is_named():

@@ -59,11 +59,6 @@ def test_other_settings_are_refused_by_name(path):
         load_model(path).require("filtered", pipeline, path)
 
 
-def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
-    pipeline = configure({"post": {"element": 9}}).pipeline
-    load_model(path).require("filtered", pipeline, path)
-
-
 @pytest.mark.parametrize(
     ("name", "stage", "setting"),
     [
@@ -175,11 +170,6 @@ def test_a_stage_that_learns_nothing_has_no_arrays(model, tmp_path):
         load_model(path)
 
 
-def test_a_folder_that_is_missing_is_made(model, tmp_path):
-    save_model(model, tmp_path / "new" / "city.model")
-    assert load_model(tmp_path / "new" / "city.model").digests == model.digests
-
-
 @pytest.mark.parametrize("end", [KeyboardInterrupt, MemoryError])
 def test_whatever_ends_the_writing_leaves_no_file(model, tmp_path, monkeypatch, end):
     def torn(file, **given):
@@ -200,16 +190,6 @@ def test_an_interrupted_writing_leaves_the_model_that_was_there(model, path, mon
     assert path.read_bytes() == before
 
 
-def test_a_file_in_the_place_of_a_folder_is_one_line(model, path):
-    with pytest.raises(RoadevalError, match="cannot write the model"):
-        save_model(model, path / "city.model")
-
-
-def test_a_folder_is_no_model(tmp_path):
-    with pytest.raises(RoadevalError, match="cannot read the model: is a folder"):
-        load_model(tmp_path)
-
-
 # --- What a stage has learnt as named arrays, and back --------------------------------------------
 
 
@@ -227,13 +207,6 @@ class Lines:
 
 
 LINE = Line(np.array([1.0, 2.0]), 0.5)
-
-
-def test_parts_have_the_name_of_their_field_before_theirs():
-    assert arrays_of(Lines(LINE, 1)).keys() == {"upper/slope", "upper/start", "count"}
-    both = arrays_of(Lines(LINE, 2, Line(np.array([3.0]), 7.0)))
-    assert both["lower/slope"].tolist() == [3]
-    assert both["lower/start"] == 7
 
 
 @pytest.mark.parametrize("lower", [None, Line(np.array([3.0]), 7.0)])

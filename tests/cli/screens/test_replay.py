@@ -1,7 +1,6 @@
 """What a replay came to, on a screen of 80 columns."""
 
 import io
-import math
 import re
 from pathlib import Path
 
@@ -58,33 +57,6 @@ def screen(results, folder=Path("reports/drive"), recording=None):
     return out.file.getvalue()
 
 
-def lines(results):
-    """The lines of the screen, with single spaces."""
-    return [" ".join(line.split()) for line in screen(results).splitlines()]
-
-
-def test_an_undefined_rate_is_a_dash():
-    totals = {"filtered": {"post": total(math.nan)}, "unfiltered": {"post": total(0.3)}}
-    assert "filtered post 91 - 50.00 50.00 50.00 - 60.00" in lines(summary(totals=totals))
-
-
-def test_a_difference_that_does_not_stand_bears_no_mark():
-    unsure = {"filtered": by_rate(difference(0.0065, -0.001, 0.012, 0.08))}
-    shown = lines(summary(against_blind=unsure))
-    assert "filtered - blind +0.65 -0.10 to +1.20 +0.10 -0.20" in shown
-    assert "significant after Holm's correction for the 2 differences of ERR" in " ".join(shown)
-
-
-def test_the_mark_is_explained_only_where_there_is_one():
-    unsure = {"filtered": by_rate(difference(0.0065, -0.001, 0.012, 0.08))}
-    assert "Holm" not in screen(summary(difference={}, against_blind=unsure))
-
-
-def test_a_difference_without_an_interval_has_none():
-    shown = lines(summary(difference={"post": by_rate(difference(-0.002))}))
-    assert "filtered - unfiltered -0.20 none given +0.10 -0.20" in shown
-
-
 @pytest.mark.parametrize(
     ("labelled", "why"), [(0, "has road truth"), (10, "was trained on or left out")]
 )
@@ -124,17 +96,6 @@ def test_a_log_without_labels_is_told_how_to_get_them(tmp_path):
     assert re.search(r"\nnext       \S*roadeval replay street.mcap --truth LABELS\n", shown)
 
 
-@pytest.mark.parametrize(
-    ("length", "words"), [(0, "0.1 kB"), (2_340, "2.3 kB"), (34_200_000, "34.2 MB")]
-)
-def test_sizes_are_for_people(length, words, tmp_path):
-    file = tmp_path / "out.rrd"
-    file.touch()
-    with file.open("r+b") as opened:
-        opened.truncate(length)
-    assert outcome.size(file) == words
-
-
 # --- What other seeds come to, on a screen of 80 columns ------------------------------------------
 
 
@@ -142,27 +103,3 @@ def rates(*errors):
     """A final mask's rates with each seed; all but ERR are undefined."""
     names = ("ACC", "ERR", "FNR", "FPR", "pooled_ERR")
     return {"post": dict.fromkeys(names, [None] * len(errors)) | {"ERR": [*errors]}}
-
-
-SEEDS = {
-    "seeds": [0, 1, 2],
-    "totals": {"filtered": rates(0.0912, 0.1, 0.12), "unfiltered": rates(0.0847, 0.08, 0.083)},
-    "difference": {"post": {"ERR": [0.0065, 0.02, 0.037]}},
-}
-SURE = {"post": by_rate(difference(0.0065, 0.001, 0.012, 0.02))}
-
-
-def test_every_variant_s_final_mask_has_a_row_with_the_middle_and_both_ends():
-    shown = screen(summary(seeds=SEEDS))
-    assert "Percent, with seeds 0 to 2 of the training: the middle" in shown
-    (filtered,) = (line for line in lines(summary(seeds=SEEDS)) if "10.00 (9.12" in line)
-    assert filtered.split()[:5] == ["filtered", "10.00", "(9.12", "to", "12.00)"]
-    assert "unfiltered 8.30 (8.00 to 8.47)" in " ".join(shown.split())
-    assert "filtered - unfiltered, pp +2.00 (+0.65 to +3.70)" in " ".join(shown.split())
-    assert "All else is of seed 0." in " ".join(shown.split())
-    assert shown.isascii() or not (set(shown) - set("─")) & set("–−")  # noqa: RUF001
-    assert max(map(len, shown.partition("\nnext ")[0].splitlines())) <= 80
-
-
-def test_without_further_seeds_not_a_word_is_said_of_them():
-    assert "seed" not in screen(summary(difference=SURE))

@@ -18,13 +18,6 @@ def printed(width, row=ROW):
     return [line.split() for line in out.file.getvalue().splitlines() if line and "─" not in line]
 
 
-def test_all_columns_stand_in_one_table_where_there_is_room():
-    assert printed(43) == [
-        ["variant", "stage", "ERR", "%", "FPR", "%", "pooled", "ERR", "%"],
-        ["filtered", "post", "1.00", "2.00", "3.00"],
-    ]
-
-
 def test_columns_that_do_not_fit_stand_below_with_the_names_again():
     assert printed(42) == [
         ["variant", "stage", "ERR", "%", "FPR", "%"],
@@ -42,11 +35,6 @@ def test_no_column_of_numbers_is_left_alone_below_many():
     assert heads == [titles[:5], ["drive", *titles[5:]]]
 
 
-def test_a_long_name_is_folded_rather_than_parting_the_numbers():
-    row = ["a-network-with-a-name-that-is-longer-than-others", *ROW[1:]]
-    assert ["variant", "stage", "ERR", "%", "FPR", "%", "pooled", "ERR", "%"] in printed(60, row)
-
-
 def test_numbers_are_ascii_alone():
     out = Console(file=io.StringIO(), width=80)
     rows = [["a", f"{MINUS}2.00 to {MINUS}1.00 *"], ["b", DASH]]
@@ -55,11 +43,3 @@ def test_numbers_are_ascii_alone():
         ["a", "-2.00", "to", "-1.00", "*"],
         ["b", "-"],
     ]
-
-
-def test_heads_and_captions_are_ascii_as_numbers_are():
-    out = Console(file=io.StringIO(), width=60)
-    titles = ["mask", f"0{DASH}10 m"]
-    show_table(Table(titles, [["a", "1.0"]], caption=f"0{DASH}10 m ahead"), out)
-    assert "0-10 m" in out.file.getvalue()
-    assert DASH not in out.file.getvalue()

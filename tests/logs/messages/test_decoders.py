@@ -57,12 +57,6 @@ def test_cdr_is_read_whatever_language_its_schema_is_in(encoding: str, text: str
     assert (picture.encoding, picture.step, bytes(picture.data)) == ("mono8", 2, b"\x07\x07")
 
 
-@pytest.mark.parametrize("data", [RAW, PACKED, zstandard.ZstdCompressor().compress(RAW)])
-def test_the_stamp_alone_is_read_without_the_rest(data: bytes) -> None:
-    name = COMPRESSED_NAME if data is PACKED else IMAGE_NAME
-    assert decoder_for(channel("cdr"), schema(name, "")).stamp(data) == STAMP
-
-
 def test_a_schema_that_makes_no_sense_leaves_its_name() -> None:
     picture = read("cdr", schema(COMPRESSED_NAME, "ros2msg", "uint3 nonsense"), PACKED)
     assert isinstance(picture, CompressedPicture)
@@ -119,13 +113,6 @@ def test_fields_of_another_type_than_an_image_has_are_refused() -> None:
         message = {"format": name, "data": "ZmlsZQ=="}
         with pytest.raises(BadMessage, match="lacks the fields of an image"):
             read("json", None, json.dumps(message).encode())
-
-
-def test_json_may_hold_its_bytes_as_numbers_and_no_stamp() -> None:
-    message = {"width": 2, "height": 1, "encoding": "mono8", "step": 2, "data": [7, 8]}
-    picture = read("json", None, json.dumps(message).encode())
-    assert isinstance(picture, RawPicture)
-    assert (picture.stamp_ns, bytes(picture.data)) == (0, b"\x07\x08")
 
 
 @pytest.mark.parametrize(

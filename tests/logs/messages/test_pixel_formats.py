@@ -25,12 +25,6 @@ def row(data: bytes, encoding: str, width: int = 1, **more: Any) -> list[list[in
     return pixels
 
 
-def test_sixteen_bits_keep_the_upper_half() -> None:
-    assert row(b"\x34\x12", "mono16") == [[0x12] * 3]
-    assert row(b"\x12\x34", "mono16", big_endian=True) == [[0x12] * 3]
-    assert row(b"\x00\x01\x00\x02\x00\x03", "rgb16") == [[1, 2, 3]]
-
-
 def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
     data = np.array([0, 0.5, 1, 2, np.nan], np.float32).tobytes()
     assert [r for r, _, _ in row(data, "32FC1", 5)] == [0, 128, 255, 255, 0]
@@ -50,10 +44,6 @@ def test_an_image_is_an_array_of_its_own(encoding: str, pixel: int, padding: int
 def test_padding_between_rows_is_skipped() -> None:
     padded = picture(b"\x01\x02xx\x03\x04xx", "mono8", 2, 2, step=4)
     assert to_rgb(padded, LIMITS)[..., 0].tolist() == [[1, 2], [3, 4]]
-
-
-def test_the_last_row_may_lack_its_padding() -> None:
-    assert to_rgb(picture(b"\x01\x02xx\x03\x04", "mono8", 2, 2, step=4), LIMITS)[1, 1, 0] == 4
 
 
 def test_labels_keep_sixteen_bits() -> None:

@@ -37,19 +37,10 @@ def test_labels_and_masks_are_no_cameras() -> None:
     assert choose_image(topics, None)[0].name == "/cam"
 
 
-def test_a_grey_camera_is_a_camera() -> None:
-    assert choose_image([label("/cam/mono"), label("/labels")], None)[0].name == "/cam/mono"
-
-
 def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
     depth = TopicInfo("/cam/depth", "Image", "cdr", TopicKind.IMAGE, 5, format="16UC1", channels=1)
     assert choose_image([camera("/cam/rgb"), depth], None)[0].name == "/cam/rgb"
     assert choose_image([depth], None)[0].name == "/cam/depth"
-
-
-def test_two_cameras_are_listed_with_the_setting() -> None:
-    with pytest.raises(LogError, match=r"/left/image, /right/image; .*`topics.image`"):
-        choose_image([camera("/left/image"), camera("/right/image")], None)
 
 
 def test_an_unknown_topic_lists_the_valid_ones() -> None:
@@ -60,11 +51,6 @@ def test_an_unknown_topic_lists_the_valid_ones() -> None:
         choose_image(topics, "/lef")
     with pytest.raises(LogError, match=r"/imu: carries no images"):
         choose_image(topics, "/imu")
-
-
-def test_a_log_without_images_lists_what_it_has() -> None:
-    with pytest.raises(LogError, match=r"no image topic; the log has: /imu \(sensor_msgs/msg/Imu"):
-        choose_image([other("/imu")], None)
 
 
 @pytest.mark.parametrize(
@@ -82,29 +68,15 @@ def test_other_masks_are_no_road_truth(name: str) -> None:
     assert truth_of(label(name)) is None
 
 
-def test_a_coloured_picture_of_labels_is_no_truth() -> None:
-    assert truth_of(camera("/labels/overlay")) is None
-
-
 def test_the_labels_of_the_chosen_camera_are_taken() -> None:
     labels = (label("/front/labels"), label("/rear/labels"))
     assert truth_of(*labels, image="/rear/image") == "/rear/labels"
-
-
-def test_two_label_topics_are_listed_with_the_setting() -> None:
-    with pytest.raises(LogError, match=r"/a/labels, /b/labels; .*`topics.truth`"):
-        truth_of(label("/a/labels"), label("/b/labels"))
 
 
 def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
     topics = [camera("/cam"), label("/truth/road"), label("/truth/shadow")]
     assert choose_truth(topics, topics[0], None, LabelSettings()).topic == topics[1]
     assert choose_shadow(topics, topics[0], None).topic == topics[2]
-
-
-def test_an_empty_name_takes_none() -> None:
-    topics = [camera("/cam"), label("/labels")]
-    assert choose_truth(topics, topics[0], "", LabelSettings()).topic is None
 
 
 def lossy(name: str) -> TopicInfo:

@@ -53,28 +53,11 @@ def test_another_cameras_truth_is_refused_by_its_frame_id(tmp_path: Path) -> Non
         truth(path, "/b/image")
 
 
-def test_another_cameras_truth_is_taken_where_it_is_named(tmp_path: Path) -> None:
-    path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/camera/front/labels": "front"})
-    assert truth(path, REAR, "/camera/front/labels") == "/camera/front/labels"
-    assert truth(path, REAR, "") is None
-
-
 def test_of_two_truths_the_cameras_own_is_taken(tmp_path: Path) -> None:
     cameras = {"/one": "cam1", "/two": "cam2"}
     path = rig(tmp_path, cameras, {"/labels/a": "cam1", "/labels/b": "cam2"})
     assert truth(path, "/one") == "/labels/a"
     assert truth(path, "/two") == "/labels/b"
-
-
-def test_a_rig_is_told_that_its_truth_names_no_other_camera(tmp_path: Path) -> None:
-    path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/camera/front/labels": "front"})
-    reasons = " ".join(selected(path, FRONT).reasons)
-    assert "no other camera's by path and frame_id" in reasons
-
-
-def test_a_truth_without_a_camera_of_its_own_belongs_to_each(tmp_path: Path) -> None:
-    path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/labels/semantic": ""})
-    assert truth(path, FRONT) == truth(path, REAR) == "/labels/semantic"
 
 
 @pytest.mark.parametrize(

@@ -104,15 +104,6 @@ def test_numbers_of_no_frame_are_refused_with_three_of_them(drive, tmp_path):
     assert message.endswith("with `truth.images`")
 
 
-def test_stamps_of_no_frame_are_refused_with_three_of_each(drive, tmp_path):
-    stamps = [START - 10**12 + number * STEP for number in range(FRAMES)]
-    message = refusal(drive, images(tmp_path / "truth", *(f"{stamp}.png" for stamp in stamps)))
-    for first in (stamps[0], START):
-        assert ", ".join(str(first + number * STEP) for number in range(3)) + ", ..." in message
-    assert "`topics.sync_tolerance_ms`" in message
-    assert "`truth.pair`" in message
-
-
 def test_names_of_no_image_are_refused_with_three_of_each(drive, tmp_path):
     named = images(tmp_path / "images", *(f"a{letter}.png" for letter in "uvwxyz"))
     path = images(tmp_path / "truth", *(f"b{letter}.png" for letter in "uvwx"))
@@ -382,13 +373,6 @@ def test_names_of_yolo_are_texts(tmp_path):
     nested = [f"l{n}: &l{n} [{', '.join([f'*l{n - 1}' if n else 'ha'] * 10)}]" for n in range(11)]
     (tmp_path / "data.yaml").write_text("\n".join([*nested, "names: {0: *l10, 1: road}"]))
     assert {*labels_in(tmp_path / "1.txt", SIZE).classes} == {"0", "road"}
-
-
-def test_a_class_may_be_called_by_a_number(drive, tmp_path):
-    path = written(tmp_path / "truth", "1.txt", "7 .1 .1 .5 .1 .5 .5")
-    run, summary = replay(drive, path, "--road-label", "7")
-    assert run.returncode == 0, run.stderr
-    assert summary["frames"]["evaluated"] == 1
 
 
 @pytest.mark.parametrize(

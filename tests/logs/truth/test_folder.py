@@ -45,10 +45,6 @@ def test_the_last_number_of_a_name_is_its_frame(tmp_path):
     assert list(keys(path)[1]) == list(expected)
 
 
-def test_numbers_may_begin_elsewhere(tmp_path):
-    assert keys(folder(tmp_path, "5.png", "6.png"), first=5)[1] == {"5.png": 0, "6.png": 1}
-
-
 def test_names_that_are_times_are_stamps(tmp_path):
     path = folder(tmp_path, "1700000000.25.png", "1700000000123.png", "1700000000500000001_gt.png")
     assert keys(path) == (
@@ -59,12 +55,6 @@ def test_names_that_are_times_are_stamps(tmp_path):
             "1700000000500000001_gt.png": 1_700_000_000_500_000_001,
         },
     )
-
-
-def test_ten_digits_are_a_number_unless_told_otherwise(tmp_path):
-    path = folder(tmp_path, "0000000012.png")
-    assert keys(path) == ("number", {"0000000012.png": 12})
-    assert keys(path, pair="stamp")[1] == {"0000000012.png": 12 * 10**9}
 
 
 def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
@@ -134,11 +124,6 @@ def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same(tmp_pa
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
 
 
-def test_a_confidence_at_the_threshold_is_road():
-    codes = np.array([[50, 51, 52]], np.uint16) * 257
-    assert Confidence(0.2).road(codes).tolist() == [[0, 1, 1]]
-
-
 # --- NPY files as pictures ------------------------------------------------------------------------
 
 LIMITS = Limits(1000)
@@ -155,11 +140,6 @@ def file_of(array, **options):
 def test_whole_numbers_keep_their_values(dtype, order):
     array = np.array([[0, 1, 1], [1, 0, 0]], dtype, order=order)
     np.testing.assert_array_equal(to_labels(npy_picture(file_of(array), LIMITS), LIMITS), array)
-
-
-def test_a_number_of_sixteen_bits_keeps_them():
-    array = np.array([[0, 60_000]])
-    assert to_labels(npy_picture(file_of(array), LIMITS), LIMITS).tolist() == [[0, 60_000]]
 
 
 @pytest.mark.parametrize(

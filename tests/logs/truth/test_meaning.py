@@ -57,11 +57,6 @@ def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
     assert truth([0, 3, 4, 11, 255], labels) == [0, 1, 1, 255, 0]
 
 
-def test_a_sixteen_bit_value_is_understood() -> None:
-    table = understand(LabelSettings(road=(300,)), [0, 300], "/labels")
-    assert table.of_values(np.array([[0, 300, 44]], np.uint16)).tolist() == [[0, 1, 0]]
-
-
 @pytest.mark.parametrize(
     ("labels", "setting"),
     [
@@ -117,12 +112,6 @@ def test_colours_are_asked_for_with_those_seen() -> None:
         seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels", LIMITS)
 
 
-def test_a_colour_that_never_occurs_is_refused() -> None:
-    labels = LabelSettings(road_colors=(LANE,))
-    with pytest.raises(LogError, match=r"`labels\.road_colors` 255,0,0 does not occur in /labels"):
-        understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels", LIMITS), "/labels")
-
-
 def test_values_and_colours_cannot_be_mixed() -> None:
     with pytest.raises(ValueError, match="as values or as colours"):
         LabelSettings(road=(1,), road_colors=(ROAD,))
@@ -134,15 +123,6 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     labels = LabelSettings(road_colors=(ROAD,))
     table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[0, 1, 0]]
-
-
-def test_a_palette_of_greys_is_a_grey_image() -> None:
-    picture = palette_png([[0, 1, 2]], [0, 0, 0, 128, 128, 128, 255, 255, 255])
-    assert to_labels(picture, LIMITS).tolist() == [[0, 128, 255]]
-
-
-def test_three_equal_channels_are_one() -> None:
-    assert to_labels(colors([(0, 0, 0), (3, 3, 3)]), LIMITS).tolist() == [[0, 3]]
 
 
 @pytest.mark.parametrize("labels", [LabelSettings(), LabelSettings(road=(255,))])

@@ -47,14 +47,6 @@ def test_foxgloves_own_decoder_reads_it(tmp_path: Path) -> None:
     ]
 
 
-def test_nothing_appears_until_it_is_complete(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    with LogWriter(path) as log:
-        log.image("/camera", 1, jpeg(grey(1)), "jpeg")
-        assert not path.exists()
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_nothing_is_left_of_a_log_that_failed(tmp_path: Path) -> None:
     log = LogWriter(tmp_path / "a.mcap")
     log.image("/camera", 1, jpeg(grey(1)), "jpeg")
@@ -83,10 +75,6 @@ def test_nothing_is_left_of_a_log_that_is_stopped_while_it_is_completed(
     with pytest.raises(stop):
         write(tmp_path / "a.mcap")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_its_folder_is_made(tmp_path: Path) -> None:
-    assert write(tmp_path / "new" / "deep" / "a.mcap").exists()
 
 
 def test_a_folder_in_its_place_is_told_at_once(tmp_path: Path) -> None:

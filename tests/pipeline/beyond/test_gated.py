@@ -267,14 +267,6 @@ def test_a_wide_image_is_judged_as_the_reduced_one_and_compensated_at_its_own_si
     np.testing.assert_allclose(output.image[225:300, 165:315], 120, atol=1)
 
 
-def test_layers_are_the_ones_announced():
-    output, _ = run(road(ROAD * SHADE))
-    assert tuple(layer.spec for layer in output.layers) == gated.STAGE.layers
-    for layer in output.layers:
-        assert layer.array.dtype == {"scalar": np.float32}.get(layer.spec.kind, np.uint8)
-        assert layer.array.shape[:2] == (HEIGHT, WIDTH)
-
-
 def test_every_pixel_is_in_one_region():
     output, layers = run(road(ROAD * SHADE))
     np.testing.assert_array_equal(sum(m.pixels() for m in output.regions.values()), 1)

@@ -181,13 +181,6 @@ def test_trees_that_hear_nothing_say_so():
         trees.bind(SMALL, learnt)
 
 
-def test_samples_keep_their_order():
-    images = tuple(np.full((24, 32, 3), grey, np.uint8) for grey in (10, 200))
-    sample = TrainingSet(images, *np.array([[1, 0, 1], [0, 1, 2], [0, 1, 2]]), np.ones(3, bool))
-    straight, _ = at_samples(sample, lambda seen, _: (None, np.moveaxis(seen, 2, 0)))
-    assert straight[:, 0].tolist() == [200, 10, 200]
-
-
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
@@ -211,11 +204,6 @@ def test_trees_for_other_features_are_a_misfit(learnt):
     known = len(names_of(SMALL.features))
     with pytest.raises(MisfitError, match=f"grown on {known} features .* computes 3;"):
         trees.bind(replace(SMALL, features=("place",)), learnt)
-
-
-def test_trees_for_fewer_features_are_a_misfit(sample):
-    with pytest.raises(MisfitError, match="grown on 3 features"):
-        trees.bind(SMALL, trees.fit(sample, replace(SMALL, features=("place",))))
 
 
 @pytest.mark.parametrize("names", [("nose",), ("place", "place"), ()])

@@ -8,11 +8,9 @@ import pytest
 from roadeval.jobs.results.report import write_report
 from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import Figure, Heading, ImageGrid, Table, Text
-from roadeval.report.document import document
-from roadeval.report.pdf.typeset import pdf
 from roadeval.report.sections import drive, drives, provenance, summary
 from roadeval.results.fleet import FleetFolder
-from tests.report.making import column, links_within, opened, plain_rows, reader, text, the
+from tests.report.making import column, opened, plain_rows, reader, text, the
 from tests.results.fleet import making
 from tests.results.fleet.making import fleet_of
 
@@ -173,10 +171,3 @@ def test_two_drives_of_one_name_are_told_apart(folder, tmp_path):
     (copy / "fleet.json").write_text(replace(found.facts, drives=drives_).text())
     names = (FleetFolder(copy)).names
     assert len(set(names.values())) == 12
-
-
-def test_its_contents_lead_to_its_sections(tmp_path):
-    found = FleetFolder(fleet_of(tmp_path / "f", 12, pictures=2))
-    made = document(found)
-    parts = [each for each in made.blocks if isinstance(each, Heading) and each.level == 1]
-    assert links_within(pdf(made)) == len(parts) > 4

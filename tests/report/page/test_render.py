@@ -180,7 +180,3 @@ def test_a_picture_inside_a_page_says_of_which_kind_it_is(content, media):
     address = f"data:{media};base64,{encoded}"
     made = Reader(rendered(ImageGrid([("It.", ImageFile(content))], 1)))
     assert [own["src"] for own in made.all("img") if "src" in own] == [address]
-
-
-def test_equal_documents_give_equal_bytes():
-    assert rendered(*every_block("word")) == rendered(*every_block("word"))

@@ -17,11 +17,10 @@ from roadeval.report.blocks import (
     ImageFile,
     ImageGrid,
     Table,
-    TableOfContents,
     Text,
     TwoColumns,
 )
-from roadeval.report.chart import Chart, ChartKind, Level, Look, Series, looks
+from roadeval.report.chart import Chart, ChartKind, Level, Series, looks
 from roadeval.report.pdf.typeset import ReportError, pdf
 from tests.report.making import a_document, reader, text
 
@@ -68,22 +67,6 @@ def test_every_kind_of_chart_is_drawn_with_its_words(name):
     assert words.count(title) == 3
 
 
-def test_names_of_stages_are_turned_where_they_have_no_room():
-    stages = ["similarity_as_printed", "svm_as_printed", "post_as_printed"]
-    series = [Series("a", Look("#0072B2"), [0, 1, 2], [1, 2, 3])]
-    for names, turned in ((["similarity", "svm", "post"], False), (stages, True)):
-        chart = Chart("ERR", ChartKind.LINES, series, names=names)
-        slopes = {}
-
-        def visit(found, matrix, *_, slopes=slopes):
-            if found.strip():
-                slopes[found.strip()] = abs(matrix[1]) > 0.1
-
-        page = reader(pdf(a_document(Figure([chart] * 3, "")))).pages[0]
-        page.extract_text(visitor_text=visit)
-        assert any(slopes.values()) is turned
-
-
 def test_a_long_legend_takes_lines_and_stays_on_the_page():
     names = [f"{LONG}{place}" for place in range(6)]
     series = [Series(name, look, [0, 1], [1, 2]) for name, look in looks(names).items()]
@@ -122,19 +105,6 @@ def test_a_title_that_looks_like_markup_is_the_documents_title():
     assert reader(content).metadata.title == HOSTILE
 
 
-def test_the_same_document_gives_the_same_bytes():
-    document = a_document(Heading("one"), TableOfContents(), Figure([a_chart("two")], ""))
-    assert pdf(document) == pdf(document)
-
-
-def test_headings_are_the_outline_and_the_table_of_contents():
-    content = pdf(a_document(TableOfContents(), Heading("First"), Heading("Second")))
-    assert [entry["/Title"] for entry in reader(content).outline] == ["1 First", "2 Second"]
-    contents = reader(content).pages[0]
-    assert len(contents["/Annots"]) == 2
-    assert "1 / 1" in contents.extract_text()
-
-
 def test_what_a_page_hides_is_a_part_on_paper_or_is_left_out():
     hidden = [Details(f"about {on}", [Text(f"told {on}")], on_paper=on) for on in (True, False)]
     content = pdf(a_document(Heading("One"), *hidden))
@@ -171,14 +141,6 @@ def parts(element):
     for each in inner if isinstance(inner, list) else [inner]:
         if hasattr(each.get_object(), "keys") and "/S" in each.get_object():
             yield from parts(each)
-
-
-def test_every_font_is_embedded():
-    content = pdf(a_document(Heading("x"), Text("y"), Command("z"), Text("w", "note")))
-    fonts = reader(content).pages[0]["/Resources"]["/Font"].values()
-    kinds = [font.get_object()["/DescendantFonts"][0]["/FontDescriptor"] for font in fonts]
-    assert kinds
-    assert all({"/FontFile2", "/FontFile3"} & set(kind.get_object()) for kind in kinds)
 
 
 def test_a_table_keeps_its_rows_and_repeats_its_head_on_the_next_page():

@@ -1,14 +1,13 @@
 """The parts of a drive's report: what each says where numbers lack or cannot be sure."""
 
 import math
-from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from roadeval.data.words import DASH
 from roadeval.report.blocks import Figure, Table, Text
-from roadeval.report.sections.drive import filter_effect, over_drive, regions, thresholds
+from roadeval.report.sections.drive import filter_effect, regions, thresholds
 from tests.evaluation.making import rows_of
 from tests.report.making import (
     VARIANTS,
@@ -26,11 +25,6 @@ def texts(findings):
     return [block.text for block in filter_effect(findings) if isinstance(block, Text)]
 
 
-def table_of(findings):
-    table, *_ = (block for block in filter_effect(findings) if isinstance(block, Table))
-    return table
-
-
 def test_where_there_is_no_interval_the_reason_is_given():
     found = some_findings(difference={"post": by_rate(err=a_difference(-0.02))})
     assert any("No interval for ERR: 1200 frames are too few" in text for text in texts(found))
@@ -40,21 +34,6 @@ def test_where_err_is_undefined_nothing_is_said_about_frames():
     unknown = {"post": by_rate(err=a_difference(None))}
     *_, text = texts(some_findings(difference=unknown, filtered=pairs([math.nan], [0])))
     assert text.startswith("ERR is undefined on every frame")
-
-
-def test_an_unknown_number_of_effective_frames_is_a_dash():
-    unknown = by_rate(err=replace(a_difference(-0.02, -0.03, -0.01), effective=None))
-    assert plain_rows(table_of(some_findings(difference={"post": unknown})))[0][-1] == DASH
-
-
-# --- Over the drive -------------------------------------------------------------------------------
-
-
-def test_no_column_for_shorter_windows_where_there_are_none():
-    claims = {"filter_ERR": {"held": 2, "windows": 9, "short_held": 0, "short": 0}}
-    findings = some_findings(claims=claims)
-    table = the(Table, opened(over_drive(findings)))
-    assert table.columns == ["claim", "borne out by"]
 
 
 # --- Over thresholds ------------------------------------------------------------------------------
@@ -79,13 +58,6 @@ def findings(**quoted):
     )
 
 
-def test_what_is_quoted_stands_beside_the_mask_as_it_is():
-    (table,) = (block for block in opened(thresholds(findings())) if isinstance(block, Table))
-    assert plain_rows(table) == [
-        ["filtered", "post", "91.00", "93.00", "40.00", "75.00"],
-    ]
-
-
 def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
     (figure,) = (block for block in opened(thresholds(findings())) if isinstance(block, Figure))
     (recall,) = figure.charts
@@ -108,10 +80,6 @@ def test_what_is_undefined_is_a_dash():
     assert plain_rows(table)[0].count(DASH) == 3
 
 
-def test_without_a_probability_there_is_no_section():
-    assert list(thresholds(some_findings())) == []
-
-
 # --- Regions --------------------------------------------------------------------------------------
 
 
@@ -132,11 +100,6 @@ def charts(findings):
     return the(Figure, regions(findings)).charts
 
 
-def test_a_region_that_no_one_knows_is_shown_by_its_name():
-    findings = some_findings(regions=of_regions("boundary", "interior", "wet_asphalt"))
-    assert charts(findings)[0].names[-1] == "wet asphalt"
-
-
 def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near():
     beyond = {name: {"trimap": {"1": [0, 0], "8": [3, 12]}} for name in VARIANTS[:2]}
     findings = some_findings(regions=of_regions("boundary", "interior"), beyond=beyond)
@@ -145,10 +108,3 @@ def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near
     assert chart.names == ["1", "8"]
     assert [each.name for each in chart.series] == ["filtered", "unfiltered"]
     assert [*chart.series[0].points()] == [(1, 25)]
-
-
-def test_shadow_is_explained_where_it_is_a_region():
-    for names, told in ((("shadow", "boundary"), True), (("boundary", "interior"), False)):
-        blocks = regions(some_findings(regions=of_regions(*names)))
-        (note,) = (block.text for block in blocks if isinstance(block, Text))
-        assert ("took for shadow" in note) == told

@@ -2,13 +2,10 @@
 
 import math
 
-from roadeval.data.words import DASH
-from roadeval.report.blocks import BulletList, LinkList, Table
-from roadeval.report.findings import NotableFrame
-from roadeval.report.sections.summary import section, warnings
+from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import rates_table
 from roadeval.results.facts import TrainingFacts
-from tests.report.making import a_total, column, plain_rows, some_findings
+from tests.report.making import a_total, column, some_findings
 
 
 def bold(table, title):
@@ -22,35 +19,6 @@ def test_an_undefined_rate_is_never_the_best():
 
 
 ALONE = {"filtered": {"post": a_total(0.1)}}
-SEEDS = {
-    "seeds": [0, 1, 2],
-    "totals": {
-        name: {"post": {rate: [0.1, 0.3, 0.15] for rate in ("ERR", "FPR", "FNR", "ACC")}}
-        for name in ("filtered", "unfiltered")
-    },
-    "difference": {"post": {"ERR": [0.01, 0.02, 0.03]}},
-}
-
-
-def test_the_spread_over_seeds_stands_below_the_rates():
-    findings = some_findings()
-    assert len([block for block in section(findings) if isinstance(block, Table)]) == 1
-    blocks = list(section(some_findings(seeds=SEEDS)))
-    _, table = (block for block in blocks if isinstance(block, Table))
-    assert plain_rows(table) == [
-        ["filtered", *["15.00 (10.00 to 30.00)"] * 4],
-        ["unfiltered", *["15.00 (10.00 to 30.00)"] * 4],
-        ["filtered \N{MINUS SIGN} unfiltered, pp", "+2.00 (+1.00 to +3.00)", *[DASH] * 3],
-    ]
-
-
-def test_the_frames_are_a_column_only_where_they_differ():
-    findings = some_findings()
-    assert "means over 1,200 frames" in rates_table(findings.facts).caption
-    findings.totals["filtered"]["post"]["frames"] = 7
-    table = rates_table(findings.facts)
-    assert column(table, "frames") == ["7", "1,200", "1,200"]
-    assert "means over the evaluated frames" in table.caption
 
 
 def test_undefined_rates_are_told_and_how_often():
@@ -77,25 +45,3 @@ def test_a_drive_that_trained_itself_says_so():
     ]
     given = TrainingFacts("truth", model="city.model")
     assert not list(warnings(some_findings(totals=ALONE, training=given)))
-
-
-def test_below_the_verdict_are_the_worst_frame_and_the_command_that_opens_it():
-    rates = {"filtered": {"ERR": 0.312}}
-    frame = NotableFrame(80, 0, "filtered", rates)
-    found = some_findings(worst=[frame])
-    blocks = list(section(found))
-    links = [("Worst frame: 80, where filtered gets 31.2 % wrong", "#frame-80")]
-    assert blocks[2] == LinkList(links, "open frame 80")
-    unseen = some_findings(worst=[frame], inspect=None)
-    gone = [each for each in section(unseen) if isinstance(each, LinkList)]
-    assert gone == [LinkList(links)]
-
-
-def test_a_partial_recording_is_marked_before_the_verdict():
-    blocks = list(section(some_findings(complete=False)))
-    assert isinstance(blocks[1], BulletList)
-    assert blocks[1].tone == "warning"
-    assert "did not reach its end" in blocks[1].items[0]
-
-
-# --- Settings and versions: what all variants share is told once ----------------------------------
