@@ -45,11 +45,8 @@ class Metric:
     """What it counts, in plain words; empty where the title says it."""
     unit: str = "fraction"
     """Of the value in tables."""
-    mirrors: str | None = None
-    """The metric that says the same, as ``FNR`` for ``TPR = 1 - FNR``, and is shown in its stead.
-    """
-    shown: Shown | None = None
-    """Where people see it: everywhere by default, one that mirrors another in files alone."""
+    shown: Shown = Shown.EVERYWHERE
+    """Where people see it; one that mirrors another, as ``TPR = 1 - FNR``, in files alone."""
     tabled: bool = True
     """Whether it is a column of the tables. One that is not is computed of sums alone."""
 
@@ -57,13 +54,6 @@ class Metric:
     def in_words(self) -> str:
         """What it counts, or else its title."""
         return self.meaning or self.title
-
-    @property
-    def place(self) -> Shown:
-        """Where people see it."""
-        if self.shown is not None:
-            return self.shown
-        return Shown.EVERYWHERE if self.mirrors is None else Shown.IN_FILES
 
 
 def ratio(part: int, whole: int) -> float:

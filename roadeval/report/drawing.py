@@ -107,8 +107,6 @@ class Mark:
     low: float | None = None
     high: float | None = None
     """Ends of the interval, within the chart."""
-    cut: str = ""
-    """``left``, ``right`` or ``both``, where the interval reaches beyond the chart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,10 +229,8 @@ def _mark(chart: Chart, series: Series, place: int, values: Span) -> Mark | None
     if not (math.isfinite(low) and math.isfinite(high)):
         return Mark(series.name, series.look, middle, text)
     text += f" ({low:.2f} to {high:.2f})"
-    beyond = low < values.low, high > values.high
-    cut = {(True, False): "left", (False, True): "right", (True, True): "both"}.get(beyond, "")
     left, right = (min(max(values.percent(end), 0.0), 100.0) for end in (low, high))
-    return Mark(series.name, series.look, middle, text, left, right, cut)
+    return Mark(series.name, series.look, middle, text, left, right)
 
 
 def values(chart: Chart, drawing: Drawing) -> dict[str, Any]:

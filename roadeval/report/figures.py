@@ -223,13 +223,10 @@ def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
 
 def _subtitle(windows: Rows) -> str:
     stages = ", ".join(score.finals(windows).distinct("stage"))
-    sizes = score.each_window(windows)["frames"]
-    size, rest = sizes.max(), sizes[-1]
-    each = f"each point is the mean of {size} frames" if size > 1 else "each point is one frame"
-    if len(sizes) > CROWDED:
-        each = f"each point is the mean of {-(-len(sizes) // CROWDED)} rows of {size} frames"
-    short = f", the last of {rest}" if rest < size else ""
-    return f"Final mask ({stages}); {each}{short}; lower is better"
+    size, count = windows["frames"].max(), len(windows.distinct("window"))
+    rows = -(-count // CROWDED)
+    each = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    return f"Final mask ({stages}); each point is the mean of {each}; lower is better"
 
 
 LEFT: Final = 0.28

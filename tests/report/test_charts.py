@@ -52,13 +52,3 @@ def test_of_many_drives_the_worst_and_the_best_have_a_row():
     assert len(chart.names) == DRAWN + 1
     assert chart.names[half - 1 : half + 1] == [f"drive_{half + 4}", f"drive_{half - 1}"]
     assert "Of all drives the 20 worst and the 20 best." in figure.caption
-
-
-def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
-    some = [ForestRow(str(n), None, 0.0, -0.01, 0.015) for n in range(20)]
-    many = [*some, ForestRow("huge", None, 0.0, -0.9, 0.9)]
-    figure = charts.forest(many, OVER, "change")
-    low, high = figure.charts[0].y_range
-    assert -2 < low < -1
-    assert 3 < high < 4
-    assert "1 interval reaches beyond the edge" in figure.caption

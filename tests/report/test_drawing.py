@@ -87,20 +87,3 @@ def test_of_a_long_drive_neighbours_are_averaged():
     assert long.x == [0, 2, 4, 6, 8]
     assert long.y == [0.5, 2.5, 4.5, 6.5, 8.5]
     assert thinned(long, most=5) is long
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "cut", "ends"),
-    [
-        (1.0, 3.0, "", (25.0, 75.0)),
-        (-9.0, 3.0, "left", (0.0, 75.0)),
-        (1.0, 9.0, "right", (25.0, 100.0)),
-        (-9.0, 9.0, "both", (0.0, 100.0)),
-    ],
-)
-def test_an_interval_beyond_the_chart_ends_in_an_arrow_at_its_edge(low, high, cut, ends):
-    own = series([0], [2.0], low=[low], high=[high])
-    made = drawn(Chart("change", ChartKind.MARKS, [own], names=["a"], y_range=(0.0, 4.0)))
-    (mark,) = made.rows[0].marks
-    assert (mark.cut, (mark.low, mark.high)) == (cut, ends)
-    assert f"({low:.2f} to {high:.2f})" in mark.text

@@ -33,7 +33,7 @@ OVERLAP: Final = {name: metric for name, metric in ALL.items() if not metric.tab
 def _read(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
     """Return the metrics that people see there, in the order in which they read them."""
     ranked = sorted(metrics.values(), key=lambda metric: metric.rank)
-    return {metric.name: metric for metric in ranked if metric.place >= least}
+    return {metric.name: metric for metric in ranked if metric.shown >= least}
 
 
 SHORT: Final = _read(METRICS, Shown.EVERYWHERE)

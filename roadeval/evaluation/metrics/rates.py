@@ -27,7 +27,6 @@ METRICS: Final = (
         higher_is_better=True,
         order=24,
         rank=4,
-        mirrors="ERR",
         shown=Shown.IN_FULL,
     ),
     Metric(  # Eq. 25
@@ -47,7 +46,7 @@ METRICS: Final = (
         function=lambda c: ratio(c.tp, c.tp + c.fn),
         higher_is_better=True,
         order=26,
-        mirrors="FNR",
+        shown=Shown.IN_FILES,
     ),
     Metric(  # Eq. 27
         name="FNR",
@@ -66,7 +65,7 @@ METRICS: Final = (
         function=lambda c: ratio(c.tn, c.tn + c.fp),
         higher_is_better=True,
         order=28,
-        mirrors="FPR",
+        shown=Shown.IN_FILES,
     ),
     Metric(  # Eq. 29
         name="FPR",

@@ -29,7 +29,6 @@ from roadeval.evaluation.score.rows import (
     camera_masks,
     causes,
     counts_of,
-    each_window,
     finals,
     merged,
     most_changed,

@@ -40,14 +40,6 @@ def stages_of(rows: Rows) -> dict[str, str]:
     return final_stages((variant, stage) for variant, stage, _ in rows.masks())
 
 
-def each_window(windows: Rows) -> Rows:
-    """Return one row of each window, in order, with the most ``frames`` that a mask has there."""
-    numbers, first, place = np.unique(windows["window"], return_index=True, return_inverse=True)
-    most = np.zeros(len(numbers), np.int64)
-    np.maximum.at(most, place, windows["frames"])
-    return windows.take(first).replace(frames=most)
-
-
 def finals(rows: Rows) -> Rows:
     """Return the rows of each variant's final mask."""
     last = stages_of(rows)

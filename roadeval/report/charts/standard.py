@@ -215,12 +215,6 @@ def series(name: str, look: Look, x: Any, y: Any) -> Series:
 MEAN: Final = "mean over drives"
 DRAWN: Final = 40
 """Drives that have a row; of more the worst and the best."""
-WIDEST: Final = 0.9
-"""The share of the drives' intervals that are seen whole; an axis for all would hide the rest."""
-LEAST: Final = 0.001
-"""The difference on either side of zero that is shown at least: less may be rounding."""
-
-
 Interval = tuple[float | None, float | None, float | None]
 """A mean and the ends of its interval, as fractions."""
 
@@ -291,34 +285,19 @@ def forest(rows: Sequence[ForestRow], over: Difference, label: str) -> Figure:
             ("better", Look(BETTER), [p for p, row in enumerate(ranked) if row.mean <= 0]),
         )
     ]
-    mean, ends = (over.mean, over.low, over.high), _limits(rows, over)
-    drives.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [mean]))
-    chart = Chart(label, ChartKind.MARKS, drives, [*names, MEAN], "pp", sums=1, y_range=ends)
+    drives.append(
+        _intervals(
+            MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [(over.mean, over.low, over.high)]
+        )
+    )
+    chart = Chart(label, ChartKind.MARKS, drives, [*names, MEAN], "pp", sums=1)
     if any(row.group for row in rows):
         told.append("In brackets the group that it belongs to.")
     if missing := sum(row.low is None for row in rows):
         told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
-    known = ((row.low, row.high) for row in rows if row.low is not None and row.high is not None)
-    if beyond := sum(100 * low < ends[0] or 100 * high > ends[1] for low, high in known):
-        told.append(f"{beyond} interval{' reaches' if beyond == 1 else 's reach'} beyond the edge.")
     if over.low is None:
         told.append("The mean has no interval: too few drives or groups of drives.")
     return Figure([chart], " ".join(told))
-
-
-def _limits(rows: Sequence[ForestRow], over: Difference) -> tuple[float, float]:
-    """Return the ends of the axis in percentage points: every mean is seen, and most intervals."""
-    wanted = [row.mean for row in rows] + [0.0, LEAST, -LEAST]
-    wanted += [end for end in (over.low, over.high) if end is not None]
-    for ends, share in (
-        ([row.low for row in rows if row.low is not None], 1 - WIDEST),
-        ([row.high for row in rows if row.high is not None], WIDEST),
-    ):
-        if ends:
-            wanted.append(float(np.quantile(ends, share)))
-    low, high = 100 * min(wanted), 100 * max(wanted)
-    margin = 0.04 * (high - low)
-    return low - margin, high + margin
 
 
 def _intervals(

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import first_of, number, percent, points
+from roadeval.data.words import counted, first_of, number, percent, points
 from roadeval.evaluation.score import BASES, TESTED, Effect
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import (
@@ -157,22 +157,19 @@ def _point(values: Mapping[str, float], drive: str) -> str:
 
 
 def missing(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the drives that failed by reason, those without truth, and losses."""
-    failed = [row for row in findings.drives.values() if row["status"] == FAILED]
-    unscored = [row for row in findings.drives.values() if row["status"] == UNSCORED]
-    damaged = [row for row in findings.drives.values() if row["losses"]]
-    if not failed and not unscored and not damaged:
-        return
-    yield Heading("What is missing")
-    for title, rows in (("Drives that failed", failed), ("Drives without a score", unscored)):
-        if rows:
-            yield Heading(f"{title}: {number(len(rows))}", 2)
-            yield from _reasons(findings, rows)
-    if damaged:
-        yield Heading(f"Logs of which a part was lost: {number(len(damaged))}", 2)
-        yield _losses(findings, damaged)
-        if len(damaged) > NAMED:
-            yield Text(f"{number(len(damaged) - NAMED)} more: see drives.parquet.", "note")
+    """Yield the drives that failed by reason, those without truth, and those with losses."""
+    rows = findings.drives.values()
+    parts = {
+        "Drives that failed": [row for row in rows if row["status"] == FAILED],
+        "Drives without a score": [row for row in rows if row["status"] == UNSCORED],
+        "Logs of which a part was lost": [row for row in rows if row["losses"]],
+    }
+    if any(parts.values()):
+        yield Heading("What is missing")
+    for title, own in parts.items():
+        if own:
+            yield Heading(f"{title}: {number(len(own))}", 2)
+            yield from _reasons(findings, own)
 
 
 def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
@@ -193,26 +190,17 @@ def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
 
 
 def by_reason(findings: FleetFolder, rows: Iterable[Row]) -> dict[str, list[str]]:
-    """Return the drives' names by the reason that they failed for, or were not scored.
+    """Return the drives' names by what was lost first, or by why they failed or were not scored.
 
     Without the name of the drive's file, which begins most reasons.
     """
     found: defaultdict[str, list[str]] = defaultdict(list)
     for row in rows:
-        reason = row["reason"] or "no reason known"
-        begin, _, rest = reason.partition(": ")
+        first, *_ = (row["losses"] or row["reason"] or "no reason known").splitlines()
+        begin, _, rest = first.partition(": ")
         is_file = rest and begin.rpartition("/")[2].startswith(row["name"])
-        found[rest if is_file else reason].append(findings.names[row["drive"]])
+        found[rest if is_file else first].append(findings.names[row["drive"]])
     return found
-
-
-def _losses(findings: FleetFolder, rows: Sequence[Row]) -> Table:
-    lost = []
-    for row in rows[:NAMED]:
-        first, *rest = row["losses"].splitlines()
-        more = f" (and {len(rest)} more)" if rest else ""
-        lost.append([findings.names[row["drive"]], f"{first}{more}"])
-    return Table(["drive", "lost"], lost, text_columns=(0, 1), small=True)
 
 
 STRATA: Final = 30
@@ -277,8 +265,6 @@ WORST_AT: Final = "#the-worst-frames-over-all-drives"
 SEEN: Final = 12
 """Pictures that a page shows at once."""
 ACROSS = 4
-LACKING = 12
-"""Frames without a picture that are named."""
 LONGEST = 20
 """Letters of a drive's name below a picture."""
 
@@ -289,15 +275,12 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     if not rows:
         return
     yield Heading("The worst frames over all drives")
-    pictures, lacking = [], []
+    pictures = []
     for row in rows:
-        name = findings.names[row["drive"]]
-        title = f"{row['rank']}. {elided(name, LONGEST)}, frame {row['frame']}"
-        if (content := findings.picture(row)) is None:
-            lacking.append(f"{name} frame {row['frame']}")
-        else:
+        title = f"{elided(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
+        if content := findings.picture(row):
             error = f"ERR {percent(row['ERR'], 1)} %"
-            pictures.append((f"{title}: {error}", ImageFile(content)))
+            pictures.append((f"{row['rank']}. {title}: {error}", ImageFile(content)))
     if pictures:
         yield ImageGrid(pictures[:SEEN], across)
     if more := pictures[SEEN:]:
@@ -307,9 +290,8 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
         "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
         "grey: ignored."
     )
-    if lacking:
-        named = first_of(lacking, LACKING)
-        legend += f" Pictures of {len(lacking)} are not in the folder: {named}."
+    if lacking := len(rows) - len(pictures):
+        legend += f" Not in the folder: {counted(lacking, 'picture')}."
     yield Text(legend, "note")
     yield _commands_table(findings, rows)
 

@@ -99,30 +99,16 @@ def _beware(warned: list[str]) -> BulletList:
     return BulletList("Beware", warned or ["Nothing known."], "warning" if warned else "plain")
 
 
-def _trained_here(placement: str | None) -> str:
-    if placement == "picked":
-        return (
-            "Trained on frames of this drive that were labelled because they were in doubt (none "
-            "of them is evaluated): the rates are of a method that has seen this road."
-        )
-    if placement == "spread":
-        return (
-            "Trained on frames spread along this drive (neither they nor those beside them are "
-            "evaluated): the rates say how well it does between frames that were labelled."
-        )
-    return (
-        "Trained on this drive's own first frames (none of them is evaluated): the rates say "
-        "how well it does on a road that it has seen."
-    )
-
-
 def warnings(findings: Findings) -> Iterator[str]:
     """Yield what a reader must know before believing the numbers of a drive."""
     facts = findings.facts
     yield from facts.warnings
     own = facts.training.model is None or facts.training.adapted
     if facts.training.source == "truth" and own and findings.totals:
-        yield _trained_here(facts.training.placement)
+        yield (
+            "Trained on frames of this drive (none of them is evaluated): the rates say how well "
+            "it does on a road that it has seen."
+        )
     errors = {name: findings.total(name)["ERR"] for name in findings.finals}
     if worse := _worse_than_baseline(errors):
         yield f"{worse}, which never looks at the image: nothing was gained from its pixels here."

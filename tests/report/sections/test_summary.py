@@ -41,7 +41,7 @@ def test_three_losses_are_named_and_the_others_counted():
 def test_a_drive_that_trained_itself_says_so():
     own = some_findings(totals=ALONE, training=TrainingFacts("truth"))
     assert [text.partition(" (")[0] for text in warnings(own)] == [
-        "Trained on this drive's own first frames"
+        "Trained on frames of this drive"
     ]
     given = TrainingFacts("truth", model="city.model")
     assert not list(warnings(some_findings(totals=ALONE, training=given)))
