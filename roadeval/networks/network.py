@@ -153,34 +153,25 @@ class Placement:
         if self.inner == self.size:
             return small
         whole = np.full((*self.size[::-1], 3), GREY, np.uint8)
-        there, here = self._overlap()
-        whole[there] = small[here]
+        whole[self._inside()] = small
         return whole
 
     def back(self, plane: Plane, *, exact: bool) -> Plane:
         """Bring an ``(h, w)`` map of the input, or a smaller one of all of it, to the frame's size.
 
-        Interpolated linearly, or if ``exact`` by the nearest pixel, as for labels. Pixels of the
-        frame that the input does not show are 0.
+        Interpolated linearly, or if ``exact`` by the nearest pixel, as for labels.
         """
         how = cv2.INTER_NEAREST_EXACT if exact else cv2.INTER_LINEAR
         if self.inner != self.size:
             whole = cv2.resize(plane, self.size, interpolation=how)
-            plane = np.zeros(self.inner[::-1], plane.dtype)
-            there, here = self._overlap()
-            plane[here] = whole[there]
+            plane = np.ascontiguousarray(whole[self._inside()])
         framed: Plane = cv2.resize(plane, self.frame, interpolation=how)
         return framed
 
-    def _overlap(self) -> tuple[Any, Any]:
-        """Return where the input and the resized frame overlap, as slices of each."""
-        there, here = [], []
-        for whole, inner in zip(self.size[::-1], self.inner[::-1], strict=True):
-            begin = (whole - inner) // 2  # negative where the frame is cut off
-            first, last = max(0, begin), min(whole, begin + inner)
-            there.append(slice(first, last))
-            here.append(slice(first - begin, last - begin))
-        return tuple(there), tuple(here)
+    def _inside(self) -> tuple[slice, slice]:
+        """Return the rows and columns of the input where the frame lies: in the middle."""
+        (left, top), (width, height) = np.subtract(self.size, self.inner) // 2, self.inner
+        return slice(top, top + height), slice(left, left + width)
 
 
 @lru_cache(maxsize=16)
@@ -188,8 +179,7 @@ def placement(frame: tuple[int, int], size: tuple[int, int], resize: str) -> Pla
     """Place frames of a width and height in an input of a size, see `NetSettings.resize`."""
     if resize == "stretch":
         return Placement(frame, size, size)
-    ratios = [whole / side for whole, side in zip(size, frame, strict=True)]
-    ratio = min(ratios) if resize == "letterbox" else max(ratios)
+    ratio = min(whole / side for whole, side in zip(size, frame, strict=True))
     width, height = (max(1, round(side * ratio)) for side in frame)
     return Placement(frame, size, (width, height))
 

@@ -30,10 +30,9 @@ class NetSettings:
     beside it, of all of them, one after the other."""
     size: tuple[Side, Side] | None = None
     """Width and height of its input, in pixels; by default those that the file names."""
-    resize: Literal["stretch", "letterbox", "crop"] = "stretch"
+    resize: Literal["stretch", "letterbox"] = "stretch"
     """How an image gets that size, interpolated linearly. ``stretch``: each side by itself.
-    ``letterbox``: reduced as a whole until it fits, in the middle of a grey area. ``crop``:
-    reduced until it covers the input; what is cut off counts as no road."""
+    ``letterbox``: reduced as a whole until it fits, in the middle of a grey area."""
     layout: Literal["NCHW", "NHWC"] | None = None
     """The order of its input's dimensions: N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None

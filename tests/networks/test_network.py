@@ -118,15 +118,6 @@ def test_a_letterbox_shows_the_whole_frame_and_no_more(tmp_path):
     assert opened(path, resize="letterbox").road(tall).mask.all()
 
 
-def test_what_a_crop_does_not_show_is_no_road(tmp_path):
-    path = network(tmp_path / "n.onnx", classes=1, values=_everywhere(1))
-    wide = np.zeros((30, 80, 3), np.uint8)  # the input shows the 40 columns in the middle
-    mask = opened(path, resize="crop").road(wide).mask
-    assert mask[:, 21:59].all()
-    assert not mask[:, :19].any()
-    assert not mask[:, 61:].any()
-
-
 def test_of_several_outputs_road_is_what_one_of_them_calls_road(tmp_path):
     path = network(tmp_path / "n.onnx", values=balanced(IMAGE), spare=True)
     alone, other = (opened(path, outputs=(n,), road=(1,)) for n in ("road", "r1"))
