@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
@@ -294,12 +294,12 @@ def from_log(
         chosen = ranked or _spread_out(candidates, frames, settings, on_frame, by_truth=by_truth)
     else:
         chosen = ranked or _from_the_first(candidates, settings, on_frame, by_truth=by_truth)
-    held, warnings = chosen.frames, []
+    held, schedule = chosen
+    warnings = []
     if labelled and not by_truth:
         what = "no frame that is read has road truth"
         what = what if picks is None else "no frame that was picked by rank is labelled"
         warnings.append(f"{what}: {BY_PATCH}")
-    schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first, picks=picks)
     if base is not None:
         how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
         warnings.append(
@@ -307,7 +307,7 @@ def from_log(
             f"{len(held)} of its own {how}: the rates are not those on a drive that it has not seen"
         )
     models = _with_each_seed(held, pipelines, settings, warnings, base)
-    return models, replace(schedule, digests=models[0].digests)
+    return models, replace(schedule, digests=models[0].digests, picks=picks)
 
 
 def _require_adaptable(pipelines: Mapping[str, Pipeline]) -> None:
@@ -373,8 +373,7 @@ def spread(
     seen = {frame.number: frame.labelled for frame in frames()}
     numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
     chosen = frozenset(evenly(numbers, count))
-    for _, frame in decoded(each for each in frames() if each.number in chosen):
-        yield frame
+    yield from decoded(each for each in frames() if each.number in chosen)
 
 
 class HeldFrames:
@@ -400,17 +399,6 @@ class HeldFrames:
         self.frames.append(frame)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Chosen:
-    """The frames that train, and what that means for the others."""
-
-    frames: Sequence[Frame]
-    gap: frozenset[int] = frozenset()
-    """Numbers of the frames beside them that are not evaluated."""
-    first: int | None = None
-    """Number of the first frame to evaluate; None if there is none."""
-
-
 def _candidates(frames: Frames, *, labelled: bool) -> tuple[Iterator[LoggedFrame], bool]:
     """Return the labelled frames and True; if there are none, all frames and False."""
     if labelled:
@@ -420,15 +408,19 @@ def _candidates(frames: Frames, *, labelled: bool) -> tuple[Iterator[LoggedFrame
     return iter(frames()), False
 
 
+Chosen = tuple[Sequence[Frame], Schedule]
+"""The frames that train, and what that means for the others."""
+
+
 def _of_picks(frames: Frames, picks: Picks, on_frame: Callable[[int], None]) -> Chosen | None:
     """Choose all frames that were picked by rank and labelled since; None without any."""
     held, ranked = HeldFrames(), picks.stamps_of(Why.RANKED)
-    for _, frame in decoded(e for e in frames() if e.labelled and e.stamp_ns in ranked):
+    for frame in decoded(e for e in frames() if e.labelled and e.stamp_ns in ranked):
         if frame.truth is None or picks.is_proposal(frame.stamp_ns, frame.truth):
             continue
         held.add(frame)
         on_frame(len(held.frames))
-    return Chosen(held.frames) if held.frames else None
+    return (held.frames, Schedule(frozenset())) if held.frames else None
 
 
 def _from_the_first(
@@ -449,7 +441,7 @@ def _from_the_first(
     if by_truth and held and len(following) <= gap:
         raise _none_left(len(held), gap, len(held) + len(following))
     first = following[gap] if len(following) > gap else None
-    return Chosen(held, frozenset(following[:gap]), first)
+    return held, Schedule(frozenset(), frozenset(following[:gap]), first)
 
 
 def _spread_out(
@@ -479,7 +471,7 @@ def _spread_out(
     if by_truth and trained and not left:
         raise _none_left(len(trained), len(near & {*range(len(every))}), len(every))
     beside = frozenset(number for place, number in enumerate(every) if place in near)
-    return Chosen(held, beside, left[0] if left else None)
+    return held, Schedule(frozenset(), beside, left[0] if left else None)
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -492,21 +484,17 @@ def evenly(numbers: Sequence[int], count: int) -> list[int]:
     return [numbers[i * len(numbers) // taken] for i in range(taken)]
 
 
-def decoded(
-    frames: Iterable[LoggedFrame], lost: list[str] | None = None
-) -> Iterator[tuple[LoggedFrame, Frame]]:
+def decoded(frames: Iterable[LoggedFrame], lost: list[str] | None = None) -> Iterator[Frame]:
     """Decode what can be decoded; ``lost`` receives why others cannot.
 
     They are reported when they are replayed.
     """
     for readable in frames:
         try:
-            frame = readable.decode()
+            yield readable.decode()
         except RoadevalError as error:
             if lost is not None:
                 lost.append(str(error))
-            continue
-        yield readable, frame
 
 
 def _hold(
@@ -514,7 +502,7 @@ def _hold(
 ) -> list[Frame]:
     """Decode the first ``count`` frames."""
     held, lost = HeldFrames(), list[str]()
-    for _, frame in decoded(candidates, lost):
+    for frame in decoded(candidates, lost):
         held.add(frame)
         on_frame(len(held.frames))
         if len(held.frames) == count:

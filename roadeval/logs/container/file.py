@@ -34,8 +34,6 @@ BLOCK: Final = 1 << 20
 """Bytes to take at a time of a whole file."""
 OUTSIDE: Final = -1
 """The chunk number of a message that lies in no chunk."""
-CHANNELS: Final = 4096
-"""Channels that are read of a log; a robot has hundreds."""
 TRIED: Final = 5
 """Chunks with messages by which the right one of two descriptions is found."""
 BEFORE_ALL: Final = int(np.iinfo(np.int64).min) + 1
@@ -127,13 +125,6 @@ class Container:
         self.looked_into = frozenset(self.scan.seen)
         """Chunks whose messages were not filed by their message indexes."""
         self.scan.seen.clear()
-        read = {channel_id for channel_id, log in self.logs.items() if log.wanted}
-        order = sorted(self.channels, key=lambda channel_id: (channel_id not in read, channel_id))
-        self.channels_left_out = frozenset(order[CHANNELS:])
-        """Numbers of the channels that are not read, because there are too many."""
-        for channel_id in self.channels_left_out:
-            del self.channels[channel_id]
-            self.logs.pop(channel_id, None)
 
     @property
     def expected(self) -> Mapping[int, int]:
@@ -430,7 +421,7 @@ def _missing(container: Container) -> Iterator[Damage]:
     for channel_id, expected in container.expected.items():
         log = container.logs.get(channel_id)
         missing = expected - (log.count if log else 0)
-        if missing > 0 and channel_id not in container.channels_left_out:
+        if missing > 0:
             lost = ((container.topic(channel_id), missing),)
             reason = "messages that the file's own statistics count are missing"
             end = len(container.source)
@@ -438,12 +429,9 @@ def _missing(container: Container) -> Iterator[Damage]:
 
 
 def _channels(container: Container) -> Iterator[Damage]:
-    path, left_out = container.path, len(container.channels_left_out)
+    path = container.path
     for offset, reason in container.redefined.items():
         yield Damage(path, offset, reason)
-    if left_out:
-        count = left_out + len(container.channels)
-        yield Damage(path, 0, f"{count} channels, of which {CHANNELS} are read")
     for channel_id, log in container.logs.items():
         if channel_id not in container.channels:  # its number may be what is damaged
             reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"

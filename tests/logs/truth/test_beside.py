@@ -54,10 +54,10 @@ def images(folder: Path, *names: str, pixels=LOWER) -> Path:
     return folder
 
 
-def select(drive: Path, path: Path, road: str = "", *, resize: bool = False, **place: Any) -> Any:
+def select(drive: Path, path: Path, *road: int | str, resize: bool = False, **place: Any) -> Any:
     config = LogConfig(
         truth=LabelPlace(str(path), **place),
-        labels=LabelSettings(road=(road,) if road else ()),
+        labels=LabelSettings(road=road),
         topics=TopicSettings(resize_truth=resize),
     )
     with open_log(drive, config) as log:
@@ -187,7 +187,7 @@ def test_labels_lie_below_a_list_of_names(drive, tmp_path):
     shutil.copytree(LABELS / "yolo" / "labels", path / "labels")
     images(path / "images", "frame_0000.png")
     (path / "classes.txt").write_text("road\ncar\nego\n")
-    assert select(drive, path, "0")[1] == [0, 1, 3]
+    assert select(drive, path, 0)[1] == [0, 1, 3]
 
 
 # --- Annotation tools' files ----------------------------------------------------------------------
