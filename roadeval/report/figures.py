@@ -7,8 +7,6 @@ it only to draw.
 from __future__ import annotations
 
 import base64
-import struct
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from io import BytesIO
@@ -16,7 +14,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.image import FigureImage
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
@@ -71,8 +68,6 @@ RC: Final[dict[str, Any]] = {
     "savefig.facecolor": "white",
 }
 """Matplotlib's settings for every figure; in an SVG, and so in a PDF, text stays text."""
-_PNG_HEADER: Final = 33
-"""Bytes of a PNG's signature and first chunk."""
 
 
 def write_figures(
@@ -107,7 +102,7 @@ def write_figures(
 def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
     name, drawing = figure
     files = {
-        folder / f"{name}.png": _with_dpi(figure_as("png", drawing, DPI)),
+        folder / f"{name}.png": figure_as("png", drawing, DPI),
         folder / f"{name}.pdf": figure_as("pdf", drawing),
     }
     for path, content in files.items():
@@ -115,22 +110,8 @@ def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
     return list(files)
 
 
-def _with_dpi(png: bytes) -> bytes:
-    """Return a PNG file that says how large its dots are, right after its header."""
-    dots = round(DPI / 0.0254)
-    chunk = b"pHYs" + struct.pack(">IIB", dots, dots, 1)
-    sized = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    return png[:_PNG_HEADER] + sized + png[_PNG_HEADER:]
-
-
 def svg(figure: Figure) -> bytes:
     """Return a figure as SVG."""
-    if engine := figure.get_layout_engine():
-        # As `savefig` would, but without drawing everything once more for it. An SVG's canvas
-        # measures letters in its own way.
-        FigureCanvasSVG(figure)
-        engine.execute(figure)
-        figure.set_layout_engine("none")
     content = BytesIO()
     figure.savefig(content, format="svg", dpi=DPI, metadata={"Date": None})
     return content.getvalue()

@@ -400,13 +400,11 @@ class _Against:
         self._alone: Final = len(pairs) == 1
         """Whether it is one camera of one drive, whose frames have numbers of their own."""
         self._left_out: Final = left_out
-        self._same_logs: Final = sum(one.drive != other.drive for one, other in pairs)
         self.changed: Final = _changed_settings(pairs)
         self.base_frames = self.new_frames = 0
         self._lost = [0, 0]
         self._relabelled = 0
         self._apart: Final[list[str]] = []
-        self._uncommon: Final[dict[str, None]] = {}
         self.levels: Final = _Masks(list)
         self._masks: Final = _Masks(list)
         self._regions: Final = _Masks(list)
@@ -443,11 +441,6 @@ class _Against:
             self._lost[place] += len(np.unique(rows["frame"])) - len(np.unique(np.concatenate(own)))
         differing = [mask.before["frame"][mask.truth_differs] for mask in masks]
         self._relabelled += len(np.unique(np.concatenate(differing)))
-        if not self._across:
-            theirs = set(after.distinct("variant")) - {mask.variant for mask in masks}
-            self._uncommon.update(
-                dict.fromkeys(v for v in before.distinct("variant") if v in theirs)
-            )
         for mask in masks:
             chosen = mask.final and mask.variant != BASELINE
             stamps = mask.after["stamp_ns"]
@@ -550,20 +543,12 @@ class _Against:
         yield from self._left_out
         if apart := self._apart:
             yield left_out(apart, new, f"no evaluated frame in common with {base}")
-        if self._several and self._same_logs:
-            yield (
-                f"{self._same_logs} drives have other names in {base} and {new}, and are taken for "
-                "the same by the digests of their logs"
-            )
         for label, other, frames in zip((base, new), (new, base), self._lost, strict=True):
             if frames:
                 yield (
                     f"{frames} frames that {label} evaluated are left out against {other}, which "
                     "lacks them or trained on them"
                 )
-        for variant in self._uncommon:
-            if all(variant != mask[0] for mask in self._masks):
-                yield f"{variant} is left out: {base} and {new} share no frame of it"
         of_the_log = [
             f"`{name}` {setting(own)} and {setting(other)}"
             for name, (own, other) in self.changed.items()
