@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Rows
+from roadeval.data.words import defined
 from roadeval.evaluation import score
 from roadeval.evaluation.metres import band_name
 from roadeval.evaluation.stats import mean_distribution
@@ -26,25 +27,33 @@ WINDOWS: Final = 30
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NotableFrame:
-    """A frame worth looking at."""
+    """A frame, in a table or with its pictures."""
 
     frame: int
     stamp_ns: int
     """Which."""
     variant: str
-    """Whose failure or change it is."""
+    """Whose failure or change it is; empty of a row of a table, and without truth."""
     rates: Mapping[str, Mapping[str, float]]
-    """Of each variant's final mask, as short tables show them."""
+    """Of each variant's final mask, as short tables show them; without truth its doubts."""
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of the ERR of ``variant``, by stage, see `Findings.error_parts`."""
     change: float | None = None
     """The filter's change of ERR, or None."""
     notes: Sequence[str] = ()
-    """The recording's own sentences."""
+    """Sentences about it."""
+    conditions: Sequence[str] = ()
+    """In words, as ``much shadow``."""
     images: Sequence[LayerImage] = ()
     """The camera, the truth and the errors; none where the recording is not at hand."""
     layers: Sequence[Sequence[LayerImage]] = ()
     """A row a variant: its layers in the order of the stages."""
+
+    @property
+    def error(self) -> float:
+        """The ERR of the first variant, or its first doubt; below 0 where none is defined."""
+        rates = next(iter(self.rates.values()), {})
+        return next((rates[by] for by in ("ERR", *score.SIGNS) if defined(rates.get(by))), -1.0)
 
 
 def no_rows(table: str) -> Rows:

@@ -32,7 +32,7 @@ from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.pdf.typeset import pdf, write_file
-from roadeval.report.sections.frames import FrameBrowser, FrameRow, browser, strip
+from roadeval.report.sections.frames import FrameBrowser, browser, strip
 from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import as_arrays, window_rows
@@ -319,7 +319,7 @@ def browsed(compared: Compared, taken: Callable[[FrameBrowser], int]) -> FrameBr
     return replace(without, strips=strips)
 
 
-def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameRow]:
+def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[NotableFrame]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
     for frame, stamp, rates in rates_by_frame(rows, [*SHORT]):
@@ -328,11 +328,11 @@ def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameRow]:
             change = rates[new]["ERR"] - rates[base]["ERR"]
             if abs(change) >= NOTEWORTHY:
                 conditions = [f"{new} {'worse' if change > 0 else 'better'}"]
-        yield FrameRow(frame, stamp, rates, conditions)
+        yield NotableFrame(frame, stamp, "", rates, conditions=conditions)
 
 
 def _strip(
-    facts: FrameRow,
+    facts: NotableFrame,
     masks: Sequence[ComparedMask],
     opened: Mapping[str, DriveResult],
     command: str,

@@ -32,7 +32,7 @@ from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, faded
-from roadeval.report.sections.frames import SMALL, FrameBrowser, FrameRow, strip
+from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
 from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
@@ -263,7 +263,7 @@ def browsed(result: DriveResult) -> FrameBrowser:
     )
 
 
-def facts_of(result: DriveResult) -> Iterator[FrameRow]:
+def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames = result.rows
     if not len(frames):
@@ -271,18 +271,16 @@ def facts_of(result: DriveResult) -> Iterator[FrameRow]:
         seen = {frame for frame, _, _ in doubts}
         stamps = result.recording.stamps if result.recording else {}
         doubts += [(each, stamps[each], {}) for each in result.pictured if each not in seen]
-        yield from (FrameRow(*each) for each in sorted(doubts, key=itemgetter(0)))
+        yield from (
+            NotableFrame(frame, stamp, "", rates)
+            for frame, stamp, rates in sorted(doubts, key=itemgetter(0))
+        )
         return
     for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
-        yield FrameRow(
-            frame,
-            stamp,
-            rates,
-            [*_conditions(others, blind)],
-            [*notes(others, blind)],
-        )
+        words, conditions = [*notes(others, blind)], [*_conditions(others, blind)]
+        yield NotableFrame(frame, stamp, "", rates, notes=words, conditions=conditions)
 
 
 def _conditions(

@@ -11,7 +11,6 @@ from typing import Any, Final
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, first_of, number, percent, points
 from roadeval.evaluation.score import BASES, TESTED, Effect
-from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -203,33 +202,31 @@ def by_reason(findings: FleetFolder, rows: Iterable[Row]) -> dict[str, list[str]
     return found
 
 
-STRATA: Final = 30
-"""Parts of a fleet that a table has, at most."""
-
-
 def strata(findings: FleetFolder) -> Iterator[Block]:
-    """Yield a table of parts for each difference that has a plot."""
-    for place, (effect, title) in enumerate(plotted(findings)):
+    """Yield a table of parts by tag for each difference that has a plot."""
+    if findings.facts.strata:
+        yield Heading("By tag")
+    for effect, title in plotted(findings):
         mask = (effect.base, effect.variant)
-        if own := [each for each in findings.facts.strata if (each.base, each.variant) == mask]:
-            if not place:
-                yield Heading("By tag")
-            yield Details(title, [*_strata_table(own)])
-
-
-def _strata_table(rows: Sequence[StratumFacts]) -> Iterator[Block]:
-    """Yield a table of parts, those with the most drives of each tag, and what marks mean."""
-    ranked = sorted(range(len(rows)), key=lambda place: (-rows[place].difference.units, place))
-    shown = [rows[place] for place in sorted(ranked[:STRATA])]
-    first = [place == 0 or shown[place - 1].tag != row.tag for place, row in enumerate(shown)]
-    yield Table(
-        ["by", "value", "drives", "mean", "interval", "worse", "better"],
-        [_part_cells(row, first=begins) for row, begins in zip(shown, first, strict=True)],
-        text_columns=(0, 1),
-        breaks=[place for place, begins in enumerate(first) if begins and place],
-        small=True,
-    )
-    yield Text(_legend([row.difference for row in rows], len(rows) - len(shown)), "note")
+        own = [each for each in findings.facts.strata if (each.base, each.variant) == mask]
+        first = [place == 0 or own[place - 1].tag != row.tag for place, row in enumerate(own)]
+        parts = Table(
+            ["by", "value", "drives", "mean", "interval", "worse", "better"],
+            [_part_cells(row, first=begins) for row, begins in zip(own, first, strict=True)],
+            text_columns=(0, 1),
+            breaks=[place for place, begins in enumerate(first) if begins and place],
+            small=True,
+        )
+        count = max((each.difference.comparisons or 0 for each in own), default=0)
+        note = (
+            f"{MARK} significant after Holm's correction for the {count} parts that were tested "
+            "together."
+            if count
+            else "No part has enough drives, or groups of them, for an interval."
+        )
+        if own:
+            told = Text(f"Percentage points, means over drives. {note}", "note")
+            yield Details(title, [parts, told])
 
 
 def _part_cells(row: StratumFacts, *, first: bool) -> list[Cell | str]:
@@ -243,21 +240,6 @@ def _part_cells(row: StratumFacts, *, first: bool) -> list[Cell | str]:
         number(found.worse or 0),
         number(found.better or 0),
     ]
-
-
-def _legend(found: Sequence[Difference], left_out: int) -> str:
-    counts = {each.comparisons for each in found if each.comparisons}
-    legend = "Percentage points, means over drives."
-    if counts:
-        legend += (
-            f" {MARK} significant after Holm's correction for the {max(counts)} parts that were "
-            "tested together."
-        )
-    elif all(each.low is None for each in found):
-        legend += " No part has enough drives, or groups of them, for an interval."
-    if left_out:
-        legend += f" {left_out} smaller parts are left out."
-    return legend
 
 
 WORST_AT: Final = "#the-worst-frames-over-all-drives"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import defined, in_percent, listing, number, percent, points, timestamp
+from roadeval.data.words import in_percent, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import SIGNS
 from roadeval.report.blocks import (
@@ -133,31 +133,10 @@ ROWS: Final = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class FrameRow:
-    """A frame in the table."""
-
-    frame: int
-    stamp_ns: int
-    """Which."""
-    rates: Mapping[str, Mapping[str, float]]
-    """Of each variant's final mask, as short tables show them; without truth its doubts."""
-    conditions: Sequence[str] = ()
-    """Its conditions in words, as ``the filter helps``."""
-    notes: Sequence[str] = ()
-    """Sentences about it."""
-
-    @property
-    def error(self) -> float:
-        """The ERR of the first variant, or its first doubt; below 0 where none is defined."""
-        rates = next(iter(self.rates.values()), {})
-        return next((rates[by] for by in ("ERR", *SIGNS) if defined(rates.get(by))), -1.0)
-
-
-@dataclass(frozen=True, slots=True)
 class FrameBrowser(Block):
     """The frames of a drive on a page: one with its pictures, and a table of all."""
 
-    rows: Sequence[FrameRow]
+    rows: Sequence[NotableFrame]
     """The frames of the drive, in order."""
     variants: Sequence[str]
     """Those that were scored, or without truth are in doubt."""
@@ -180,7 +159,7 @@ class FrameBrowser(Block):
         return frozenset(strip.frame for strip in self.strips) or self.served
 
     @property
-    def shown(self) -> list[FrameRow]:
+    def shown(self) -> list[NotableFrame]:
         """The frames of the table: all, or of a long drive the worst and the pictured."""
         if len(self.rows) <= ROWS:
             return [*self.rows]
@@ -193,7 +172,7 @@ class FrameBrowser(Block):
         """Titles of groups of columns, each of which has a column a variant."""
         return [*self.titles] if self.variants else []
 
-    def cells(self, row: FrameRow) -> Iterator[str]:
+    def cells(self, row: NotableFrame) -> Iterator[str]:
         """Yield a frame's seconds from the first one, and a number for each column of rates."""
         yield f"{(row.stamp_ns - self.rows[0].stamp_ns) / 1e9:.2f}"
         for rate in self.rates:

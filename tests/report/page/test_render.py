@@ -28,8 +28,9 @@ from roadeval.report.blocks import (
     TwoColumns,
 )
 from roadeval.report.chart import Chart, ChartKind, Look, Series
+from roadeval.report.findings import NotableFrame
 from roadeval.report.page.render import page
-from roadeval.report.sections.frames import FrameBrowser, FrameRow
+from roadeval.report.sections.frames import FrameBrowser
 from tests.report.making import a_document
 
 JPEG = ImageFile(b"\xff\xd8\xff\xe0 not much of a picture")
@@ -42,7 +43,7 @@ def every_block(text):
     """One of each kind of block, with a text wherever one has room."""
     table = Table([text, "n"], [[Cell(text, dot="#0072B2"), text], ["", "1"]], caption=text)
     strip = Strip(7, [text], table, [[Picture(text, text, JPEG)]], text)
-    row = FrameRow(7, 0, {text: {"ERR": 0.01}}, [text], [text])
+    row = NotableFrame(7, 0, "", {text: {"ERR": 0.01}}, notes=[text], conditions=[text])
     return [
         Heading(text),
         Heading(text, 2),
