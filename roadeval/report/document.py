@@ -63,7 +63,7 @@ def _of(findings: Findings | FleetFolder, *sections: Section) -> Document:
         kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,
         subtitle=", ".join(_subtitle(findings)),
-        footer=f"{findings.name}, {findings.path}",
+        footer=", ".join(dict.fromkeys((findings.name, str(findings.path)))),
         blocks=[block for each in (summary.section, *sections) for block in each(findings)],
         keywords=[
             *("road recognition", "evaluation", *(["fleet"] if of_fleet else []), findings.name)
