@@ -16,7 +16,6 @@ if TYPE_CHECKING:
         png_of,
         size_of,
         to_labels,
-        to_png,
         to_rgb,
         without_colours,
     )

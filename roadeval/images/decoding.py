@@ -79,23 +79,6 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
     return np.array(image)
 
 
-def to_png(data: File, limits: Limits) -> bytes:
-    """Return an image file as a PNG file of the same pixels.
-
-    Errors as of `to_rgb`, and if PNG has no such pixels.
-    """
-    from PIL import Image
-
-    format_, png = _known_format(data), io.BytesIO()
-    is_jpeg = format_.plugin is None
-    image = Image.fromarray(_jpeg(data, limits)) if is_jpeg else _loaded(data, format_, limits)
-    try:
-        image.save(png, "PNG")
-    except OSError as error:
-        raise ImageError(str(error)) from error
-    return png.getvalue()
-
-
 def without_colours(image: Rgb) -> Array:
     """Return one channel of an image whose three are equal, else the image itself."""
     grey = image[..., 0]

@@ -94,18 +94,6 @@ def test_a_mask_of_one_bit_is_black_and_white() -> None:
 
 
 @pytest.mark.parametrize("name", [*EXACT, *LOSSY])
-def test_a_file_becomes_a_png_of_the_same_pixels(name: str) -> None:
-    data = (EXACT | LOSSY)[name]
-    png = images.to_png(data, LIMITS)
-    np.testing.assert_array_equal(images.to_rgb(png, LIMITS), images.to_rgb(data, LIMITS))
-
-
-def test_pixels_that_png_has_not_are_refused() -> None:
-    with pytest.raises(ImageError, match="cannot write mode F"):
-        images.to_png(file("TIFF", np.array([[0.5]], np.float32)), LIMITS)
-
-
-@pytest.mark.parametrize("name", [*EXACT, *LOSSY])
 def test_half_a_file_is_damaged(name: str) -> None:
     data = (EXACT | LOSSY)[name]
     with pytest.raises(ImageError, match=f"a damaged {name}"):

@@ -179,8 +179,6 @@ def _notes(
 
 
 NPY: Final = ".npy"
-_LONGEST_HEAD: Final = 1 << 16
-"""Bytes in which the head of an NPY file of numbers ends."""
 
 
 def file_label(file: Path) -> NamedLabel:
@@ -202,24 +200,19 @@ def npy_picture(data: bytes, limits: Limits) -> RawPicture:
     """Return the ``(H, W)`` array of an NPY file as a picture of one channel.
 
     Truth values and whole numbers keep their values, numbers with a fraction become float32.
-    Nothing in the file is run: an array of objects is refused by its head. A `BadMessage` if it is
-    no NPY file, is cut off, or holds something else. An `ImageError` if it is larger than the
-    limits allow.
+    Nothing in the file is run: an array of objects is refused. A `BadMessage` if it is no NPY file,
+    is cut off, or holds something else. An `ImageError` if it is larger than the limits allow.
     """
-    head = io.BytesIO(data[:_LONGEST_HEAD])
     try:
-        np.lib.format.read_magic(head)
-        shape, by_columns, dtype = np.lib.format.read_array_header_1_0(head)
+        array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     except (ValueError, TypeError, SyntaxError, EOFError, RecursionError, MemoryError) as error:
-        raise BadMessage("no NPY file, or its head is damaged") from error
-    if len(shape) != 2 or dtype.kind not in "buif":
-        raise BadMessage(f"an array of {dtype} of shape {shape}, not of numbers, rows by columns")
-    height, width = shape
+        raise BadMessage("no NPY file of numbers, or a damaged one") from error
+    if array.ndim != 2 or array.dtype.kind not in "buif":
+        what = f"an array of {array.dtype} of shape {array.shape}"
+        raise BadMessage(f"{what}, not of numbers, rows by columns")
+    height, width = array.shape
     limits.check(width, height)
-    if len(data) - head.tell() < height * width * dtype.itemsize:
-        raise BadMessage(f"an NPY file of {len(data)} bytes that is cut off")
-    flat = np.frombuffer(data, dtype, height * width, head.tell())
-    encoding, samples = _samples(flat.reshape(shape, order="F" if by_columns else "C"))
+    encoding, samples = _samples(array)
     return RawPicture(0, width, height, encoding, 0, big_endian=False, data=samples.tobytes())
 
 

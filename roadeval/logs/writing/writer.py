@@ -20,7 +20,7 @@ import numpy.typing as npt
 from mcap.writer import Writer
 
 from roadeval.data import Frame, FrameResult, Layer, Tally
-from roadeval.images import ImageError, Limits, format_of, png_of, size_of, to_png
+from roadeval.images import ImageError, format_of, png_of, size_of
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
 from roadeval.logs.settings import NS
@@ -279,8 +279,6 @@ LABEL_DELAY_NS: Final = 1
 VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
 QUALITY: Final = 95
 """JPEG quality of a video's frames, 0 to 100."""
-GREATEST: Final = 1 << 30
-"""Most pixels of an image that is converted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -418,10 +416,7 @@ def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
-    """Read an image file as it is, or as a PNG if viewers do not know its format.
-
-    Whatever its ending; a label must not be a JPEG.
-    """
+    """Read a JPEG or PNG file as it is, whatever its ending; a label must not be a JPEG."""
     try:
         check_input(file)
         data = file.read_bytes()
@@ -431,7 +426,7 @@ def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
         if is_label and not format_.exact:
             raise LogError(f"{file}: {format_.name} changes label values; masks must be lossless")
         if format_.media_type is None:
-            return to_png(data, Limits(GREATEST)), "png"
+            raise LogError(f"{file}: {format_.name}, which not all viewers know: save it as PNG")
         return data, format_.media_type.removeprefix("image/")
     except OSError as error:
         raise LogError(f"{file}: {error.strerror}") from error

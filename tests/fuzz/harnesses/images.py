@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from mcap.records import Channel, Schema
 
-from roadeval.images import ImageError, Limits, to_png
+from roadeval.images import Limits
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import (
@@ -73,9 +73,6 @@ def _decode(picture: Picture) -> None:
             array = decode(picture, limits)
             assert array.size
             assert array.dtype in (np.uint8, np.uint16)
-    if isinstance(picture, CompressedPicture):
-        with suppress(ImageError):
-            to_rgb(CompressedPicture(0, "png", to_png(picture.data, limits)), limits)
 
 
 @cache

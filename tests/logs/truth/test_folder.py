@@ -163,20 +163,19 @@ def test_objects_are_refused_and_nothing_of_them_is_run():
         def __reduce__(self):
             return pytest.fail, ("it ran",)
 
-    with pytest.raises(BadMessage, match="not of numbers"):
+    with pytest.raises(BadMessage, match="no NPY file of numbers"):
         npy_picture(file_of(np.array([[Bomb()]], dtype=object), allow_pickle=True), LIMITS)
 
 
 @pytest.mark.parametrize("length", [0, 5, 40, 128, 133])
 def test_a_file_that_is_cut_off_is_refused(length):
-    with pytest.raises(BadMessage, match=r"cut off|damaged"):
+    with pytest.raises(BadMessage, match="a damaged one"):
         npy_picture(file_of(np.zeros((2, 3), "u1"))[:length], LIMITS)
 
 
-def test_a_head_that_claims_too_much_is_refused_before_anything_is_read():
-    head = file_of(np.zeros((1, 1), "u1")).replace(b"(1, 1), }", b"(9999, 9999), }")
+def test_more_pixels_than_are_allowed_are_refused():
     with pytest.raises(ImageError, match="more than the 1000 pixels"):
-        npy_picture(head, LIMITS)
+        npy_picture(file_of(np.zeros((40, 30), "u1")), LIMITS)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1.0])
