@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Final
 
@@ -36,17 +37,12 @@ _OTHERS: Final = (
     (0, b"SQLite format 3\0", "a rosbag2 SQLite file: mcap convert {path} {stem}.mcap"),
     (0, b"version https://git-lfs", "a pointer to a file in Git LFS: git lfs pull"),
     (0, b"\x28\xb5\x2f\xfd", "compressed as a whole by zstd: zstd -d {path} -o {stem}.mcap"),
-    (0, b"\x04\x22\x4d\x18", "compressed as a whole by lz4: lz4 -d {path} {stem}.mcap"),
     (0, b"\x1f\x8b", "compressed as a whole by gzip: gunzip -c {path} > {stem}.mcap"),
-    (0, b"BZh", "compressed as a whole by bzip2: bunzip2 -c {path} > {stem}.mcap"),
     (0, b"PK\x03\x04", "a ZIP archive: unzip {path}"),
-    (0, b"\xfd7zXZ\0", "compressed as a whole by xz: xz -dc {path} > {stem}.mcap"),
     (0, b"RRF2", "a Rerun recording: roadeval report {path}"),
     (0, b"\xff\xd8\xff", "a JPEG image: roadeval pack makes a log of a folder of images"),
     (0, b"\x89PNG\r\n", "a PNG image: roadeval pack makes a log of a folder of images"),
     (4, b"ftyp", "a video: roadeval pack {path} -o {stem}.mcap"),
-    (0, b"\x1a\x45\xdf\xa3", "a video: roadeval pack {path} -o {stem}.mcap"),
-    (0, b"RIFF", "a video or image: roadeval pack {path} -o {stem}.mcap"),
 )
 """How many bytes to skip, the bytes that follow, what the file is and how it becomes a log."""
 
@@ -74,23 +70,17 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     if not path.is_dir():
         _check(path)
         return [path], []
-    files: list[Path] = []
-    damage: list[Damage] = []
     try:
-        found = [file for file in path.iterdir() if file.suffix == ".mcap"]
+        found = sorted((f for f in path.iterdir() if f.suffix == ".mcap"), key=natural)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
-    for file in sorted(found, key=natural):
-        try:
-            _check(file)
-            files.append(file)
-        except LogError as error:
-            damage.append(Damage(file, 0, str(error).removeprefix(f"{file}: ")))
+    damage = [Damage(file, 0, why) for file in found if (why := _problem(file))]
+    files = [file for file in found if file not in {each.path for each in damage}]
     if not files:
         raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
-    there = {*files, *(each.path for each in damage)}
-    lacking = sorted({*_missing([*there]), *_listed(path, there)} - there, key=natural)
-    return files, [*damage, *(Damage(file, 0, _why_unread(file)) for file in lacking)]
+    lacking = sorted({*_missing(found), *_listed(path, {*found})} - {*found}, key=natural)
+    unnamed = "the file is not called *.mcap"
+    return files, [*damage, *(Damage(file, 0, _problem(file) or unnamed) for file in lacking)]
 
 
 def _missing(files: Sequence[Path]) -> Iterator[Path]:
@@ -121,15 +111,15 @@ def _listed(folder: Path, there: Set[Path]) -> set[Path]:
     return files if files & there else set()
 
 
-def _why_unread(file: Path) -> str:
-    """Return why a file of a folder is no part of the log that was read."""
+def _problem(file: Path) -> str:
+    """Return why a file of a folder cannot be read as a part of a log; empty if it can."""
     if not file.exists():
         return "the file is missing"
     try:
         _check(file)
     except LogError as error:
         return str(error).removeprefix(f"{file}: ")
-    return "the file is not called *.mcap"
+    return ""
 
 
 def natural(path: Path) -> list[tuple[int, str]]:
@@ -176,15 +166,11 @@ def _other(path: Path, head: bytes) -> str:
 
 
 def _empty_folder(path: Path) -> str:
-    for pattern, advice in (
-        ("*.mcap.zst*", "its files are compressed as a whole by zstd: zstd -d them first"),
-        ("*.db3", "a rosbag2 folder of SQLite files: mcap convert FILE.db3 FILE.mcap"),
-        ("*.bag", "a folder of ROS 1 bags: mcap convert FILE.bag FILE.mcap"),
-        ("*.png", "a folder of images: roadeval pack makes a log of it"),
-        ("*.jpg", "a folder of images: roadeval pack makes a log of it"),
-    ):
-        if any(path.glob(pattern)):
-            return f"{path}: no *.mcap file in it; {advice}"
+    """Return what is wrong with a folder without MCAP files, and what lies in it instead."""
+    for file in sorted(filter(Path.is_file, path.iterdir()), key=natural):
+        with suppress(OSError), file.open("rb") as opened:
+            if (head := opened.read(_HEAD)) and (other := _other(file, head)):
+                return f"{path}: no *.mcap file in it; {visible(file.name)} is {other}"
     return f"{path}: a folder without *.mcap files"
 
 

@@ -183,7 +183,7 @@ def test_what_shows_an_entry_shows_no_secret():
         ("gone.mcap", r"gone\.mcap: there is no such file or folder"),
         ("gone/*.mcap", r"gone/\*\.mcap: no log matches it"),
         ("empty", r"empty: a folder without \*\.mcap files"),
-        ("bags", r"bags: no \*\.mcap file in it; a folder of ROS 1 bags"),
+        ("bags", r"bags: no \*\.mcap file in it; a\.bag is a ROS 1 bag: mcap convert"),
         ("unfinished", "unfinished: no log that is complete"),
         ("ftp://host/a.mcap", r"ftp://host/a\.mcap: no scheme that is known; choose s3://, gs://"),
         ("file:///a.mcap", r"file:///a\.mcap: no scheme that is known"),
@@ -196,6 +196,7 @@ def test_what_shows_an_entry_shows_no_secret():
 def test_a_word_that_names_no_drive_is_an_error_of_one_line(folder, word, message):
     Path("empty").mkdir()
     put("bags/a.bag", "unfinished/.hidden.mcap", "m.toml")
+    Path("bags/a.bag").write_bytes(b"#ROSBAG V2.0\n")
     Path("unfinished/a.5d1c02fe.partial.mcap").write_bytes(LOG)
     with pytest.raises(RoadevalError, match=message) as error:
         find_drives([word])
