@@ -23,12 +23,12 @@ from roadeval.logs.topics.calibration import calibration_of
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.meaning import Labels
-from roadeval.logs.truth.pairing import Camera, Clock, Partners
+from roadeval.logs.truth.pairing import Camera, Clock, Partners, by_time
 from roadeval.logs.truth.source import (
     Label,
     LabelSource,
     check_size,
-    in_log,
+    meaning_of,
     nothing_of,
     read_or_error,
     samples,
@@ -165,7 +165,9 @@ def settle(
             check_size(chosen.name, chosen.size, camera)
             own = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
             reader = readers[chosen.name]
-            labels[name] = in_log(reader, own, camera, reason)
+            pairing = by_time(reader, camera)
+            meaning = meaning_of(reader, own)
+            labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     no_truth = "" if truth.topic else truth.why
     known, unknown = calibration_of(image, topics, readers)
     ground = ground_of(known, config.ground, image.size)

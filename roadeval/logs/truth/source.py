@@ -110,15 +110,6 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[str, Picture]]:
             yield pictures.place(position), pictures.picture(position)
 
 
-def in_log(labels: TopicReader, settings: MaskSettings, camera: Camera, why: str) -> LabelSource:
-    """Settle a label topic of the log itself, whose size was checked.
-
-    A `LogError` if its values cannot be understood.
-    """
-    meaning = _meaning(labels, settings)
-    return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why)
-
-
 def beside_log(
     labels: LabelPictures,
     settings: MaskSettings,
@@ -144,7 +135,7 @@ def beside_log(
         pairing = by_number(labels, settings, camera.images)
     from_log = isinstance(labels, TopicReader)
     words = camera.clock if from_log and settings.pair is None else by
-    meaning = _meaning(labels, settings, camera)
+    meaning = meaning_of(labels, settings, camera)
     notes = labels.origin.notes if isinstance(labels, NamedLabels) else ()
     why = f"{count}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
@@ -191,7 +182,7 @@ def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
     return LogError(f"nothing of {pictures.name} can be decoded: {problem}")
 
 
-def _meaning(
+def meaning_of(
     labels: LabelPictures, settings: MaskSettings, camera: Camera | None = None
 ) -> Meaning:
     """Find the meaning of labels by looking at some; of those beside the log check the size, too.
