@@ -78,9 +78,8 @@ def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
         yield f"{number(len(findings.facts.drives))} drives"
         yield f"{number(findings.facts.frames)} frames evaluated"
     else:
-        facts, own = findings.facts, findings.properties
-        preset, version = preset or own.get("preset"), facts.versions.get("roadeval", "")
-        version = version or own.get("version", "")
+        facts = findings.facts
+        version = facts.versions.get("roadeval", "")
         if findings.cameras:
             yield f"{len(findings.cameras)} cameras"
         yield f"{facts.frames.in_log or facts.frames.evaluated} frames"

@@ -147,7 +147,7 @@ def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, t
     words = text((tmp_path / "report.pdf").read_bytes())
     for said in (
         "Nothing to compare: ERR is undefined on every frame.",
-        "filtered: undefined on every frame: ACC, ERR, TPR, FNR, TNR and FPR.",
+        "frames, undefined and left out: ACC on ",
         "ERR is undefined on every frame, so what the filter does to it is unknown.",
         "ERR of filtered is undefined on every frame, so no frame is the worst.",
     ):

@@ -12,7 +12,7 @@ from roadeval.data.words import DASH, defined, number, percent, points
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import FILTER, Effect, merged
+from roadeval.evaluation.score import Effect, merged
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -62,25 +62,18 @@ def _examples(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
 def _claims(findings: Findings) -> Iterator[Block]:
     """Tabulate in how many windows the paper's claims are borne out."""
     found = findings.facts.claims
-    short = any(each["short"] for each in found.values())
     rows = [
-        [
-            words,
-            f"{each['held']} of {each['windows']}",
-            *([f"{each['short_held']} of {each['short']}"] if short else []),
-        ]
+        [words, f"{found[name]['held']} of {found[name]['windows']}"]
         for name, words in CLAIMED.items()
-        if (each := found.get(name))
+        if name in found
     ]
-    if not rows:
-        return
-    table = Table(
-        ["claim", "borne out by", *(["shorter, at the end"] if short else [])],
-        rows,
-        caption=f"Windows of {findings.facts.evaluation.window} frames that bear a claim out, of "
-        "those in which both rates are defined; windows.csv has their rates.",
-    )
-    yield table
+    if rows:
+        yield Table(
+            ["claim", "borne out by"],
+            rows,
+            caption=f"Windows of {findings.facts.evaluation.window} frames that bear a claim out, "
+            "of those in which both rates are defined; windows.csv has their rates.",
+        )
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
@@ -190,7 +183,12 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
-    yield Text(_regions_note(findings, names), "note")
+    note = (
+        "Shadow is what the filter took for shadow, right or wrong. Near the road's edge: within "
+        f"{findings.facts.evaluation.boundary_width} pixels of the border between road and "
+        "non-road in the truth. Regions overlap; regions.csv has their counts."
+    )
+    yield Text(note, "note")
     if not isinstance(findings, Findings):
         return
     beyond = findings.facts.beyond.items()
@@ -204,17 +202,6 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
         yield _heat_maps(findings.heatmaps)
 
 
-def _regions_note(findings: Findings | FleetFolder, names: Mapping[str, str]) -> str:
-    width = findings.facts.run.get("evaluation", {}).get("boundary_width")
-    near = f"within {width} pixels of" if width else "near"
-    shadow = "Shadow is what the filter took for shadow, right or wrong. "
-    return (
-        f"{shadow if 'shadow' in names else ''}"
-        f"Near the road's edge: {near} the border between road and non-road in the truth. "
-        "Regions overlap; regions.csv has their counts."
-    )
-
-
 def stages(findings: Findings) -> Iterator[Block]:
     """Yield what each stage did to the mask, and which part of the error is whose."""
     yield Heading("Which stage broke it")
@@ -224,7 +211,12 @@ def stages(findings: Findings) -> Iterator[Block]:
         "scale.",
     )
     yield _parts_table(findings)
-    yield Text(_parts_note(findings), "note")
+    note = (
+        "How ERR comes about, in percent of the pixels: the mask that the last stage is given, "
+        f"without the filter; what {FILTERED} has more or less than {UNFILTERED} in it; and what "
+        "the last stage makes of it."
+    )
+    yield Text(note, "note")
     numbers: list[Block] = [stages_table(findings.totals, findings.changes)]
     if findings.changes:
         note = (
@@ -257,21 +249,6 @@ def _part(parts: Mapping[str, float], part: str) -> str:
         return DASH
     first = part == next(iter(parts))
     return percent(parts[part]) if first else points(parts[part])
-
-
-def _parts_note(findings: Findings) -> str:
-    first, *rest = max(findings.error_parts.values(), key=len)
-    meanings = "".join(f"; {part}: {_meaning(part)}" for part in rest)
-    return (
-        f"How ERR comes about, in percent of the pixels. {first}: the mask that the last stage is "
-        f"given, without the filter{meanings}."
-    )
-
-
-def _meaning(part: str) -> str:
-    if part == FILTER:
-        return f"what {FILTERED} has more or less than {UNFILTERED} in that mask"
-    return f"what {part} made of it"
 
 
 def _oracles(findings: Findings) -> Iterator[Block]:

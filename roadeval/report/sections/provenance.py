@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from roadeval.data.words import UNSET, number, setting
+from roadeval.data.words import UNSET, setting
 from roadeval.report.blocks import Block, Command, Details, Heading, KeepTogether, Table, Text
 from roadeval.report.findings import Findings
 from roadeval.results.facts import Facts
@@ -42,35 +41,13 @@ def section(findings: Findings) -> Iterator[Block]:
 
 
 def of_drives(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the settings, version, models and folds behind the results of many drives."""
-    facts = findings.facts
+    """Yield what many drives were replayed with, and where its settings are."""
     yield Heading("What was run")
-    yield Text(f"roadeval {facts.version}; {_models(findings)}; {_seeds(facts.run)}.")
-    folds = Counter(row["fold"] for row in findings.drives.values() if row["fold"] is not None)
-    if folds:
-        dealt = ", ".join(f"fold {fold}: {number(n)}" for fold, n in sorted(folds.items()))
-        yield Text(f"Drives by the fold whose model scored them, which never saw them: {dealt}.")
     yield Text(
-        f"run.toml in {findings.path} has the whole configuration, drives.parquet each log's "
-        "SHA-256. The same logs, configuration and version give the same numbers.",
-        "note",
+        f"roadeval {findings.facts.version}. run.toml in {findings.path} has the whole "
+        "configuration, drives.parquet each log's digest, and the model and the fold that scored "
+        "it. The same logs, configuration and version give the same numbers.",
     )
-
-
-def _models(findings: FleetFolder) -> str:
-    models = {row["model"] for row in findings.drives.values() if row["model"]}
-    if not models:
-        return "each drive trained its own model"
-    if len(models) == 1:
-        return f"one model for all drives (SHA-256 {min(models)[:12]})"
-    return f"{number(len(models))} models"
-
-
-def _seeds(run: Mapping[str, Any]) -> str:
-    training = run.get("training", {})
-    seeds = training.get("seeds", 1)
-    first = f"training seed {training.get('seed', 0)}"
-    return first if seeds == 1 else f"{first} and {seeds - 1} more"
 
 
 def _methods(facts: Facts) -> Iterator[Block]:

@@ -132,11 +132,10 @@ def _worse_than_baseline(errors: Mapping[str, float | None]) -> str:
 def _undefined(findings: Findings) -> Iterator[str]:
     for variant in findings.finals:
         total = findings.total(variant)
-        frames, counts = total["frames"], total["undefined"].items()
-        if never := [rate for rate, count in counts if count == frames]:
-            yield f"{variant}: undefined on every frame: {listing(never)}."
-        if many := [f"{rate} on {count}" for rate, count in counts if 0 < count < frames]:
-            yield f"{variant}: undefined on some of {frames} frames, and left out: {listing(many)}."
+        counts = [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]
+        if counts:
+            of = number(total["frames"])
+            yield f"{variant}: of {of} frames, undefined and left out: {listing(counts)}."
 
 
 def fleet_warnings(findings: FleetFolder) -> Iterator[str]:

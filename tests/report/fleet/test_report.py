@@ -8,7 +8,7 @@ import pytest
 from roadeval.jobs.results.report import write_report
 from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import Figure, Heading, ImageGrid, Table, Text
-from roadeval.report.sections import drive, drives, provenance, summary
+from roadeval.report.sections import drive, drives, summary
 from roadeval.results.fleet import FleetFolder
 from tests.report.making import column, opened, plain_rows, reader, text, the
 from tests.results.fleet import making
@@ -126,12 +126,6 @@ def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, findi
     told = blocks(drives.worst, (FleetFolder(copy)))
     assert len(told[1].pictures) == 11
     assert "Not in the folder: 1 picture." in told[2].text
-
-
-def test_what_was_run_is_told_with_its_seed_and_folds(findings):
-    told = " ".join(b.text for b in blocks(provenance.of_drives, findings) if isinstance(b, Text))
-    assert "each drive trained its own model; training seed 0" in told
-    assert "fold" not in told
 
 
 def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):

@@ -25,8 +25,7 @@ def test_undefined_rates_are_told_and_how_often():
     undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
     totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
     assert list(warnings(some_findings(totals=totals))) == [
-        "filtered: undefined on every frame: FNR.",
-        "filtered: undefined on some of 1200 frames, and left out: FPR on 3.",
+        "filtered: of 1,200 frames, undefined and left out: FNR on 1,200 and FPR on 3."
     ]
 
 
