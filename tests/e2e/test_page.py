@@ -112,6 +112,8 @@ def test_frames_are_filtered_by_variant_rate_and_condition(drive, watched):
     notes = shown(tab, ".frames tbody td:last-child")
     assert 0 < len(notes) < everything
     assert all("the filter helps" in note for note in notes)
+    errors = (shown(tab, f".frames tbody td:nth-child({column})") for column in (3, 4))
+    assert all(float(with_) < float(without) for with_, without in zip(*errors, strict=True))
 
 
 def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(drive, watched):

@@ -129,16 +129,6 @@ def test_a_comparison_of_the_variants_has_the_numbers_of_the_replay(rig: Path):
         assert getattr(change.difference["ERR"], end) == pytest.approx(wanted[end], abs=1e-12)
 
 
-def test_a_rig_is_compared_camera_by_camera_with_a_replay_of_one(rig: Path):
-    found = roadeval.compare([rig / "recordings" / "rig.rrd", rig / "rear.rrd"])
-    assert all(change.unchanged for change in found.comparison.changes)
-    rows = roadeval.Result(rig / "rear.rrd").frames
-    assert found.comparison.changes[0].frames == rows["frame"].nunique()
-    (told,) = found.comparison.warnings
-    assert told.startswith("2 drives are left out of rig (not in rear): ")
-    assert "rear" not in told.partition(": ")[2]
-
-
 def test_the_first_screen_lists_the_cameras(rig: Path):
     shown = (rig / "screen.txt").read_text()
     assert "rig: 3 cameras, 46 of 76 frames were evaluated" in shown
@@ -236,11 +226,6 @@ def test_a_command_that_looks_at_one_camera_takes_no_second(rig: Path):
     run = here("info", rig / "rig.mcap", *topics("front", "rear"))
     assert run.returncode == 2
     assert "one camera at a time" in run.stderr
-
-
-def test_a_recording_of_a_rig_is_opened_by_a_camera(rig: Path):
-    with pytest.raises(roadeval.RoadevalError, match="several cameras; name one of /front"):
-        roadeval.Recording(rig / "recordings" / "rig.rrd")
 
 
 def test_an_interrupted_run_of_a_rig_is_read_camera_by_camera(rig, tmp_path):

@@ -49,16 +49,6 @@ def test_one_name_with_another_log_is_no_match():
     assert found[1] == ["1 drive is left out of base (of another log in new): a"]
 
 
-def test_drives_without_a_digest_or_a_score_are_no_match():
-    one, other = a_result("base", ("a", None)), a_result("new", ("b", None))
-    assert not pairs_of(match_drives(one, other))
-    (told,) = match_drives(one, a_result("new", ("a", "1")))[1]
-    assert told == "1 drive is left out of base (log unknown): a"
-    failed = a_result("base", ("a", "1"), scored=False)
-    (told,) = match_drives(failed, a_result("new", ("a", "1")))[1]
-    assert told == "1 drive is left out of base (not scored in both): a"
-
-
 def test_five_of_the_drives_left_out_for_a_reason_are_named():
     base = a_result("a", *((f"d{place}", f"{place}") for place in range(7)))
     assert match_drives(base, a_result("b"))[1] == [
@@ -82,15 +72,6 @@ def test_frames_are_matched_by_stamp_in_the_bases_order_and_equal_stamps_by_thei
 def masks_of(base, new, **more):
     found = common_masks(rows_of(a_table(base)), rows_of(a_table(new)), **more)
     return [(mask.variant, mask.base_stage, mask.stage, mask.final) for mask in found]
-
-
-def test_masks_are_matched_by_variant_and_stage():
-    own = {("a", "svm"): [1], ("a", "post"): [1], ("b", "post"): [1]}
-    assert masks_of(own, own | {("c", "post"): [1]}) == [
-        ("a", "svm", "svm", False),
-        ("a", "post", "post", True),
-        ("b", "post", "post", True),
-    ]
 
 
 def test_final_masks_are_matched_whatever_their_stages_are_called():

@@ -10,9 +10,10 @@ import hashlib
 import re
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from threading import Thread
-from types import TracebackType
 from typing import Any, Self
+from urllib.parse import urlsplit
 
 CONTENT = bytes(range(256)) * 40_000
 """Ten megabytes."""
@@ -31,7 +32,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(body=True)
 
     def _answer(self, *, body: bool) -> None:
-        kind = self.path.strip("/").partition("/")[0]
+        kind = "whole" if self.server.folder else self.path.strip("/").partition("/")[0]
         self.server.asked.append((self.command, self.path, dict(self.headers)))
         if kind.isdigit():
             self._head(int(kind), 0)
@@ -52,11 +53,14 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = length is None
 
     def _content(self, kind: str, *, body: bool) -> None:
-        headers = {
-            "ETag": f'"{hashlib.md5(CONTENT).hexdigest()}"',
-            "Last-Modified": "Wed, 21 Oct 2015 07:28:00 GMT",
-        }
-        begin, end, size = 0, len(CONTENT), len(CONTENT)
+        name, folder = Path(urlsplit(self.path).path).name, self.server.folder
+        content = (folder / name).read_bytes() if folder else CONTENT
+        tag = f'"{hashlib.md5(content).hexdigest()}"'
+        if self.headers.get("If-Match", tag) != tag:
+            self._head(412, 0)
+            return
+        headers = {"ETag": tag, "Last-Modified": "Wed, 21 Oct 2015 07:28:00 GMT"}
+        begin, end, size = 0, len(content), len(content)
         asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         if asked is not None and kind != "early":
             begin, end = int(asked[1]), int(asked[2]) + 1
@@ -64,23 +68,28 @@ class _Handler(BaseHTTPRequestHandler):
         self._head(206 if "Content-Range" in headers else 200, end - begin, **headers)
         if body and kind in ("early", "stalled", "resumed") and not begin:
             self.close_connection = True
-            self.wfile.write(CONTENT[: end // 2])
+            self.wfile.write(content[: end // 2])
             self.wfile.flush()
             time.sleep(SLOW if kind == "stalled" else 0)
         elif body:
-            self.wfile.write(CONTENT[begin:end])
+            self.server.sent += end - begin
+            self.wfile.write(content[begin:end])
 
     def log_message(self, *_: Any) -> None:
         """Stay silent."""
 
 
 class Server(ThreadingHTTPServer):
-    """The server; ``asked`` holds the requests: method, path and headers."""
+    """The server; ``asked`` holds the requests: method, path and headers.
+
+    With a ``folder`` all its files are served as they should be, whatever stands before their name.
+    """
 
     daemon_threads = True
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path | None = None) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
+        self.folder, self.sent = folder, 0
         self.asked: list[tuple[str, str, dict[str, str]]] = []
         self._thread = Thread(target=self.serve_forever, args=(0.05,), daemon=True)
 
@@ -95,11 +104,6 @@ class Server(ThreadingHTTPServer):
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: Any) -> None:
         self.shutdown()
         self.server_close()

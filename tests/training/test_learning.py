@@ -101,19 +101,6 @@ def test_without_truth_spread_frames_train_by_the_patch():
     assert (model.source, roles(frames, schedule)) == ("patch", "tgugtgugtguu")
 
 
-def test_every_further_seed_trains_as_it_would_by_itself():
-    frames = log(8)
-    models, schedule = with_seeds(frames, frames=3, pixels_per_class=20, seed=5, seeds=3)
-    assert roles(frames, schedule) == "ttteeeee"
-    alone = [learn(frames, frames=3, pixels_per_class=20, seed=seed)[0] for seed in (5, 6, 7)]
-    means = [
-        [model.parameters["unfiltered"]["similarity"].mean.tolist() for model in each]
-        for each in (models, alone)
-    ]
-    assert means[0] == means[1]
-    assert means[0][0] != means[0][1] != means[0][2]
-
-
 def test_frames_right_after_training_can_be_left_out():
     frames = log(8)
     _, schedule = learn(frames, frames=2, gap=3)
@@ -160,13 +147,6 @@ def test_an_image_that_trained_is_recognised_wherever_it_lies():
     _, schedule = learn(frames, frames=2)
     elsewhere = replace(frames[1].frame, number=77, stamp_ns=5)
     assert schedule.role(elsewhere) is Role.TRAINING
-
-
-def test_the_log_that_trains_evaluates_what_looks_like_its_training_frames():
-    frames = log(5)
-    _, schedule = learn(frames, frames=2)
-    again = replace(frames[1].frame, payload=b"encoded anew")
-    assert schedule.role(again) is Role.EVALUATED
 
 
 def test_training_frames_are_spread_over_a_drive():

@@ -116,19 +116,6 @@ def test_what_looks_like_markup_is_text_wherever_it_stands():
             assert address is None or address.startswith(("#", "data:", "0/"))
 
 
-def test_what_belongs_to_a_variant_says_so():
-    table = Table(["mask"], [[text] for text in ("a", "b", "a \N{MINUS SIGN} b", "ab")])
-    frames = FrameBrowser([], ["a", "b"], [])
-    rows = Reader(rendered(table, frames)).all("tr")
-    assert [each.get("data-of") for each in rows if "data-of" in each] == ["a", "b", "a"]
-
-
-def test_titles_are_text_as_well():
-    made = Reader(page(a_document(title=HOSTILE)))
-    assert len(made.all("script")) == 1
-    assert any("<script>alert(1)</script>" in words for words in made.words)
-
-
 def test_a_page_asks_for_nothing_and_allows_its_own_script_and_style_alone():
     content = rendered(*every_block("word"))
     made = Reader(content)
@@ -167,17 +154,3 @@ def test_pictures_have_words_for_who_does_not_see_them():
     pictures = [own for own in made.all("img") if "src" in own]
     assert len(pictures) == 2
     assert all(own["alt"] for own in pictures)
-
-
-@pytest.mark.parametrize(
-    ("content", "media"),
-    [
-        (b"\x89PNG...", "image/png"),
-        (b"\xff\xd8\xff...", "image/jpeg"),
-    ],
-)
-def test_a_picture_inside_a_page_says_of_which_kind_it_is(content, media):
-    encoded = base64.b64encode(content).decode()
-    address = f"data:{media};base64,{encoded}"
-    made = Reader(rendered(ImageGrid([("It.", ImageFile(content))], 1)))
-    assert [own["src"] for own in made.all("img") if "src" in own] == [address]

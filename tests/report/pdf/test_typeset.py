@@ -9,7 +9,6 @@ import pytest
 
 from roadeval.report.blocks import (
     BulletList,
-    Cell,
     Command,
     Details,
     Figure,
@@ -105,15 +104,6 @@ def test_a_title_that_looks_like_markup_is_the_documents_title():
     assert reader(content).metadata.title == HOSTILE
 
 
-def test_what_a_page_hides_is_a_part_on_paper_or_is_left_out():
-    hidden = [Details(f"about {on}", [Text(f"told {on}")], on_paper=on) for on in (True, False)]
-    content = pdf(a_document(Heading("One"), *hidden))
-    assert "told True" in text(content)
-    assert "False" not in text(content)
-    one, (two,) = reader(content).outline
-    assert (one["/Title"], two["/Title"]) == ("1 One", "about True")
-
-
 def test_the_caption_of_pictures_is_on_their_page():
     for above in range(2, 8):
         pictures = ImageGrid([("one", a_png())] * 3, 2, caption="What they show")
@@ -141,14 +131,6 @@ def parts(element):
     for each in inner if isinstance(inner, list) else [inner]:
         if hasattr(each.get_object(), "keys") and "/S" in each.get_object():
             yield from parts(each)
-
-
-def test_a_table_keeps_its_rows_and_repeats_its_head_on_the_next_page():
-    rows = [[f"frame {number}", Cell(f"{number}.25", bold=True)] for number in range(100)]
-    table = Table(["frame", "ERR"], rows, breaks=[50], groups=[("", 1), ("percent", 1)])
-    words = text(pdf(a_document(table)))
-    assert all(f"frame {number} {number}.25" in words for number in range(100))
-    assert words.count("percent") > 1
 
 
 LONG = "a_name_of_64_letters_" + 43 * "n"
@@ -194,11 +176,6 @@ def test_a_name_of_64_letters_stays_in_its_column(block):
     content = pdf(a_document(TwoColumns([block], [Text("beside")])))
     lines = [edge for word, edge in places(content).items() if word in 2 * LONG]
     assert len(lines) > 1
-
-
-def test_equal_pictures_are_kept_once():
-    document = a_document(*(ImageGrid([(name, a_png())], 1) for name in ("one", "two")))
-    assert len(document.files()) == 1
 
 
 def test_where_no_temporary_folder_can_be_written_this_is_told(tmp_path, monkeypatch):
