@@ -95,7 +95,6 @@ class Log:
         self._lost_files = damage
         self._beside: list[Log] = []
         self._of_rig = False
-        self._with_truth: tuple[LabelSource, list[int]] | None = None
         self._containers = [
             container
             for file in files
@@ -250,7 +249,7 @@ class Log:
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with what is asked of one camera of several."""
         other = copy(self)
-        other.config, other._with_truth, other._of_rig = config, None, True
+        other.config, other._of_rig = config, True
         return other
 
     def frames(self, selection: Selection, only: Collection[int] | None = None) -> FrameStream:
@@ -273,7 +272,8 @@ class Log:
             )
         numbers: Sequence[int] = range(first, last)
         if asked.labelled:
-            numbers = [each for each in self._labelled(selection) if first <= each < last]
+            labelled = frames_of(selection.truth.pairing) if selection.truth else ()
+            numbers = sorted(each for each in labelled if first <= each < last)
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
@@ -281,15 +281,6 @@ class Log:
         if only is not None:
             numbers = [each for each in numbers if each in only]
         return FrameStream(selection, last - first, numbers)
-
-    def _labelled(self, selection: Selection) -> list[int]:
-        """Return the numbers of the frames that have truth; they are looked for once."""
-        truth = selection.truth
-        if truth is None:
-            return []
-        if self._with_truth is None or self._with_truth[0] is not truth:
-            self._with_truth = truth, sorted(frames_of(truth.pairing))
-        return self._with_truth[1]
 
     def close(self) -> None:
         """Close the log's files, and those of logs beside it."""

@@ -134,14 +134,6 @@ class LabelSettings:
     ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
     """Truth colours that are counted nowhere."""
 
-    @property
-    def values(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """The values that are road, and those that are ignored; without names."""
-        road, ignore = (
-            tuple(each for each in own if isinstance(each, int)) for own in (self.road, self.ignore)
-        )
-        return road, ignore
-
     def __post_init__(self) -> None:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
             raise ValueError("the truth's labels are given as values or as colours, not as both")

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -57,11 +57,6 @@ class ClassMap:
     """Whether colours are looked up instead of values."""
     words: str
 
-    @property
-    def by_itself(self) -> bool:
-        """Whether a mask was understood without settings."""
-        return self.others == UNKNOWN
-
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
         """``(65536,)`` truth by label value."""
@@ -97,7 +92,7 @@ class ClassMap:
             truth: Truth = cv2.LUT(np.ascontiguousarray(labels), self._table[:256])
         else:
             truth = self._table[labels]
-        if self.by_itself and (truth == UNKNOWN).any():
+        if self.others == UNKNOWN and (truth == UNKNOWN).any():
             value = int(labels[truth == UNKNOWN][0])
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
         return truth
@@ -108,7 +103,6 @@ class Confidence:
     """Confidence maps: road is what has at least the ``threshold``, from 0 to 1."""
 
     threshold: float
-    by_itself: ClassVar[bool] = False
 
     @property
     def words(self) -> str:
@@ -204,10 +198,9 @@ def _as_given(labels: LabelSettings, seen: list[int], name: str) -> ClassMap:
     """Return the meaning of the values, or of the colours, that the settings name."""
     by_color = bool(labels.road_colors)
     ending, text = ("_colors", _color_name) if by_color else ("", str)
-    road, ignore = labels.values
     wanted = {
-        "road": [*road, *map(_packed, labels.road_colors)],
-        "ignore": [*ignore, *map(_packed, labels.ignore_colors)],
+        "road": [*map(int, labels.road), *map(_packed, labels.road_colors)],
+        "ignore": [*map(int, labels.ignore), *map(_packed, labels.ignore_colors)],
     }
     for setting, values in wanted.items():
         for value in values:
