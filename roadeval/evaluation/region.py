@@ -42,8 +42,6 @@ class Region:
     """Its place among the regions."""
     find: Callable[[LabelledFrame], Mapping[str, Bits]]
     """Computes the regions, ``(H, words)`` each, by name; without those that the frame lacks."""
-    whole: bool = False
-    """Whether the regions do not overlap and together are the whole frame, which is checked."""
 
     def titled(self, names: Collection[str], height: int = 0) -> Mapping[str, str]:
         """Return the titles of those of some names that are its own, in order."""

@@ -288,16 +288,15 @@ class Facts(Document):
         finals, found = self.finals, []
         for stage, rates in self.difference.items():
             final = finals[FILTERED] == stage
-            base = finals[UNFILTERED] if final else stage
-            found.append(Effect(UNFILTERED, base, FILTERED, stage, final, rates))
-        for base, own in ((UNFILTERED, self.against_unfiltered), (BASELINE, self.against_blind)):
-            found += [
-                Effect(base, finals[base], name, finals[name], final=True, rates=rates)
-                for name, rates in own.items()
-            ]
-        for name, rates in self.against_method.items():
-            base = name.removesuffix(TUNED)
-            found.append(Effect(base, finals[base], name, finals[name], final=True, rates=rates))
+            found.append(Effect(UNFILTERED, FILTERED, stage, final, rates))
+        for base, own in (
+            (UNFILTERED, self.against_unfiltered),
+            (BASELINE, self.against_blind),
+            (None, self.against_method),
+        ):
+            for name, rates in own.items():
+                of = base or name.removesuffix(TUNED)
+                found.append(Effect(of, name, finals[name], final=True, rates=rates))
         return found
 
     @property

@@ -106,7 +106,7 @@ def _effects(
     several = len({row["drive"] for rows in effects.values() for row in rows}) > 1
     for (base, variant, metric), rows in effects.items():
         first = rows[0]
-        made = Effect(base, first["stage"], variant, first["stage"], True, {})
+        made = Effect(base, variant, first["stage"], True, {})
         each = found[base].setdefault(variant, made)
         difference = _within(first, settings)
         if several:

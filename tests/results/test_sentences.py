@@ -147,7 +147,7 @@ def test_the_account_says_how_many_frames_were_evaluated_and_why_not_others(fram
 
 def against(base, **found):
     return [
-        Effect(base, "post", variant, "post", True, {"ERR": difference})
+        Effect(base, variant, "post", True, {"ERR": difference})
         for variant, difference in found.items()
     ]
 

@@ -16,6 +16,8 @@ from roadeval.runtime.discovery import found_in
 
 ALL: Final = "all"
 """The name of the whole frame where sums are by region."""
+HALVES: Final = ("boundary", "interior")
+"""Regions that together are the whole frame."""
 REGIONS: Final[tuple[Region, ...]] = tuple(
     sorted(chain(*found_in(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
 )
@@ -34,8 +36,3 @@ def titles(names: Collection[str], height: int = 0) -> dict[str, str]:
     """
     known = {n: title for r in REGIONS for n, title in r.titled(names, height).items()}
     return known | {name: name.replace("_", " ") for name in names if name not in known}
-
-
-def partitions(names: Collection[str]) -> list[list[str]]:
-    """Return those of some regions that together are the whole frame, family by family."""
-    return [own for region in REGIONS if region.whole and (own := [*region.titled(names)])]

@@ -100,19 +100,16 @@ REGIONS: Final = (
         {"boundary": "near the road's edge", "interior": "away from the road's edge"},
         order=30,
         find=_halves,
-        whole=True,
     ),
     Region(
         _titles_of_bands,
         order=40,
         find=lambda frame: row_bands(frame.truth.shape, frame.settings.bands),
-        whole=True,
     ),
     Region(
         _titles_of_distances,
         order=50,
         find=lambda frame: frame.survey.regions if frame.survey else {},
-        whole=True,
     ),
     Region({ABOVE: "the ground seen from above"}, order=51, find=lambda _: {}),
 )

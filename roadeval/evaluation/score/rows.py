@@ -16,7 +16,7 @@ import numpy.typing as npt
 from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts, Rows
 from roadeval.data.arrays import Floats
 from roadeval.evaluation import metrics
-from roadeval.evaluation.regions import partitions
+from roadeval.evaluation.regions import HALVES
 from roadeval.evaluation.score.counts import (
     CameraMasks,
     FourCounts,
@@ -257,10 +257,9 @@ def by_region(rows: Rows) -> dict[tuple[str, str], dict[str, float]]:
         names, table = last["region"][places], counts_of(last.take(places))
         for region in dict.fromkeys(names.tolist()):
             sums[region, variant] = Counts(*table[names == region].sum(axis=0).tolist())
-    halves = next(iter(partitions([*dict.fromkeys(region for region, _ in sums)])), [])
     found = {}
     for (region, variant), counts in sums.items():
-        whole = [sums[half, variant] for half in halves if (half, variant) in sums]
+        whole = [sums[half, variant] for half in HALVES if (half, variant) in sums]
         rates = {name: metric.function(counts) for name, metric in metrics.SHORT.items()}
         pixels = counts.n, sum(each.n for each in whole)
         errors = counts.fp + counts.fn, sum(each.fp + each.fn for each in whole)

@@ -69,7 +69,6 @@ class Effect:
 
     base: str
     """The variant that is subtracted: one of `BASES`, or the method that was tuned."""
-    base_stage: str
     variant: str
     stage: str
     """Whose mask."""
@@ -109,7 +108,7 @@ def drive_effects(cameras: Sequence[CameraMasks], settings: EvaluationSettings) 
                         for n, (rate, metric) in enumerate(METRICS.items())
                         if rate in COMPARED
                     }
-                    family.append(Effect(base, base_stage, variant, stage, final, rates))
+                    family.append(Effect(base, variant, stage, final, rates))
         found += corrected(family)
     return found
 
