@@ -75,13 +75,9 @@ def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
     source = os.fspath(drive)
     if not is_url(source):
         return Path(source)
-    files = {Path(_file_name(each)): _opened(each) for each in _files(source)}
+    places = {Path(_file_name(each)): _place(each) for each in _files(source)}
+    files = {n: cast("IO[bytes]", _Parts(own, *_facts(own))) for n, own in places.items()}
     return RemoteLog(shown(source), Path(_file_name(source)), files)
-
-
-def _opened(url: str) -> IO[bytes]:
-    place = _place(url)
-    return cast("IO[bytes]", _Parts(place, *_facts(place)))
 
 
 class _Parts:
@@ -275,10 +271,7 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
     try:
         return answer.result()
     except Exception as error:
-        raise FleetError(f"{shown(url)}: {_reason(error)}") from None
-
-
-def _reason(error: Exception) -> str:
-    text = f"{type(error).__name__} {error}"
-    found = (words for pattern, words in _REASONS if re.search(pattern, text))
-    return next(found, f"cannot be read ({type(error).__name__})")
+        kind = type(error).__name__
+        found = (words for pattern, words in _REASONS if re.search(pattern, f"{kind} {error}"))
+        reason = next(found, f"cannot be read ({kind})")
+        raise FleetError(f"{shown(url)}: {reason}") from None

@@ -19,14 +19,19 @@ NS = 1_000_000_000
 
 def show(found: Mapping[str, Any], out: Console) -> None:
     """Print what `roadeval.logs.describe` found, as plain data."""
-    out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
+    start, end = found["start_ns"], found["end_ns"]
+    size = f"{found['bytes'] / 1e6:.1f} MB"
+    known = "" if found["verified"] else "; not read whole, --verify looks for all damage"
+    length = f"{(end - start) / NS:.1f} s from {timestamp(start)}"
+    out.print(f"{found['path']}: {length}, {size}{known}", soft_wrap=True)
     out.print()
     tables.show_table(_topics(found["topics"]), out)
     for topic in found["topics"]:
         if topic["problem"]:
             out.print(f"{topic['name']} cannot be read: {topic['problem']}", soft_wrap=True)
-        for gap in topic["gaps"]:
-            out.print(f"{topic['name']}: {_gap(gap, found['start_ns'])}", soft_wrap=True)
+        for before, after in topic["gaps"]:
+            gap = f"gap of {(after - before) / NS:.2f} s, {(before - start) / NS:.2f} s after"
+            out.print(f"{topic['name']}: {gap} the start", soft_wrap=True)
     out.print()
     if found["problem"]:
         out.print(f"replay would stop: {with_flags(found['problem'])}", soft_wrap=True)
@@ -38,25 +43,13 @@ def show(found: Mapping[str, Any], out: Console) -> None:
             )
 
 
-def _extent(found: Mapping[str, Any]) -> str:
-    start, end = found["start_ns"], found["end_ns"]
-    known = "" if found["verified"] else "; not read whole, --verify looks for all damage"
-    size = f"{found['bytes'] / 1e6:.1f} MB"
-    return f"{(end - start) / NS:.1f} s from {timestamp(start)}, {size}{known}"
-
-
-def _gap(gap: tuple[int, int], start: int) -> str:
-    before, after = gap
-    return f"gap of {(after - before) / NS:.2f} s, {(before - start) / NS:.2f} s after the start"
-
-
 def _topics(topics: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
         ["topic", "carries", "size", "messages", "rate"],
         [
             [
                 topic["name"],
-                _carries(topic),
+                f"{topic['format'] or topic['schema'] or 'no schema'} ({topic['encoding']})",
                 "x".join(str(side) for side in topic["size"] or ()),
                 str(topic["count"]),
                 _rate(topic["rate_hz"]),
@@ -71,8 +64,3 @@ def _rate(rate: float | None) -> str:
     if not rate:
         return ""
     return f"{rate:.4g} Hz" if rate >= 0.01 else "< 0.01 Hz"
-
-
-def _carries(topic: Mapping[str, Any]) -> str:
-    what = topic["format"] or topic["schema"] or "no schema"
-    return f"{what} ({topic['encoding']})"

@@ -22,7 +22,7 @@ from roadeval.report.tables import (
     stages_table,
     thresholds_table,
 )
-from roadeval.results.facts import Facts, FrameAccount
+from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction, without_truth
 
 if TYPE_CHECKING:
@@ -40,7 +40,10 @@ def show(outcome: Outcome, out: Console) -> None:
     if facts.totals:
         tables.show([Text(facts.verdict), *_scores(facts, outcome.metres)], out)
     else:
-        out.print(f"Nothing to score: {_why_nothing(facts.frames)}.")
+        why = "every frame with road truth was trained on or left out"
+        if not facts.frames.labelled:
+            why = "no frame that was read has road truth"
+        out.print(f"Nothing to score: {why}.")
         for sentence in without_truth(facts.unlabelled):
             out.print(sentence)
     out.print()
@@ -62,12 +65,6 @@ def _scores(facts: Facts, metres: Sequence[Measured]) -> Iterator[Block]:
         yield thresholds_table(facts.curves, facts.totals)
     if metres:
         yield distance_table([asdict(each) for each in metres], [*facts.finals], brief=True)
-
-
-def _why_nothing(frames: FrameAccount) -> str:
-    if frames.labelled:
-        return "every frame with road truth was trained on or left out"
-    return "no frame that was read has road truth"
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

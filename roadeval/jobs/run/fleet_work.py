@@ -233,7 +233,7 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
             "seconds": time.perf_counter() - started,
         }
     )
-    own = {"drives": [row], **outcome.rows, "worst": [*gatherer.worst_rows()]}
+    own = {"drives": [row], **outcome.rows, "worst": gatherer.worst}
     key = Key(drive, outcome.facts.drive.camera)
     rows = {table: cells(table, key, each) for table, each in own.items()}
     return Record(drive, task.asked, before, rows)
@@ -288,11 +288,6 @@ def _disk_failure(error: BaseException | None) -> BaseException | None:
     return None
 
 
-def model_path(folder: Path, fold: int) -> Path:
-    """Return the file of a fold's model in a fleet's folder."""
-    return folder / MODELS / f"fold_{fold}.model"
-
-
 @dataclass(frozen=True, slots=True)
 class FoldTask:
     """The task of a worker that trains the model of a fold."""
@@ -309,7 +304,7 @@ class FoldTask:
     @property
     def path(self) -> Path:
         """The model file."""
-        return model_path(self.folder, self.fold)
+        return self.folder / MODELS / f"fold_{self.fold}.model"
 
 
 @dataclass(frozen=True, slots=True)
@@ -482,7 +477,7 @@ class FrameGatherer:
         for row, picture in self._worst:
             put(self._folder / row["picture"], picture)
 
-    def worst_rows(self) -> Iterator[dict[str, Any]]:
-        """Yield the rows of ``worst``; ranks are given over all drives."""
-        for rank, (row, _) in enumerate(self._worst, 1):
-            yield {"rank": rank, **row}
+    @property
+    def worst(self) -> list[dict[str, Any]]:
+        """The rows of ``worst``; ranks are given over all drives."""
+        return [{"rank": rank, **row} for rank, (row, _) in enumerate(self._worst, 1)]

@@ -8,10 +8,11 @@ import os
 import platform
 import re
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -168,22 +169,18 @@ class Run:
             extent=(*self.config.evaluation.plan, self.config.evaluation.plan_width),
             clouds=tuple(each.name for each in self.log.topics if each.is_cloud),
             tables={name: TABLES[name].header for name in STREAMED},
-            properties=self._properties(),
+            properties={
+                "version": VERSION,
+                # The recording's identity comes from its layout, this digest included.
+                "input": identity(self.log, self.config, self.selection.digests()),
+                "drive": self.log.name,
+                "preset": self.config.preset,
+                "image_topic": self.selection.image.name,
+                "truth_topic": self.selection.truth.where if self.selection.truth else "",
+                "trained_on": self.model.source,
+                "training_frames": len(self.model.digests),
+            },
         )
-
-    def _properties(self) -> dict[str, str | int | float]:
-        masks = self.selection.digests()
-        return {
-            "version": VERSION,
-            # The recording's identity comes from its layout, this digest included.
-            "input": identity(self.log, self.config, masks),
-            "drive": self.log.name,
-            "preset": self.config.preset,
-            "image_topic": self.selection.image.name,
-            "truth_topic": self.selection.truth.where if self.selection.truth else "",
-            "trained_on": self.model.source,
-            "training_frames": len(self.model.digests),
-        }
 
 
 def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: str = "") -> Run:
@@ -271,13 +268,8 @@ def _learn(
     )
 
 
-OPENCV: Final = (
-    *("opencv-python-headless", "opencv-python"),
-    *("opencv-contrib-python-headless", "opencv-contrib-python"),
-)
-"""The packages that bring OpenCV; without one, its own version is taken."""
 COMPUTING: Final = (
-    *("numpy", "scipy", "scikit-learn", *OPENCV, "onnxruntime"),
+    *("numpy", "scipy", "scikit-learn", "onnxruntime"),
     *("av", "isal", "mcap", "pillow", "simplejpeg"),
 )
 """The packages that decode and compute: another version may give other numbers."""
@@ -291,18 +283,10 @@ def deciding(config: RunConfig) -> RunConfig:
 
 @cache
 def computing() -> dict[str, str]:
-    """Return the versions of the installed packages that compute, and of OpenCV in any case."""
-    found = {}
-    for package in COMPUTING:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    if not found.keys() & set(OPENCV):
-        import cv2
+    """Return the versions of the packages that compute."""
+    import cv2
 
-        found["opencv"] = cv2.__version__
-    return found
+    return {"opencv": cv2.__version__, **{each: version(each) for each in COMPUTING}}
 
 
 def software(config: RunConfig) -> dict[str, str]:
@@ -365,10 +349,17 @@ def process(
 
     Decoding, computing, scoring and encoding happen in the worker threads.
     """
-    total = sum(len(run.frames) for run in runs)
+    total, read = sum(len(run.frames) for run in runs), Counter[int]()
+
+    def numbered() -> Iterator[tuple[Run, int, logs.LoggedFrame]]:
+        """Yield the frames, each with its position among its camera's."""
+        for place, logged in logs.in_step([run.frames for run in runs]):
+            read[place] += 1
+            yield runs[place], read[place], logged
+
     workers = runs[0].config.run.jobs or os.cpu_count() or 1
     work = partial(_process, encoder)
-    for position, (run, done) in enumerate(ordered(work, _numbered(runs), workers), 1):
+    for position, (run, done) in enumerate(ordered(work, numbered(), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
             trim()
@@ -383,14 +374,6 @@ def process(
     for run in runs:
         if first := run.failures.first:
             raise _hopeless(run, first) from StageError(first[0].traceback)
-
-
-def _numbered(runs: Sequence[Run]) -> Iterator[tuple[Run, int, logs.LoggedFrame]]:
-    """Yield the frames of the cameras by log time, each with its position among its camera's."""
-    read = [0] * len(runs)
-    for place, logged in logs.in_step([run.frames for run in runs]):
-        read[place] += 1
-        yield runs[place], read[place], logged
 
 
 def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:

@@ -30,10 +30,6 @@ from roadeval.version import VERSION
 OnFrame = Callable[[FrameResult], None]
 
 
-def pass_by(_result: FrameResult) -> None:
-    """Do nothing with a frame."""
-
-
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """The result of a replay: where it lies, and its facts."""
@@ -65,7 +61,7 @@ def replay(
     reports: AnyPath | None = None,
     mcap: AnyPath | None = None,
     on_progress: OnProgress = ignore,
-    on_frame: OnFrame = pass_by,
+    on_frame: OnFrame = lambda _: None,
 ) -> Outcome:
     """Replay a log through every variant; record, score and table every frame.
 
@@ -99,8 +95,10 @@ def replay(
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
             outcome = _written(log, config, to, on_progress, on_frame)
-            warnings = (*outcome.warnings, *_unwritten(config, to))
-    return replace(outcome, warnings=warnings)
+            if to.recording is None and (save := config.output.save) is not None:
+                unwritten = f"`output.save` {save} is not written: `output.record` is none"
+                return replace(outcome, warnings=(*outcome.warnings, unwritten))
+            return outcome
 
 
 def _written(
@@ -236,13 +234,6 @@ def _texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:
         "run": run_toml(config, run.log.name, VERSION),
         **{name: TABLES[name].header + text for name, text in sums.items()},
     }
-
-
-def _unwritten(config: RunConfig, to: Outputs) -> tuple[str, ...]:
-    """Warn where a recording has a name but is not made."""
-    if to.recording is not None or config.output.save is None:
-        return ()
-    return (f"`output.save` {config.output.save} is not written: `output.record` is none",)
 
 
 SHOWN: Final = 4
