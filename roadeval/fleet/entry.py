@@ -22,7 +22,7 @@ from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import public_url, visible, without_secrets
 
 BUCKETS: Final = ("s3", "gs")
-"""Schemes of stores that keep objects in buckets, and can list them."""
+"""Schemes of stores that keep objects in buckets."""
 SCHEMES: Final = (*BUCKETS, "https", "http")
 
 _URL: Final = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
@@ -143,8 +143,7 @@ class DriveEntry:
 def stem_of(source: str) -> str:
     """Return the name of a drive: of a folder, or of a file without its suffix."""
     if is_url(source):
-        name = last_part(source)
-        return name if source.endswith("/") else PurePath(name).stem
+        return PurePath(last_part(source)).stem
     path = Path(source)
     return path.name if path.is_dir() else path.stem
 
@@ -182,11 +181,6 @@ def is_log(name: str) -> bool:
     return name.lower().endswith(".mcap") and counts(name)
 
 
-def is_heading(head: bytes) -> bool:
-    """Return whether a file begins as rosbag2's `METADATA` does."""
-    return BAG in head
-
-
 def cameras_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
     """Name each of several cameras of a log: a drive's identity and name hold its camera's."""
     cameras = defaultdict[str, list[str]](list)
@@ -209,7 +203,7 @@ def is_bag(folder: Path) -> bool:
     """Return whether a folder is rosbag2's, whose files are one drive."""
     try:
         with (folder / METADATA).open("rb") as file:
-            return is_heading(file.read(HEAD))
+            return BAG in file.read(HEAD)
     except OSError:
         return False
 

@@ -1,4 +1,4 @@
-"""Drives in object stores and on web servers: listed, read by parts, and checked for changes.
+"""Drives in object stores and on web servers: read by parts, and checked for changes.
 
 obstore reads them. For ``s3://`` and ``gs://`` it takes credentials, endpoint and region from the
 environment, as ``AWS_ACCESS_KEY_ID``, ``AWS_ENDPOINT_URL``, ``AWS_ALLOW_HTTP`` for an endpoint
@@ -14,30 +14,26 @@ from __future__ import annotations
 import os
 import re
 from base64 import b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from datetime import timedelta
 from os import PathLike
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from threading import Thread
 from typing import IO, Any, Final, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 
 from roadeval.fleet.entry import (
     BUCKETS,
-    HEAD,
     FleetError,
     bucket_and_key,
-    in_order,
-    is_heading,
-    is_log,
     is_url,
     last_part,
     scheme_of,
     shown,
 )
-from roadeval.logs import METADATA, RemoteLog
+from roadeval.logs import RemoteLog
 
 Answer = TypeVar("Answer")
 
@@ -67,17 +63,17 @@ _REASONS: Final = (
 
 
 def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
-    """Return what `roadeval.logs.open_log` opens of a drive: a path, or the files behind a URL.
+    """Return what `roadeval.logs.open_log` opens of a drive: a path, or the file behind a URL.
 
-    Of these only the parts that are needed are read. A `FleetError` if the URL cannot be one, or
+    Of it only the parts that are needed are read. A `FleetError` if the URL cannot be one, or
     nothing can be read there.
     """
     source = os.fspath(drive)
     if not is_url(source):
         return Path(source)
-    places = {Path(_file_name(each)): _place(each) for each in _files(source)}
-    files = {n: cast("IO[bytes]", _Parts(own, *_facts(own))) for n, own in places.items()}
-    return RemoteLog(shown(source), Path(_file_name(source)), files)
+    name, place = Path(_file_name(source)), _place(source)
+    file = cast("IO[bytes]", _Parts(place, *_facts(place)))
+    return RemoteLog(shown(source), name, file)
 
 
 class _Parts:
@@ -125,84 +121,25 @@ class _Parts:
         self._part = b""
 
 
-def stamp(url: str) -> Mapping[str, tuple[int, str | None]]:
-    """Return size and tag of the files of a drive, by name, to notice that it has changed.
+def stamp(url: str) -> tuple[int, str | None]:
+    """Return size and tag of the file behind a URL, to notice that it has changed.
 
     The tag is None where the server states none. A `FleetError` if it is not there, or cannot be
     asked.
     """
-    return {_file_name(each): _facts(_place(each)) for each in _files(url)}
-
-
-def drives_below(url: str) -> list[str]:
-    """Return the URLs of the logs and rosbag2 folders below a folder's, in natural order.
-
-    A `FleetError` if it holds none, or cannot be listed; no web server's can.
-    """
-    place = _listable(url)
-    keys = _keys(place)
-    below = len(PurePosixPath(place.key).parts)
-    bags = {key.parent for key in keys if key.name == METADATA and _heads_a_bag(place, key)}
-    logs = {
-        key
-        for key in keys
-        if key.parent not in bags
-        and is_log(key.name)
-        and not any(part.startswith(".") for part in key.parts[below:-1])
-    }
-    if not bags | logs:
-        raise FleetError(f"{shown(url)}: no log there or below")
-    ends = {folder: "/" if folder.parts else "" for folder in bags}
-    found = sorted(bags | logs, key=in_order)
-    return [f"{place.root}{'/'.join(key.parts)}{ends.get(key, '')}" for key in found]
+    return _facts(_place(url))
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where an object is: its store, its key there, and the URL of the store's root."""
+    """Where an object is: its store, and its key there."""
 
     url: str
     store: Any
     key: str = ""
-    root: str = ""
 
     def ask(self, function: Callable[..., Answer], *arguments: Any) -> Answer:
         return _ask(self.url, function, *arguments)
-
-
-def _files(url: str) -> list[str]:
-    """Return the URLs of a drive's files: its own, or of a rosbag2 folder those in it."""
-    if not url.endswith("/"):
-        return [url]
-    place = _listable(url)
-    folder = PurePosixPath(place.key)
-    files = [key for key in _keys(place) if key.parent == folder and is_log(key.name)]
-    if not files:
-        raise FleetError(f"{shown(url)}: a folder without *.mcap files")
-    return [f"{place.root}{key}" for key in sorted(files, key=in_order)]
-
-
-def _listable(url: str) -> _Place:
-    if scheme_of(url) not in BUCKETS:
-        raise FleetError(
-            f"{shown(url)}: a web server does not list its folders; name the files, or a manifest "
-            "of them"
-        )
-    return _place(url)
-
-
-def _keys(place: _Place) -> list[PurePosixPath]:
-    import obstore
-
-    listing = obstore.list(place.store, place.key.rstrip("/") or None)
-    return [PurePosixPath(each["path"]) for each in place.ask(listing.collect)]
-
-
-def _heads_a_bag(place: _Place, key: PurePosixPath) -> bool:
-    import obstore
-
-    result = place.ask(obstore.get, place.store, str(key))
-    return is_heading(bytes(place.ask(next, iter(result.stream(HEAD)), b""))[:HEAD])
 
 
 def _facts(place: _Place) -> tuple[int, str | None]:
@@ -239,7 +176,7 @@ def _place(url: str) -> _Place:
         # obstore ignores this variable where any option is given.
         allowed = {**TIMES, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
         store = _ask(url, kind, bucket, client_options=allowed, retry_config=RETRIES)
-        return _Place(url, store, key, f"{scheme}://{bucket}/")
+        return _Place(url, store, key)
     parts = urlsplit(url)
     user, at, host = parts.netloc.rpartition("@")
     plain = urlunsplit((parts.scheme, host, parts.path, parts.query, ""))

@@ -34,7 +34,6 @@ from roadeval.fleet.entry import (
     scheme_of,
     shown,
 )
-from roadeval.fleet.remote import drives_below
 from roadeval.logs import files_of
 from roadeval.runtime.text import visible
 
@@ -74,8 +73,10 @@ def _sources(word: str, base: Path) -> list[str]:
     """Return the sources of the drives that a word names; a path is relative to a folder."""
     if is_url(word):
         scheme_of(word)
+        if word.endswith("/"):
+            raise FleetError(f"{shown(word)}: a folder; name its logs, or a manifest of them")
         _no_manifest(Path(last_part(word)))
-        return drives_below(word) if word.endswith("/") else [word]
+        return [word]
     path = base / Path(word).expanduser()
     if path.is_dir():
         found = _below(path) or _none_below(path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -33,13 +33,13 @@ SMALL: Final = 50_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RemoteLog:
-    """A log that lies elsewhere, with its open files by their names."""
+    """A log that lies elsewhere: one file."""
 
     source: str
     """Where it lies, as it may be shown."""
     path: Path
     """Its name."""
-    files: Mapping[Path, IO[bytes]]
+    file: IO[bytes]
 
 
 def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> Log:
@@ -48,12 +48,11 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
     A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     if isinstance(path, RemoteLog):
-        opened, source, path = path.files, path.source, path.path
-        for name, file in opened.items():
-            check_content(name, file)
-        files, damage = list(opened), list[Damage]()
+        opened, source, path = path.file, path.source, path.path
+        check_content(path, opened)
+        files, damage = [path], list[Damage]()
     else:
-        opened, source, path = {}, str(path), Path(path)
+        opened, source, path = None, str(path), Path(path)
         files, damage = files_of(path)
     try:
         return Log(path, files, damage, config or LogConfig(), opened=opened, source=source)
@@ -84,11 +83,11 @@ class Log:
         damage: Sequence[Damage],
         config: LogConfig,
         *,
-        opened: Mapping[Path, IO[bytes]],
+        opened: IO[bytes] | None,
         source: str,
     ) -> None:
         self.path, self.source = path, source
-        is_file = path.is_file() or (bool(opened) and [*opened] == [path])
+        is_file = path.is_file() or opened is not None
         self.name = visible(path.stem if is_file else path.resolve().name)
         self.config = config
         self._limits = Limits(config.frames.max_pixels)
@@ -102,7 +101,7 @@ class Log:
                 file,
                 lambda *channel: kind_of(*channel) is not TopicKind.OTHER,
                 message_stamp,
-                opened=opened.get(file),
+                opened=opened,
             )
         ]
         self._readers = topic_readers(self._containers, self._limits, lacks_files=bool(damage))

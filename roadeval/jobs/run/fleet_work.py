@@ -170,9 +170,9 @@ def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
         files = [file for own in beside for file in logs.label_files(own)]
         found: dict[str, Any] = {}
         if entry.path is None:
+            size, tag = stamp(entry.source)
             # Without a tag nothing shows: it is equal to no other.
-            for name, (size, tag) in stamp(entry.source).items():
-                found[name] = [size, tag or secrets.token_hex()]
+            found[entry.id] = [size, tag or secrets.token_hex()]
         else:
             files += sorted(entry.path.iterdir()) if entry.path.is_dir() else [entry.path]
         facts = {str(file): file.stat() for file in files}
