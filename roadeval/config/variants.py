@@ -105,18 +105,13 @@ class Variant:
 
     def layout(self) -> VariantLayout:
         """Return the layout of the variant, which recording and tables need beforehand."""
-        return VariantLayout(
-            self.name, self._title(), self.pipeline.masks(), self.pipeline.layers()
-        )
-
-    def _title(self) -> str:
-        """Describe the variant in a few words."""
         found = self.pipeline.stages()
+        title = ", ".join(stage.title for stage in found if stage.name != FINAL_STAGE)
         if filters := [stage.title for stage in found if stage.is_filter]:
-            return f"with {', '.join(filters)}"
-        if self.of_pair:
-            return "without the filter"
-        return ", ".join(stage.title for stage in found if stage.name != FINAL_STAGE)
+            title = f"with {', '.join(filters)}"
+        elif self.of_pair:
+            title = "without the filter"
+        return VariantLayout(self.name, title, self.pipeline.masks(), self.pipeline.layers())
 
 
 def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, ...]:

@@ -79,7 +79,9 @@ def _sources(word: str, base: Path) -> list[str]:
         return [word]
     path = base / Path(word).expanduser()
     if path.is_dir():
-        found = _below(path) or _none_below(path)
+        if not (found := _below(path)):
+            files_of(path)  # an error that names what is there, and how to convert it
+            raise FleetError(f"{visible(str(path))}: no log that is complete, here or below")
     elif path.exists():
         found = [path]
     elif glob.has_magic(word):
@@ -97,9 +99,13 @@ def _no_manifest(path: Path) -> Path:
 
 def _below(folder: Path) -> list[Path]:
     """Return the logs and rosbag2 folders in a folder and those below it, in natural order."""
+
+    def refuse(error: OSError) -> None:
+        raise FleetError(f"{visible(str(error.filename))}: {error.strerror}") from error
+
     found: list[Path] = []
     seen: set[Path] = set()
-    for name, folders, files in os.walk(folder, onerror=_refuse, followlinks=True):
+    for name, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
         here = Path(name)
         if here.resolve() in seen:
             folders.clear()
@@ -108,11 +114,6 @@ def _below(folder: Path) -> list[Path]:
         folders[:] = sorted(filter(counts, folders))
         found += [here] if is_bag(here) else [here / each for each in files if is_log(each)]
     return sorted(found, key=lambda path: in_order(path.relative_to(folder)))
-
-
-def _none_below(folder: Path) -> list[Path]:
-    files_of(folder)  # an error that names what is there, and how to convert it
-    raise FleetError(f"{visible(str(folder))}: no log that is complete, here or below")
 
 
 def _matches(word: str, base: Path) -> list[Path]:
@@ -126,10 +127,6 @@ def _matches(word: str, base: Path) -> list[Path]:
     if not found:
         raise FleetError(f"{visible(word)}: no log matches it")
     return sorted(found, key=in_order)
-
-
-def _refuse(error: OSError) -> None:
-    raise FleetError(f"{visible(str(error.filename))}: {error.strerror}") from error
 
 
 def _absolute(path: Path) -> Path:

@@ -51,7 +51,10 @@ def visible(text: str) -> str:
     """
     if text.isprintable():
         return text
-    return "".join(letter if _harmless(letter) else _escaped(letter) for letter in text)
+    return "".join(
+        each if each.isprintable() or each in _JOINERS or category(each) == "Zs" else _escaped(each)
+        for each in text
+    )
 
 
 def visible_lines(text: str) -> str:
@@ -110,10 +113,6 @@ def as_markdown(text: str) -> str:
     a\*b
     """
     return "".join(f"\\{each}" if each in _MARKUP else each for each in visible(text))
-
-
-def _harmless(letter: str) -> bool:
-    return letter.isprintable() or letter in _JOINERS or category(letter) == "Zs"
 
 
 def _escaped(letters: str) -> str:

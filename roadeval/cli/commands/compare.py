@@ -71,7 +71,7 @@ def compare(
     from roadeval.jobs.results import compare as comparing
 
     with holding(*(output or ()), *filter(None, [junit]), inputs=results):
-        compared = comparing.attempt(results, variants=variant, fail_if=fail_if or [])
+        compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
         for path in output or []:
             comparing.write(compared, path)
         if junit:

@@ -75,8 +75,8 @@ def compare(
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 
-    A `RoadevalError` if a result cannot be read, or there is nothing to compare, or a condition not
-    to be judged.
+    A `RoadevalError` if a result cannot be read, or there is nothing to compare. Why a condition
+    cannot be judged is in `Compared.unjudged`.
 
     Parameters
     ----------
@@ -89,16 +89,6 @@ def compare(
     fail_if
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
-    found = attempt(results, variants=variants, fail_if=fail_if)
-    if found.unjudged:
-        raise ConditionError("; ".join(found.unjudged))
-    return found
-
-
-def attempt(
-    results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
-) -> Compared:
-    """Compare results as `compare`; a condition that cannot be judged is among the judgements."""
     conditions = [Condition.parse(text) for text in fail_if]
     paths = [Path(path) for path in listed(results)]
     across = len(paths) == 1

@@ -108,13 +108,28 @@ class FramePicker:
         self._scored = frozenset(result.rows["frame"].tolist())
         self._causes = {name: score.causes(result.rows, name) for name in self._variants}
 
-    def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
-        """Return frames for figure 2."""
-        return [self._example(self._recording, n) for n in numbers] if self._recording else []
+    def examples(self, numbers: Sequence[int]) -> Iterator[ExampleFrame]:
+        """Yield frames for figure 2."""
+        recording = self._recording
+        for frame in numbers if recording else ():
+            assert recording is not None
+            masks = {
+                v.name: self._result.layer(v.name, v.stages[-1], frame) for v in recording.variants
+            }
+            there = {name: mask for name, mask in masks.items() if mask is not None}
+            truth = recording.truth(frame) if frame in self._scored else None
+            yield ExampleFrame(frame, recording.image(frame), truth, there)
 
-    def thumbnails(self, numbers: Sequence[int]) -> list[LayerImage]:
-        """Return a picture of each frame: the first variant's errors, or without truth its mask."""
-        return [self._outcome(self._recording, n) for n in numbers] if self._recording else []
+    def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
+        """Yield a picture of each frame: the first variant's errors, or without truth its mask."""
+        recording = self._recording
+        for frame in numbers if recording else ():
+            assert recording is not None
+            first = recording.variants[0]
+            final = next(spec for spec in first.layers if spec.name == first.stages[-1])
+            spec = ERRORS if frame in self._scored else final
+            layer = recording.layer(first.name, spec.name, frame)
+            yield LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
 
     def worst(self) -> list[NotableFrame]:
         """Return the worst frames of the first variant, one a scene, all worse than the mean.
@@ -188,6 +203,10 @@ class FramePicker:
         ((_, _, rates),) = rates_by_frame(own, [*SHORT])
         first, recording = self._variants[0], self._recording
         seen = recording if recording is not None and frame in self._result.pictured else None
+        errors = (
+            (each.name, self._result.layer(each.name, ERRORS.name, frame))
+            for each in (seen.variants[self._outcomes] if seen else ())
+        )
         return NotableFrame(
             frame=frame,
             stamp_ns=stamp_ns,
@@ -196,15 +215,9 @@ class FramePicker:
             parts=self._causes[first].of(frame),
             change=change,
             notes=self._result.notes(frame, first),
-            images=[*outcomes(seen, frame, self._errors(seen, frame))] if seen else [],
+            images=[*outcomes(seen, frame, errors)] if seen else [],
             layers=[*self._layers(seen, frame)] if seen and change is None else [],
         )
-
-    def _errors(
-        self, recording: Recording, frame: int
-    ) -> Iterator[tuple[str, npt.NDArray[Any] | None]]:
-        for variant in recording.variants[self._outcomes]:
-            yield variant.name, self._result.layer(variant.name, ERRORS.name, frame)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
@@ -226,23 +239,6 @@ class FramePicker:
                 )
                 for place, (spec, array) in enumerate(known)
             ]
-
-    def _outcome(self, recording: Recording, frame: int) -> LayerImage:
-        variant = recording.variants[0]
-        if frame in self._scored:
-            spec = ERRORS
-        else:
-            spec = next(spec for spec in variant.layers if spec.name == variant.stages[-1])
-        layer = recording.layer(variant.name, spec.name, frame)
-        return LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
-
-    def _example(self, recording: Recording, frame: int) -> ExampleFrame:
-        masks = {
-            v.name: self._result.layer(v.name, v.stages[-1], frame) for v in recording.variants
-        }
-        there = {name: mask for name, mask in masks.items() if mask is not None}
-        truth = recording.truth(frame) if frame in self._scored else None
-        return ExampleFrame(frame, recording.image(frame), truth, there)
 
 
 def browsed(result: DriveResult) -> FrameBrowser:

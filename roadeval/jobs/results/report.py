@@ -53,9 +53,11 @@ def write_report(
     own = opened.drive.camera if opened.drive else ""
     camera = f"-{as_plain(own)}" if own else ""
     usual = Path("reports", f"{source.stem}{camera}.pdf") if opened.recording else None
-    path = Path(output or usual or _beside(source, camera))
+    path = Path(output or usual or source / f"report{camera}.pdf")
+    if not (output or usual) and leads_outside(path, source):  # it may come from someone else
+        raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
     with holding(path, inputs=[source]):
-        if not is_page(path):
+        if path.suffix.lower() not in PAGES:
             return write_file(path, pdf(document(findings_of(opened))))
         return write_page(path, page_of(opened, on_progress))
 
@@ -68,19 +70,6 @@ def findings_of(result: Result) -> Findings | FleetFolder:
         return collect_rig(result.rig)
     assert result.drive is not None
     return collect(result.drive)
-
-
-def _beside(folder: Path, camera: str) -> Path:
-    """Return where the report of a folder lies; its other files may come from someone else."""
-    path = folder / f"report{camera}.pdf"
-    if leads_outside(path, folder):
-        raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
-    return path
-
-
-def is_page(path: Path) -> bool:
-    """Return whether a file's name asks for a page."""
-    return path.suffix.lower() in PAGES
 
 
 def page_of(result: Result, on_progress: OnProgress = ignore) -> Document:
@@ -104,6 +93,8 @@ def collect(result: DriveResult) -> Findings:
     evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
     pictured = [number for number in result.pictured if number in evaluated]
     picker, drawn = FramePicker(result), result.facts.examples
+    if not set(drawn) <= set(result.pictured):
+        drawn = []
     worst = picker.worst()
     return Findings(
         path=str(result.path),
@@ -114,10 +105,8 @@ def collect(result: DriveResult) -> Findings:
         inspect=result.inspect if result.viewable else None,
         properties=result.properties,
         pictured=len(pictured),
-        examples=picker.examples(
-            drawn if drawn and set(drawn) <= set(result.pictured) else evenly(pictured, EXAMPLES)
-        ),
-        thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
+        examples=[*picker.examples(drawn or evenly(pictured, EXAMPLES))],
+        thumbnails=[*picker.thumbnails(evenly(pictured, THUMBNAILS))],
         worst=worst,
         helped=picker.moved([], harmed=False),
         harmed=picker.moved(worst, harmed=True),

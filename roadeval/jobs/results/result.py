@@ -58,7 +58,12 @@ class DriveResult:
     def __init__(self, path: str | Path, camera: str = "") -> None:
         self.path = Path(path)
         self.camera: Final = camera
-        self.recording = None if self.path.is_dir() else _recording(self.path, camera)
+        self.recording: Recording | None = None
+        if not self.path.is_dir():
+            # Only here: a folder is read without what reads a recording.
+            from roadeval.recording import Recording
+
+            self.recording = Recording(self.path, camera)
         self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path, camera)
         self._read: Final[dict[str, Rows]] = {}
 
@@ -499,10 +504,3 @@ def _digest(value: Any, *keys: str) -> str:
     for key in keys:
         value = value.get(key) if isinstance(value, Mapping) else None
     return value[:8] if isinstance(value, str) else ""
-
-
-def _recording(path: Path, camera: str) -> Recording:
-    # Only here: a folder is read without what reads a recording.
-    from roadeval.recording import Recording
-
-    return Recording(path, camera)
