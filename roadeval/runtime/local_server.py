@@ -71,7 +71,6 @@ NOT_FOUND: Final = told(HTTPStatus.NOT_FOUND, "There is nothing at this address.
 _REFUSED: Final = told(
     HTTPStatus.FORBIDDEN, "Refused: open the address that the terminal shows, token included."
 )
-_NO_BODY: Final = told(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "Nothing is taken here.")
 
 
 class LocalServer(ThreadingHTTPServer):
@@ -99,9 +98,8 @@ class LocalServer(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """A connection."""
+    """A request: each has a connection of its own, so no body is taken for the next one."""
 
-    protocol_version = "HTTP/1.1"
     server_version = "roadeval"
     sys_version = ""
     timeout = 30
@@ -119,10 +117,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Log nothing: the terminal is for people."""
 
     def _respond(self, *, acts: bool) -> None:
-        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
-            self.close_connection = True  # a body would be taken for the next request
-            self._send(_NO_BODY)
-        elif not self._is_ours(acts=acts) or (request := self._request(acts=acts)) is None:
+        if not self._is_ours(acts=acts) or (request := self._request(acts=acts)) is None:
             self._send(_REFUSED)
         else:
             self._send(self._answer(request))
