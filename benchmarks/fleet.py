@@ -67,7 +67,7 @@ def _frame_seconds(drive: Path, model: Path, folder: Path) -> tuple[float, int]:
 
 
 def _wall(logs: Path, model: Path, folder: Path, workers: int) -> float:
-    words = [ROADEVAL, "fleet", logs, "-o", folder, "--model", model, "--workers", workers, "-q"]
+    words = [ROADEVAL, "fleet", logs, "-o", folder, "--model", model, "--jobs", workers, "-q"]
     begun = perf_counter()
     subprocess.run(list(map(str, words)), check=True)
     return perf_counter() - begun

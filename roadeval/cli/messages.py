@@ -13,8 +13,6 @@ from roadeval.cli.options import with_flags
 from roadeval.runtime.text import debug, visible, visible_lines, without_secrets
 
 PROGRAM: Final = "roadeval"
-LONGEST: Final = 5_000
-"""Letters of a sentence; a damaged or hostile file may hold names of any length."""
 
 
 def error(sentence: object) -> None:
@@ -73,14 +71,8 @@ def one_line(sentence: object) -> str:
     return " ".join(line.strip() for line in str(sentence).splitlines())
 
 
-def _shortened(sentence: str) -> str:
-    """Leave out the middle of a long sentence."""
-    half = LONGEST // 2
-    return sentence if len(sentence) <= LONGEST else f"{sentence[:half]} ... {sentence[-half:]}"
-
-
 def _write(kind: str, style: str, sentence: object) -> None:
-    said = _shortened(visible(without_secrets(str(sentence))))
+    said = visible(without_secrets(str(sentence)))
     try:
         from rich.text import Text
 

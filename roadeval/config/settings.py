@@ -48,7 +48,7 @@ class ExecutionSettings:
     """How a run is executed; changes no number."""
 
     jobs: Annotated[int | None, Interval(ge=1, le=1000), Flag("--jobs", "N")] = None
-    """Worker threads. Default: one per CPU core."""
+    """Worker threads; processes of a fleet. Default: one per CPU core."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,5 @@ class FleetSettings:
     keep: Annotated[str, Checked(_keep), Flag("--keep", "WHAT")] = "none"
     """Recordings that stay: ``all``, those of the ``worst:N`` drives by ERR, or ``none``, which
     means that none is made."""
-    workers: Annotated[int | None, Interval(ge=1, le=1000), Flag("--workers", "N")] = None
-    """Processes that replay drives. Default: one per CPU core."""
     scheduler: Annotated[str | None, Flag("--scheduler", "ADDRESS")] = None
     """A Dask scheduler, as ``tcp://host:8786``, or its file: its workers replay the drives."""

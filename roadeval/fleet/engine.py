@@ -106,7 +106,7 @@ def _local(distributed: Any, count: int) -> Iterator[Any]:
         except (OSError, RuntimeError) as error:
             raise FleetError(
                 f"the worker processes cannot be started ({error}): give them more memory, "
-                "processes or open files (see ulimit -a), or take fewer `fleet.workers`"
+                "processes or open files (see ulimit -a), or take fewer `run.jobs`"
             ) from error
         yield stack.enter_context(client)
 

@@ -34,15 +34,6 @@ def test_text_from_elsewhere_is_escaped_wherever_it_stands(shown, monkeypatch):
     assert all(line.isprintable() for line in lines)
 
 
-def test_a_sentence_of_any_length_loses_its_middle(capsys):
-    messages.error("begin " + "x" * 20_000 + " end")
-    line = capsys.readouterr().err
-    assert line.startswith("roadeval: error: begin xx")
-    assert line.endswith("xx end\n")
-    assert " ... " in line
-    assert len(line) < messages.LONGEST + 50
-
-
 @pytest.mark.parametrize("columns", ["0", "1", "-5", "abc", "999999999999"])
 def test_a_width_that_no_terminal_has_is_no_width(columns, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", columns)

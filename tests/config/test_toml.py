@@ -57,7 +57,6 @@ OTHER = {
     "run.jobs": 1,
     "fleet.folds": 5,
     "fleet.keep": "worst:3",
-    "fleet.workers": 2,
     "fleet.scheduler": "tcp://host:8786",
 }
 """A value other than the default for every option of the command line."""
@@ -118,9 +117,7 @@ def test_every_setting_is_documented_with_its_range():
         if (" = " in line or line.endswith(" =")) and not before.startswith("#")
     ]
     assert undocumented == ['preset = "gated"']
-    assert (
-        "# Worker threads. Default: one per CPU core. At least 1, at most 1000.\n# jobs =\n" in text
-    )
+    assert "Default: one per CPU core. At least 1, at most 1000.\n# jobs =\n" in text
     assert "One of auto, truth, patch.\nsource" in text.replace("\n# ", " ")
     assert "Above 0, at most 1.\nscale = 1.0\n" in text
     assert "``" not in text

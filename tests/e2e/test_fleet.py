@@ -108,7 +108,7 @@ def copied(ran, tmp_path):
 def test_dasks_workers_replay_every_drive_and_the_broken_one_is_named(drives, ran, tmp_path):
     (tmp_path / "cwd").mkdir()
     (tmp_path / "cwd" / "multiprocessing.py").write_text("raise SystemExit('not to be run')")
-    words = ("fleet", drives, "-o", tmp_path / "f", "--train-frames", 4, "--workers", 2)
+    words = ("fleet", drives, "-o", tmp_path / "f", "--train-frames", 4, "--jobs", 2)
     done = here(*words, cwd=tmp_path / "cwd")
     assert done.returncode == 3, done.stderr
     assert "3 drives: 2 scored, 1 failed; 20 frames evaluated" in done.stdout

@@ -272,8 +272,8 @@ def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word):
         ("replay", word),
         ("info", word),
         ("report", word),
-        ("fleet", word, "-o", folder, "--workers", 1),
-        ("fleet", manifest, "-o", folder, "--workers", 1),
+        ("fleet", word, "-o", folder, "--jobs", 1),
+        ("fleet", manifest, "-o", folder, "--jobs", 1),
     ):
         done = here(*words, cwd=tmp_path)
         assert done.returncode in (1, 3)

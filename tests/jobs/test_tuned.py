@@ -256,7 +256,7 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
 @pytest.mark.parametrize("by", ["network", "masks", "files"])
 def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path, by):
     drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(2)]
-    fleet = {"folds": 2, "workers": 1}
+    fleet = {"folds": 2}
     if by == "network":
         config = with_network(folder, fleet=fleet)
     else:

@@ -215,8 +215,7 @@ class FleetRun:
     def _engine(self) -> Executor:
         """Return who does the tasks."""
         if self.executor is None:
-            asked = self.config.fleet
-            starting = started(asked.workers, asked.scheduler)
+            starting = started(self.config.run.jobs, self.config.fleet.scheduler)
             self.executor, count = self.stack.enter_context(starting)
             self.workers = max(count, 1)
         return self.executor
