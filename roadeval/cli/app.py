@@ -6,7 +6,9 @@ import gc
 import os
 import re
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Annotated, Any, Final
 
 import typer
@@ -17,7 +19,6 @@ from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
-from roadeval.runtime.discovery import found_in
 from roadeval.runtime.text import debug, defect
 
 FIRST: Final = (
@@ -41,9 +42,8 @@ app = typer.Typer(
 )
 
 
-def _place(command: Callable[..., int]) -> int:
+def _place(name: str) -> int:
     """Return the place of a command in the help."""
-    name = command.__name__
     return FIRST.index(name) if name in FIRST else len(FIRST)
 
 
@@ -63,8 +63,9 @@ class Command(TyperCommand):
                 formatter.write_dl(records)
 
 
-for _command in sorted(found_in(commands, "COMMAND"), key=_place):
-    app.command(cls=Command)(_command)
+for _name in sorted((each.name for each in iter_modules(commands.__path__)), key=_place):
+    # A command is the function that bears its file's name.
+    app.command(cls=Command)(getattr(import_module(f"{commands.__name__}.{_name}"), _name))
 
 
 def _show_version(wanted: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
@@ -84,6 +84,3 @@ def compare(
     for warning in compared.comparison.warnings:
         messages.warning(warning)
     return messages.conditions(compared.held, compared.unjudged)
-
-
-COMMAND: Final = compare

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from roadeval.cli import arguments, console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import Given, takes
@@ -24,6 +22,3 @@ def config(*, given: Given) -> int:
 
     console.emit(config_toml(settings).rstrip())
     return ExitCode.DONE
-
-
-COMMAND: Final = config

@@ -27,6 +27,3 @@ def demo(
     if not quiet:
         console.emit(str(log))
     return ExitCode.DONE
-
-
-COMMAND: Final = demo

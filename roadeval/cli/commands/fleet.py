@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
@@ -58,6 +58,3 @@ def fleet(
     for sentence in screen.problems(found):
         messages.warning(sentence)
     return ExitCode.LOSS if found.lost else ExitCode.DONE
-
-
-COMMAND: Final = fleet

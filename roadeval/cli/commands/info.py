@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
@@ -41,6 +41,3 @@ def info(
         if damage not in found.losses:
             messages.warning(damage)
     return messages.losses(found.losses)
-
-
-COMMAND: Final = info

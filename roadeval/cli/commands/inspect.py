@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -106,6 +106,3 @@ def _show(
     shown = job.view(drive, frame, file)
     if file:
         console.emit(f"{file}: {of}frame {shown}{why}")
-
-
-COMMAND: Final = inspect

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
@@ -39,6 +39,3 @@ def pack(
         masks = f", {packed.labelled} with a mask" if truth else ""
         console.emit(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
     return ExitCode.DONE
-
-
-COMMAND: Final = pack

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from shlex import join, quote
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -96,6 +96,3 @@ def _next(found: Sequence[Outcome], output: Path) -> str:
         return f"roadeval replay {logs} --config {config} --truth {quote(str(output))}"
     truth = quote(f"{output}/{{drive}}")
     return f"roadeval fleet {logs} --config {config} --truth {truth} -o labelled"
-
-
-COMMAND: Final = pick

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from roadeval.cli import arguments, console, messages, progress, streams
 from roadeval.cli.options import Given, takes
@@ -52,6 +52,3 @@ def _spare_pandas(config: RunConfig) -> None:
         from roadeval.runtime.imports import leave_out_pandas
 
         leave_out_pandas()
-
-
-COMMAND: Final = replay

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
@@ -50,6 +50,3 @@ def report(
     for warning in opened.warnings:
         messages.warning(warning)
     return ExitCode.DONE
-
-
-COMMAND: Final = report

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
@@ -30,6 +30,3 @@ def _tell(address: str) -> None:
     console.emit(address)
     console.flush()
     messages.note("open that address in a browser; Ctrl-C ends")
-
-
-COMMAND: Final = serve

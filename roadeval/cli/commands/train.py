@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
@@ -49,6 +49,3 @@ def train(
             f"{model.pixels} pixels, by the {model.source}"
         )
     return messages.losses(model.losses)
-
-
-COMMAND: Final = train
