@@ -183,8 +183,9 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
+    shadow = "Shadow is what the filter took for shadow, right or wrong. " * ("shadow" in names)
     note = (
-        "Shadow is what the filter took for shadow, right or wrong. Near the road's edge: within "
+        f"{shadow}Near the road's edge: within "
         f"{findings.facts.evaluation.boundary_width} pixels of the border between road and "
         "non-road in the truth. Regions overlap; regions.csv has their counts."
     )
@@ -211,10 +212,11 @@ def stages(findings: Findings) -> Iterator[Block]:
         "scale.",
     )
     yield _parts_table(findings)
+    both = {FILTERED, UNFILTERED} <= findings.totals.keys()
+    of_filter = f" what {FILTERED} has more or less than {UNFILTERED} in it;" if both else ""
     note = (
         "How ERR comes about, in percent of the pixels: the mask that the last stage is given, "
-        f"without the filter; what {FILTERED} has more or less than {UNFILTERED} in it; and what "
-        "the last stage makes of it."
+        f"without the filter;{of_filter} and what the last stage makes of it."
     )
     yield Text(note, "note")
     numbers: list[Block] = [stages_table(findings.totals, findings.changes)]
