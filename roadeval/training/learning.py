@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Truth
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Role, Truth
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import BlindPrior
 from roadeval.logs import LoggedFrame, Picks, Why
@@ -26,7 +26,6 @@ from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import Output, StageError, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
-from roadeval.training.schedule import Schedule
 from roadeval.training.settings import TrainingSettings
 
 COLLAPSED: Final = 0.001
@@ -223,6 +222,35 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """What each frame of a run is used for."""
+
+    digests: frozenset[str]
+    """Hashes of the frames that trained the model."""
+    gap: frozenset[int] = frozenset()
+    """Numbers of the frames after them that are left out as well."""
+    first: int | None = None
+    """Number of the first frame to evaluate, where it is known beforehand."""
+    picks: Picks | None = None
+    """Which frames were picked to be labelled: those that were drawn at random are evaluated."""
+
+    def role(self, frame: Frame) -> Role:
+        """Return what a decoded frame is used for."""
+        if frame.digest() in self.digests:
+            return Role.TRAINING
+        if frame.number in self.gap:
+            return Role.GAP
+        if frame.truth is None:
+            return Role.UNLABELLED
+        if self.picks is not None:
+            if self.picks.is_proposal(frame.stamp_ns, frame.truth):
+                return Role.UNLABELLED
+            if frame.stamp_ns not in self.picks.stamps_of(Why.RANDOM):
+                return Role.PICKED
+        return Role.EVALUATED
 
 
 GREATEST_MEMORY: Final = 2 << 30

@@ -9,8 +9,7 @@ from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingError, TrainingSettings, learning, save_model
-from roadeval.training.learning import fit, from_drives, from_file, from_log, spread
-from roadeval.training.schedule import Schedule
+from roadeval.training.learning import Schedule, fit, from_drives, from_file, from_log, spread
 from tests.training.making import frame, pipelines
 
 PIPELINES = {

@@ -35,8 +35,8 @@ from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model, TrainingSettings, learning
+from roadeval.training.learning import Schedule
 from roadeval.training.model import ModelError
-from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
 
 KEPT: Final = 5
