@@ -7,6 +7,7 @@ does, too: ``/bucket/key`` is an object of its bucket.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -14,6 +15,8 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, Self
 from urllib.parse import urlsplit
+
+import pytest
 
 CONTENT = bytes(range(256)) * 40_000
 """Ten megabytes."""
@@ -107,3 +110,16 @@ class Server(ThreadingHTTPServer):
     def __exit__(self, *_: Any) -> None:
         self.shutdown()
         self.server_close()
+
+
+def s3_is_at(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the environment name this S3 endpoint, without TLS."""
+    for key in [key for key in os.environ if key.startswith("AWS_")]:
+        monkeypatch.delenv(key)
+    for key, value in {
+        "AWS_ACCESS_KEY_ID": "user",
+        "AWS_SECRET_ACCESS_KEY": "geheim",
+        "AWS_ENDPOINT_URL": url,
+        "AWS_ALLOW_HTTP": "true",
+    }.items():
+        monkeypatch.setenv(key, value)

@@ -12,7 +12,7 @@ import pytest
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet import readable, remote, stamp
-from tests.fleet.serving import CONTENT, SLOW, Server
+from tests.fleet.serving import CONTENT, SLOW, Server, s3_is_at
 
 
 @pytest.fixture(scope="module")
@@ -36,15 +36,7 @@ def server(running, monkeypatch):
 @pytest.fixture
 def s3(server, monkeypatch):
     """The server as an S3 endpoint without TLS."""
-    for key in [key for key in os.environ if key.startswith("AWS_")]:
-        monkeypatch.delenv(key)
-    for key, value in {
-        "AWS_ACCESS_KEY_ID": "user",
-        "AWS_SECRET_ACCESS_KEY": "geheim",
-        "AWS_ENDPOINT_URL": server.url(""),
-        "AWS_ALLOW_HTTP": "true",
-    }.items():
-        monkeypatch.setenv(key, value)
+    s3_is_at(server.url(""), monkeypatch)
     return server
 
 

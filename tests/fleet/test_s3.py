@@ -1,6 +1,5 @@
 """Drives in a bucket: on the S3 server of moto, at 127.0.0.1."""
 
-import os
 from importlib.util import find_spec
 from urllib.request import Request, urlopen
 
@@ -10,6 +9,7 @@ from roadeval.errors import RoadevalError
 from roadeval.fleet import find_drives, readable, stamp
 from roadeval.logs import open_log
 from tests.fixtures.elsewhere import talker
+from tests.fleet.serving import s3_is_at
 
 if not all(map(find_spec, ("moto", "flask"))):
     pytest.skip("moto[s3] and flask are not installed", allow_module_level=True)
@@ -33,15 +33,7 @@ def bucket():
 
 @pytest.fixture
 def s3(bucket, monkeypatch):
-    for key in [key for key in os.environ if key.startswith("AWS_")]:
-        monkeypatch.delenv(key)
-    for key, value in {
-        "AWS_ACCESS_KEY_ID": "user",
-        "AWS_SECRET_ACCESS_KEY": "geheim",
-        "AWS_ENDPOINT_URL": bucket,
-        "AWS_ALLOW_HTTP": "true",
-    }.items():
-        monkeypatch.setenv(key, value)
+    s3_is_at(bucket, monkeypatch)
 
 
 @pytest.fixture
