@@ -171,7 +171,7 @@ def test_a_page_does_what_it_says(page, here, pytestconfig):
             (here / file[1]).parent.mkdir(parents=True, exist_ok=True)
             (here / file[1]).write_text(content)
             for line in lines_of(content) if language == "yaml" else ():
-                run(here, "bash", "-e", "-c", line)
+                run(here, "bash", "-e", "-c", line, GITHUB_STEP_SUMMARY="summary.md")
         elif language == "sh" and not content.startswith(BY_CI):
             said = run(here, "bash", "-eu", "-c", content)
             continue
