@@ -120,7 +120,7 @@ class Selection:
         if self.no_truth:
             lines.append(f"no truth: {self.no_truth}")
         if (clock := self.camera.clock) is not Clock.STAMP:
-            lines.append(f"the header stamps are all zero or equal: {clock} take their place")
+            lines.append(f"the header stamps are all zero or equal; used in place of them: {clock}")
         return tuple(lines)
 
 

@@ -219,6 +219,7 @@ class Clock(StrEnum):
 
     STAMP = "header stamps"
     LOG_TIME = "log times"
+    ORDER = "their order"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,7 +229,7 @@ class Camera:
     images: TopicReader
     topic: TopicInfo
     clock: Clock
-    """Header stamps if they differ, else log times."""
+    """Header stamps if they differ, else log times, else their order."""
     tolerance_ns: int
     """Largest time between an image and its label."""
     resize_labels: bool
@@ -247,7 +248,8 @@ def clock_of(reader: TopicReader) -> Clock:
     known = list(islice((stamp for stamp in stamps if stamp != UNREADABLE), LOOKED_AT))
     if len(set(known)) > 1 or (len(known) == 1 and any(known)):
         return Clock.STAMP
-    return Clock.LOG_TIME
+    times = reader.log_times[:LOOKED_AT]
+    return Clock.LOG_TIME if len(times) <= 1 or times[0] != times[-1] else Clock.ORDER
 
 
 def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
@@ -417,20 +419,22 @@ def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
 
 
 def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
-    """Pair by stamps, or by log times where the log has no stamps."""
-    images = camera.images
-    if camera.clock is Clock.STAMP:
+    """Pair by stamps, by log times, or by order where the log has no times at all.
+
+    Order means something only if there is a label for each image.
+    """
+    images, clock = camera.images, camera.clock
+    if clock is Clock.STAMP:
         period = median_period(images.log_times)
         in_order = period > 0 and _rise(images) and _rise(labels)
         reach = max(REACH * period, camera.tolerance_ns) if in_order else None
         return Pairing(images, labels, camera.tolerance_ns, reach)
-    # Where all times are equal, order means something only if there is a label for each image.
-    in_order = len(images) == len(labels) or images.log_times[0] != images.log_times[-1]
-    return Pairing(
-        Times(images.log_times),
-        Times(labels.log_times, None if in_order else 0),
-        camera.tolerance_ns,
-    )
+    if clock is Clock.LOG_TIME:
+        return Pairing(Times(images.log_times), Times(labels.log_times), camera.tolerance_ns)
+    count = min(labels.sure, len(labels) if len(images) == len(labels) else 0)
+    unsure = len(images) - min(images.sure, labels.sure)
+    frames = Times(range(len(images)), images.sure)
+    return Pairing(frames, Times(range(count)), camera.tolerance_ns, unsure=unsure)
 
 
 def _rise(stamps: Stamps) -> bool:
@@ -441,6 +445,8 @@ def _rise(stamps: Stamps) -> bool:
 
 def check_times(pairing: Pairing, name: str, clock: Clock) -> None:
     """Refuse, as a `LogError`, labels beside the log of which none has the time of a frame."""
+    if not len(pairing.labels):
+        raise LogError(f"{name}: the log has no times to pair by; set `truth.pair` to number")
     if next(frames_of(pairing), None) is None:
         theirs, ours = (_some_times(each) for each in (pairing.labels, pairing.images))
         raise LogError(

@@ -138,7 +138,7 @@ class Topic:
         ([1, 2, 3], TIMES, Clock.STAMP),
         ([0, 0, 0], TIMES, Clock.LOG_TIME),
         ([7, 7, 7], TIMES, Clock.LOG_TIME),
-        ([0, 0, 0], [100, 100, 100], Clock.LOG_TIME),
+        ([0, 0, 0], [100, 100, 100], Clock.ORDER),
         ([7], [100], Clock.STAMP),
         ([0], [100], Clock.LOG_TIME),
         # Of all images but one nothing can be read: that its stamp is the only one says nothing.
