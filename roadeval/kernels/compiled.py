@@ -84,7 +84,7 @@ def look_up_colours(planes: Planes, road: Words) -> Plane:
     height, width = _shape(*planes)
     result = np.empty((height, width), np.uint8)
     room = np.empty(width, np.int32), np.empty(width, np.uint8)
-    _loops.look_up_colours(*planes, height, width, road, None, result, *room)
+    _loops.look_up_colours(*planes, height, width, road, result, *room)
     return result
 
 
@@ -133,8 +133,8 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 def keep_region(bits: Bits, width: int) -> Bits:
     room, kept = _room_for_runs(bits, width), np.zeros_like(bits)
-    votes = np.empty_like(room[3])
-    _loops.keep_region(bits, len(bits), width, None, *room, votes, kept)
+    votes = np.zeros_like(room[3])
+    _loops.keep_region(bits, len(bits), width, *room, votes, kept)
     return kept
 
 

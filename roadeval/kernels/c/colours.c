@@ -93,10 +93,10 @@ LOOP void mahalanobis(
     }
 }
 
-/* `left` may be NULL. `words` and `bits`: `width` for what lies between two steps. */
+/* `words` and `bits`: `width` for what lies between two steps. */
 LOOP void look_up_colours(
     const uint8_t *restrict red, const uint8_t *restrict green, const uint8_t *restrict blue,
-    int64_t height, int64_t width, const uint64_t *restrict road, const uint64_t *restrict left,
+    int64_t height, int64_t width, const uint64_t *restrict road,
     uint8_t *restrict result, int32_t *restrict words, uint8_t *restrict bits)
 {
     for (int64_t y = 0; y < height; y++) {
@@ -109,7 +109,5 @@ LOOP void look_up_colours(
         }
         for (int64_t x = 0; x < width; x++)
             found[x] = road[words[x]] >> bits[x] & 1;
-        for (int64_t x = 0; left && x < width; x++)
-            found[x] |= (left[words[x]] >> bits[x] & 1) << 1;
     }
 }

@@ -46,7 +46,7 @@ void mahalanobis(
     RGB, int64_t height, int64_t width, const double *mean, const double *whitening,
     double greatest, float *distance, uint8_t *near);
 void look_up_colours(
-    RGB, int64_t height, int64_t width, const uint64_t *road, const uint64_t *left,
+    RGB, int64_t height, int64_t width, const uint64_t *road,
     uint8_t *result, int32_t *words, uint8_t *bits);
 void run_sums(RGB, int64_t width, const run_t *runs, int64_t count, int64_t *sums);
 void ring_sums(
@@ -60,7 +60,7 @@ int64_t components(
     const uint64_t *bits, int64_t height, int64_t width, int corner, int64_t *rows,
     int32_t *starts, int32_t *ends, int64_t *parents, run_t *runs);
 void keep_region(
-    const uint64_t *bits, int64_t height, int64_t width, const uint8_t *patch, int64_t *rows,
+    const uint64_t *bits, int64_t height, int64_t width, int64_t *rows,
     int32_t *starts, int32_t *ends, int64_t *parents, int64_t *votes, uint64_t *kept);
 void fill_holes(
     const uint64_t *bits, int64_t height, int64_t width, int64_t *rows, int32_t *starts,

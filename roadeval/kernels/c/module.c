@@ -49,7 +49,7 @@ static bool is_of(const Py_buffer *view, char type)
  *
  * A kind is n, a size or a flag; d, a number; or an array: the type of its elements by the letter
  * of Python's module `struct`, and how many dimensions it has. Before that a > stands where the
- * loop writes, a ? where None may be given. */
+ * loop writes. */
 static bool take(
     taken_t *taken, const char *kinds, PyObject *const *arguments, Py_ssize_t count)
 {
@@ -68,13 +68,9 @@ static bool take(
         } else if (*kind == 'd' && (kind[1] == ' ' || kind[1] == '\0')) {
             taken->given[place++].number = PyFloat_AsDouble(argument);
         } else {
-            bool optional = *kind == '?', written = *kind == '>';
-            kind += optional || written;
+            bool written = *kind == '>';
+            kind += written;
             char type = *kind++;
-            if (optional && argument == Py_None) {
-                taken->given[place++].array = NULL;
-                continue;
-            }
             Py_buffer *view = &taken->views[taken->held];
             int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (written ? PyBUF_WRITABLE : 0);
             if (PyObject_GetBuffer(argument, view, flags) < 0) {
@@ -128,8 +124,8 @@ FUNCTION(look_up_sum_min, "B2 B2 B2 n n B2 >B2 >q1 >i1",
 FUNCTION(mahalanobis, "B2 B2 B2 n n d1 d2 d >f2 >B2",
     mahalanobis(PLANES, ARRAY(5), ARRAY(6), NUMBER(7), ARRAY(8), ARRAY(9)))
 
-FUNCTION(look_up_colours, "B2 B2 B2 n n Q1 ?Q1 >B2 >i1 >B1",
-    look_up_colours(PLANES, ARRAY(5), ARRAY(6), ARRAY(7), ARRAY(8), ARRAY(9)))
+FUNCTION(look_up_colours, "B2 B2 B2 n n Q1 >B2 >i1 >B1",
+    look_up_colours(PLANES, ARRAY(5), ARRAY(6), ARRAY(7), ARRAY(8)))
 
 FUNCTION(run_sums, "B2 B2 B2 n i2 n >q2",
     run_sums(ARRAY(0), ARRAY(1), ARRAY(2), SIZE(3), ARRAY(4), SIZE(5), ARRAY(6)))
@@ -146,9 +142,9 @@ FUNCTION(components, "Q2 n n n >q1 >i1 >i1 >q1 >i2",
     found = components(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6),
         ARRAY(7), ARRAY(8)))
 
-FUNCTION(keep_region, "Q2 n n ?B2 >q1 >i1 >i1 >q1 >q1 >Q2",
+FUNCTION(keep_region, "Q2 n n >q1 >i1 >i1 >q1 >q1 >Q2",
     keep_region(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), ARRAY(7),
-        ARRAY(8), ARRAY(9)))
+        ARRAY(8)))
 
 FUNCTION(fill_holes, "Q2 n n >q1 >i1 >i1 >q1 >B1 >Q2",
     fill_holes(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), ARRAY(7),

@@ -7,8 +7,6 @@
  * A mask is `height` rows of `words`, see bits.c. `rows`, one more than rows, `starts` and `ends`,
  * width / 2 + 1 a row, and `parents`, as many, are given by the caller as room to work in. */
 
-#include <string.h>
-
 #include "loops.h"
 
 /* Find the runs of ones (or of zeros, if not `inside`), row after row, and return how many.
@@ -115,32 +113,17 @@ LOOP int64_t components(
     return count;
 }
 
-/* `patch` may be NULL; `votes` as many as `parents`; `kept` cleared. */
+/* `votes`: as many as `parents`, cleared; `kept` cleared. */
 LOOP void keep_region(
-    const uint64_t *bits, int64_t height, int64_t width, const uint8_t *patch,
+    const uint64_t *bits, int64_t height, int64_t width,
     int64_t *rows, int32_t *starts, int32_t *ends, int64_t *parents, int64_t *votes,
     uint64_t *restrict kept)
 {
     int64_t words = (width + 63) / 64;
     int64_t count = find_runs(bits, height, width, true, rows, starts, ends);
     join_runs(rows, starts, ends, height, 1, parents);
-    bool decided = false;
-    for (int by_patch = 1; by_patch >= 0 && !decided; by_patch--) {
-        if (by_patch && !patch)
-            continue;
-        memset(votes, 0, (size_t)count * sizeof *votes);
-        for (int64_t y = 0; y < height; y++)
-            for (int64_t run = rows[y]; run < rows[y + 1]; run++) {
-                int64_t vote = ends[run] - starts[run];
-                if (by_patch) {
-                    vote = 0;
-                    for (int64_t x = starts[run]; x < ends[run]; x++)
-                        vote += patch[y * width + x] > 0;
-                }
-                votes[parents[run]] += vote;
-                decided |= vote > 0;
-            }
-    }
+    for (int64_t run = 0; run < count; run++)
+        votes[parents[run]] += ends[run] - starts[run];
     /* A component's own number is its first run's: of equals the first from the top is found. */
     int64_t best = 0;
     for (int64_t run = 1; run < count; run++)
