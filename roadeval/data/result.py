@@ -249,9 +249,8 @@ class FrameResult:
     for each variant and stage that says so, and ``oracles`` the counts of what the stages
     made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
     their seed. ``metres`` are the measures of each final mask by variant where the camera is known,
-    and ``above`` the histograms of the ground seen from above. ``doubts`` has each variant's,
-    without truth.
-    ``notes`` are sentences for a person.
+    and ``above`` the ground seen from above by how probable road is. ``doubts`` has each variant's,
+    without truth. ``notes`` are sentences for a person.
     """
 
     frame: Frame

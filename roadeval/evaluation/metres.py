@@ -38,6 +38,8 @@ FARTHEST: Final = 4000
 GAP: Final = 0.3
 """A gap in the road of fewer metres across is no edge; ahead of fewer than `GAP_AHEAD`."""
 GAP_AHEAD: Final = 0.5
+LEVELS: Final = 256
+"""Thresholds of KITTI's road benchmark, whose confidences have eight bits."""
 Pixels = npt.NDArray[np.intp]
 """``(n,)``: places in a flat image; `OUTSIDE` of none."""
 
@@ -115,12 +117,17 @@ class Survey:
         placed = unpack(np.bitwise_or.reduce([*bands.values()]), self._shape[1])
         return {**bands, UNPLACED: pack(placed == 0)}
 
-    def histogram(self, probability: Probability, truth: Truth) -> Histogram:
-        """Count cells of the ground seen from above as `roadeval.data.histogram` does pixels."""
+    def levels(self, probability: Probability, truth: Truth) -> Histogram:
+        """Count cells of the ground seen from above: ``(2, LEVELS)`` uint32, non-road and road.
+
+        Arguments are as of `roadeval.data.histogram`; a level is the greatest of KITTI's thresholds
+        that a probability reaches.
+        """
         pixels, cells = self._above
         codes, labels = (each.ravel()[pixels] for each in (probability, truth))
+        levels = codes // ((CODES - 1) // (LEVELS - 1))
         counts = [
-            np.bincount(codes[labels == each], cells[labels == each], CODES)
+            np.bincount(levels[labels == each], cells[labels == each], LEVELS)
             for each in (NON_ROAD, ROAD)
         ]
         return np.array(counts, np.uint32)
@@ -250,6 +257,8 @@ def _runs(flags: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> list[Run
 
 def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
     """Join stretches with less than ``gap`` metres between them."""
+    if len(runs) < 2:
+        return runs
     joined: Runs = []
     for start, stop in runs:
         if joined and abs(borders[start] - borders[joined[-1][1]]) < gap:
@@ -275,10 +284,10 @@ def _sides(
     if best is None:
         return math.nan, math.nan, middle
     start, stop = best
-    last = len(borders) - 1
-    inner = [(0, last)] if known is None else known
-    left = any(first < start <= end for first, end in inner)
-    right = any(first <= stop < end for first, end in inner)
+    left, right = start > 0, stop < len(borders) - 1
+    if known is not None:
+        left = any(first < start <= end for first, end in known)
+        right = any(first <= stop < end for first, end in known)
     return (
         borders[start] if left else math.nan,
         borders[stop] if right else math.nan,

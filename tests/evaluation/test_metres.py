@@ -170,6 +170,11 @@ def test_of_a_homography_alone_nothing_is_said_of_other_cameras():
     assert all(np.isnan(each.low) for each in sums.totals(Curves()))
 
 
+def levels(counts: npt.NDArray[np.uint32]) -> npt.NDArray[np.int64]:
+    """Add up the counts of each probability between KITTI's thresholds."""
+    return np.add.reduceat(counts.astype(np.int64), 257 * np.arange(256), axis=1)
+
+
 def devkit(truth: Mask, confidence: npt.NDArray[Any]) -> dict[str, float]:
     """MaxF and AP as defined by KITTI's benchmark, threshold by threshold."""
     points = []
@@ -192,7 +197,7 @@ def test_maxf_and_ap_are_those_of_kittis_definition(seed: int):
     codes = (257 * np.clip(rng.normal(90 + 80 * (truth == 1), 60), 0, 255).astype(int)).astype(
         np.uint16
     )
-    found = kitti(np.zeros(4, np.int64), histogram(codes, truth).astype(np.int64))
+    found = kitti(np.zeros(4, np.int64), levels(histogram(codes, truth)))
     assert found == pytest.approx(devkit(truth, codes / 65535))
 
 
@@ -202,7 +207,7 @@ def test_the_histogram_from_above_is_that_of_the_picture_from_above():
     codes = rng.integers(0, 65536, SIZE[::-1]).astype(np.uint16)
     plan = plan_of(GROUND, EvaluationSettings())
     expected = histogram(plan.picture(codes), plan.picture(truth, 255))
-    assert (SURVEY.histogram(codes, truth) == expected).all()
+    assert (SURVEY.levels(codes, truth) == levels(expected)).all()
 
 
 def test_a_mask_is_measured_at_the_road_of_the_truth_and_not_at_another_ahead():
@@ -221,8 +226,8 @@ def test_each_variant_has_its_own_curve_and_sizes_are_without_sign():
         sums.add(dict.fromkeys(("sure", "lost"), measured(road(left, 3), truth)))
     curves.add(
         {
-            ("sure", "post"): SURVEY.histogram(codes, truth),
-            ("lost", "post"): SURVEY.histogram(inverse, truth),
+            ("sure", "post"): SURVEY.levels(codes, truth),
+            ("lost", "post"): SURVEY.levels(inverse, truth),
         },
     )
     rows = {(e.variant, e.measure, e.where): e for e in sums.totals(curves)}

@@ -105,7 +105,7 @@ def score_frame(
         repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
         metres=metres,
         above={
-            (variant.variant, each.stage): survey.histogram(each.output.probability, frame.truth)
+            (variant.variant, each.stage): survey.levels(each.output.probability, frame.truth)
             for variant in variants
             for each in variant.stages
             if survey and each.output.probability is not None

@@ -10,14 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.data import CODES, FrameMetres
+from roadeval.data import FrameMetres
 from roadeval.data.arrays import Bits, Floats, Sums, TruthBits
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, Survey
 from roadeval.evaluation.score.counts import count
 from roadeval.evaluation.score.thresholds import Curves
 
-LEVELS: Final = 256
-"""Thresholds of KITTI's road benchmark, whose confidences have eight bits."""
 RECALLS: Final = np.linspace(0, 1, 11)
 CENTIMETRES: Final = 100
 SPAN: Final = 1 << 20
@@ -158,11 +156,11 @@ def _final(curves: Curves, variant: str) -> Sums | None:
     return found[-1] if found else None
 
 
-def kitti(counts: Sums, histogram: Sums | None) -> dict[str, float]:
+def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     """Compute what KITTI's road benchmark does, of cells of the ground seen from above [1]_.
 
     Of a mask, ``(4,)`` TP, TN, FP and FN: its ``F1``, ``precision`` and ``recall``. Given the cells
-    by how probable road is, ``(2, 65536)`` non-road and road: ``MaxF``, the greatest F1 of 256
+    by how probable road is, ``(2, 256)`` as of `Survey.levels`: ``MaxF``, the greatest F1 of 256
     thresholds, with the precision and recall there; and ``AP``, the mean over eleven recalls from 0
     to 1 of the greatest precision at that recall or more. NaN without road.
 
@@ -172,7 +170,7 @@ def kitti(counts: Sums, histogram: Sums | None) -> dict[str, float]:
        Road Detection Algorithms, ITSC 2013.
     """
     tp, _, fp, fn = counts.tolist()
-    if histogram is None or not histogram[1].sum():
+    if levels is None or not levels[1].sum():
         nan = math.nan
         return {
             "F1": 2 * tp / (2 * tp + fp + fn) if tp + fp + fn else nan,
@@ -180,12 +178,10 @@ def kitti(counts: Sums, histogram: Sums | None) -> dict[str, float]:
             "recall": tp / (tp + fn) if tp + fn else nan,
         }
     # Road is what has at least the probability k / 255.
-    below = np.concatenate([np.zeros((2, 1), np.int64), histogram.cumsum(axis=1)], axis=1)
-    steps = np.arange(LEVELS) * (CODES - 1) // (LEVELS - 1)
-    negative, positive = below[:, -1:] - below[:, steps]
+    negative, positive = levels[:, ::-1].cumsum(axis=1)[:, ::-1]
     found = positive > 0
     precision = positive[found] / (positive + negative)[found]
-    recall = positive[found] / below[1, -1]
+    recall = positive[found] / positive[0]
     f = 2 * precision * recall / (precision + recall)
     best = int(f.argmax())
     reached = [precision[recall >= least] for least in RECALLS]

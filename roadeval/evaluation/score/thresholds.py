@@ -111,7 +111,7 @@ class Curves:
 
     def __init__(self) -> None:
         self.counts: Final[dict[Name, Sums]] = {}
-        """``(2, 65536)`` int64 each: non-road and road."""
+        """``(2, 65536)`` int64 each, or of the ground ``(2, 256)``: non-road and road."""
         self._frames: Final[Counter[Name]] = Counter()
 
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
