@@ -56,7 +56,7 @@ class Held:
 class Whole:
     """Stands where a recorder does, and hands out what it is given, layers and all."""
 
-    def encode(self, result: FrameResult, _position: int, _lines: Any) -> FrameResult:
+    def encode(self, result: FrameResult, _position: int) -> FrameResult:
         """Return the result."""
         return result
 
@@ -76,7 +76,7 @@ def hold(drive: Path, config: RunConfig) -> Held:
             result = done.encoded
             if position % max(1, -(-len(run.frames) * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position, lines_of(result))
+                encoded = recorder.encode(result, position)
                 sizes.append(_layer_bytes(encoded.payloads))
         frames = log.frames(run.selection)
         files = [_files(logged) for logged in frames]
@@ -134,13 +134,13 @@ def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[No
         number, files, result = item
         for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        return recorder.encode(result, number, lines_of(result))
+        return recorder.encode(result, number), lines_of(result)
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
     with codecs, recorder:
-        for encoded in ordered(work, held.frames(), jobs):
-            recorder.write(encoded)
+        for encoded, lines in ordered(work, held.frames(), jobs):
+            recorder.write(encoded, lines)
         recorder.finish({})
     return meter.read()
 
@@ -153,7 +153,7 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
             for _, done in process([run], recorder, ignore):
-                recorder.write(done.encoded)
+                recorder.write(done.encoded, done.lines)
                 results.append(done.lines)
             recorder.finish({})
             cost = meter.read()
