@@ -107,8 +107,8 @@ class Variant:
         """Return the layout of the variant, which recording and tables need beforehand."""
         found = self.pipeline.stages()
         title = ", ".join(stage.title for stage in found if stage.name != FINAL_STAGE)
-        if filters := [stage.title for stage in found if stage.is_filter]:
-            title = f"with {', '.join(filters)}"
+        if any(stage.is_filter for stage in found):
+            title = "with the filter"
         elif self.of_pair:
             title = "without the filter"
         return VariantLayout(self.name, title, self.pipeline.masks(), self.pipeline.layers())

@@ -59,7 +59,7 @@ _REASONS: Final = (
     (r"RangeNotSupported", NO_PARTS),
     (r"Content-Length", "the server does not state its length"),
 )
-"""What obstore's messages and errors mean; the first that is found."""
+"""Patterns of obstore's messages and errors, with their meaning; the first that is found counts."""
 
 
 def readable(drive: str | PathLike[str]) -> Path | RemoteLog:

@@ -226,7 +226,7 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """What each frame of a run is used for."""
+    """The frames of a run: which trained the model, which are left out, and which are evaluated."""
 
     digests: frozenset[str]
     """Hashes of the frames that trained the model."""

@@ -113,7 +113,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class DriveChange:
-    """What changed in the ERR of a final mask on one of several drives."""
+    """The change in the ERR of a final mask on one of several drives."""
 
     result: str
     variant: str
@@ -134,7 +134,7 @@ class DriveChange:
 
 @dataclass(frozen=True, slots=True)
 class RegionChange:
-    """What changed in the ERR of a final mask within a region.
+    """The change in the ERR of a final mask within a region.
 
     ``base`` and ``new`` are means over the ``frames`` on which both have labelled pixels there.
     """
@@ -170,7 +170,7 @@ class Comparison:
     disagreements: tuple[Disagreement, ...]
     """The frames of one drive on which final masks of one run disagree most."""
     warnings: tuple[str, ...]
-    """What was left out, and why results are less comparable than they look."""
+    """Sentences on drives and frames that were left out, and on settings and truths that differ."""
     settings: EvaluationSettings
     """The confidence of the intervals, and the frames that they need."""
 

@@ -78,6 +78,7 @@ class MetreSums:
         self._rates: Final[dict[str, Floats]] = {}
         """``(S, R, 2)``: sums of the frames' ERR, and frames that have one."""
         self._above: Final[dict[str, Sums]] = {}
+        """``(4,)``: cells of the ground seen from above, by outcome."""
 
     def add(self, metres: Mapping[str, FrameMetres]) -> None:
         """Add a frame's measures."""
@@ -119,7 +120,7 @@ class MetreSums:
                 yield Measured(variant, measured, where, frames, missing, value, p95, low, high)
 
     def _of(self, variant: str, place: int) -> Floats:
-        """Return a variant's differences at a place, in metres."""
+        """Return a variant's differences at a place, ``(n,)`` metres, in no order."""
         counter = self._differences[variant]
         keys, counts = (np.array([*each], np.int64) for each in (counter, counter.values()))
         own = np.abs(keys - place * SPAN) < SPAN // 2
@@ -145,7 +146,7 @@ def differences_of(metres: FrameMetres) -> Floats:
 
 
 def quantile(metres: Floats, share: float) -> float:
-    """Return the least of some values that a share of them does not exceed; NaN without any."""
+    """Return the least of ``(n,)`` values that a share of them does not exceed; NaN without any."""
     if not len(metres):
         return math.nan
     return float(np.quantile(metres, share, method="inverted_cdf"))

@@ -125,7 +125,7 @@ class FleetRun:
     """What is known of each drive that is done, by its ID."""
     pruned: set[str] = field(default_factory=set)
     stack: ExitStack = field(default_factory=ExitStack)
-    """What ends with the run."""
+    """Ends the processes that were started for the run."""
 
     def replay_all(self) -> None:
         """Replay every drive that is not done, and those whose recordings are to be kept."""

@@ -282,7 +282,7 @@ class ChunkReader:
         self.bad: dict[int, str] = {}
         """Why a chunk could not be read, by its offset."""
         self.kept: dict[int, str] = {}
-        """What is wrong with a chunk of which something was read, by its offset."""
+        """Damage of chunks of which something was read all the same, by their offsets."""
 
     def read(self, chunk: Chunk) -> Bytes:
         """Read the records of a chunk; of one that is cut off, those before the cut."""

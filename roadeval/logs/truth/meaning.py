@@ -171,12 +171,12 @@ def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMa
     """
     pictures = Counter(seen)
     values = sorted(pictures)
-    for each in (*labels.road, *labels.ignore):
-        if isinstance(each, str):
-            raise LogError(
-                f"`labels.road` {each}: {name} has no names of classes; give the value that means "
-                "road"
-            )
+    for setting, given in (("road", labels.road), ("ignore", labels.ignore)):
+        for each in given:
+            if isinstance(each, str):
+                raise LogError(
+                    f"`labels.{setting}` {each}: {name} has no names of classes; give its value"
+                )
     if labels.road or labels.road_colors:
         return _as_given(labels, values, name)
     for meaning in _MASKS:

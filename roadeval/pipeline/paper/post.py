@@ -46,7 +46,7 @@ class PostSettings:
     (on three synthetic ones it gains 8 and 6 and costs 1). So the opening comes first here; the
     presets ``printed_order`` and ``printed`` close first."""
     region: Literal["largest", "all"] = "largest"
-    """What is kept: the ``largest`` component, or ``all`` of them."""
+    """Components to keep: the ``largest``, or ``all``."""
     fill: bool = True
     """Whether the holes of what is kept are filled (Eq. 23)."""
 

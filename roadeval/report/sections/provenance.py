@@ -1,4 +1,4 @@
-"""What is behind the results, and the command that makes them again; run.toml has the settings."""
+"""Sources of the results, and the command that makes them again; run.toml has the settings."""
 
 from __future__ import annotations
 

@@ -57,6 +57,12 @@ def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
     assert truth([0, 3, 4, 11, 255], labels) == [0, 1, 1, 255, 0]
 
 
+@pytest.mark.parametrize("setting", ["road", "ignore"])
+def test_a_name_for_labels_without_names_is_refused(setting: str) -> None:
+    with pytest.raises(LogError, match=f"`labels.{setting}` sky: /labels has no names"):
+        understand(LabelSettings(**{"road": (3,), setting: ("sky",)}), [0, 3], "/labels")
+
+
 @pytest.mark.parametrize(
     ("labels", "setting"),
     [
