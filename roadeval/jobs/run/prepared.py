@@ -32,7 +32,7 @@ from roadeval.results.rows import Key, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
-from roadeval.runtime.memory import TRIM_EVERY, trim
+from roadeval.runtime.memory import TRIM_EVERY, reuse, trim
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model, TrainingSettings, learning
 from roadeval.training.learning import Schedule
@@ -349,6 +349,7 @@ def process(
 
     Decoding, computing, scoring and encoding happen in the worker threads.
     """
+    reuse()
     total, read = sum(len(run.frames) for run in runs), Counter[int]()
 
     def numbered() -> Iterator[tuple[Run, int, logs.LoggedFrame]]:
