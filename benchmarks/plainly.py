@@ -16,7 +16,7 @@ import rerun as rr
 from roadeval.config import RunConfig
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
 from roadeval.pipeline.chain import Pipeline
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.stage import TrainingSet, View
 from roadeval.training.learning import sample
 from tests.pipeline import reference
 
@@ -34,9 +34,10 @@ class PlainWay:
         self.models = {}
         for variant in config.variants():
             pipeline = variant.pipeline
-            filters = tuple(name for name in pipeline.chain if name == "shadow")
-            chain = Pipeline(filters, pipeline.settings).bind({})
-            images = tuple(chain.filtered(frame.image) for frame in first)
+            images = tuple(frame.image for frame in first)
+            if "shadow" in pipeline.chain:
+                (step,) = Pipeline(("shadow",), pipeline.settings).bind({}).steps
+                images = tuple(step.run(View.of(image)).image for image in images)
             colours = TrainingSet(images, *where).colours()
             self.models[variant.name] = reference.train(colours, pixels.road)
         self.times: Times = {}

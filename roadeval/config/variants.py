@@ -120,9 +120,10 @@ def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, 
     A pipeline without a filter gives the unfiltered variant alone. A `ConfigError` if an extra
     variant's name is taken, reserved, or no plain word.
     """
-    pair = pipeline.has_filter
+    unfiltered = pipeline.without_filter()
+    pair = unfiltered != pipeline
     variants = [Variant(FILTERED, pipeline)] if pair else []
-    variants.append(Variant(UNFILTERED, pipeline.without_filter(), of_pair=pair))
+    variants.append(Variant(UNFILTERED, unfiltered, of_pair=pair))
     for variant in extra:
         check_variant_name(variant.name, {v.name for v in variants})
         variants.append(variant)

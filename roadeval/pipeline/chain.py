@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, replace
 from itertools import takewhile
 from typing import Any
 
-from roadeval.data import LayerSpec, Output, Packed, Rgb, Truth
+from roadeval.data import LayerSpec, Output, Packed, Truth
 from roadeval.pipeline.stage import Stage, View
 from roadeval.pipeline.stages import stages_of
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pipeline:
     """Stages in the order they run, and the settings of each.
 
@@ -44,23 +44,11 @@ class Pipeline:
         """Return the names of the stages that make a road mask, in order."""
         return tuple(stage.name for stage in self.stages() if stage.yields_mask)
 
-    @property
-    def has_filter(self) -> bool:
-        """Whether some stage is a filter."""
-        return any(stage.is_filter for stage in self.stages())
-
     def without_filter(self) -> Pipeline:
         """Return the pipeline without its filters."""
-        return self._of(lambda stage: not stage.is_filter)
-
-    def alone(self, name: str) -> Pipeline:
-        """Return the pipeline of one of its stages."""
-        return self._of(lambda stage: stage.name == name)
-
-    def _of(self, chosen: Callable[[Stage], bool]) -> Pipeline:
-        pairs = zip(self.chain, self._each(), strict=True)
-        kept = {name: (stage.name, own) for name, (stage, own) in pairs if chosen(stage)}
-        return Pipeline(tuple(kept), dict(kept.values()))
+        pairs = zip(self.chain, self.stages(), strict=True)
+        kept = {name: stage.name for name, stage in pairs if not stage.is_filter}
+        return Pipeline(tuple(kept), {own: self.settings[own] for own in kept.values()})
 
     def learning(self) -> tuple[str, ...]:
         """Return the names of the stages that learn."""
@@ -72,7 +60,7 @@ class Pipeline:
         Those of stages that learn, change the image, or are heard, except where they are
         `inference_only` or `places`.
         """
-        heard = {stage.name for stage in self.heard()}
+        heard = self.heard()
         return {
             stage.name: {
                 key: value
@@ -80,7 +68,7 @@ class Pipeline:
                 if key not in (*stage.inference_only, *stage.places)
             }
             for stage, own in self._each()
-            if stage.fit is not None or not stage.yields_mask or stage.name in heard
+            if stage.fit is not None or not stage.yields_mask or stage in heard
         }
 
     def heard(self) -> tuple[Stage, ...]:
@@ -99,12 +87,8 @@ class Pipeline:
 
     def without_places(self) -> Pipeline:
         """Return the pipeline without the settings that say where files lie."""
-        found = {
-            stage.name: replace(own, **dict.fromkeys(stage.places, ""))
-            for stage, own in self._each()
-            if stage.places
-        }
-        return replace(self, settings={**self.settings, **found})
+        blank = {s.name: replace(own, **dict.fromkeys(s.places, "")) for s, own in self._each()}
+        return replace(self, settings=blank)
 
     def about(self) -> dict[str, dict[str, Any]]:
         """Return what results say of stages beside their settings, by stage."""
@@ -120,15 +104,20 @@ class Pipeline:
 
         A `MisfitError` if that does not fit the settings.
         """
-        steps = []
-        for stage, own in self._each():
-            learnt = parameters.get(stage.name)
-            oracle = stage.oracle(own, learnt) if stage.oracle else None
-            steps.append(Step(stage, own, stage.bind(own, learnt), oracle))
-        return Chain(tuple(steps))
+        return Chain(
+            tuple(
+                Step(
+                    stage,
+                    own,
+                    stage.bind(own, parameters.get(stage.name)),
+                    stage.oracle and stage.oracle(own, parameters.get(stage.name)),
+                )
+                for stage, own in self._each()
+            )
+        )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Step:
     """A stage with its settings and learnt parameters, ready to run."""
 
@@ -138,7 +127,7 @@ class Step:
     oracle: Callable[[View, Truth], Output] | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Chain:
     """The steps of a pipeline, ready to run one after the other on an image."""
 
@@ -155,11 +144,7 @@ class Chain:
             yield step.stage.name, output
 
     def oracles(
-        self,
-        view: View,
-        outputs: Sequence[Output],
-        road: Truth,
-        shadow: Truth | None,
+        self, view: View, outputs: Sequence[Output], road: Truth, shadow: Truth | None
     ) -> Iterator[tuple[str, dict[str, Packed]]]:
         """Yield what the chain makes of an image once one of its stages is replaced by the truth.
 
@@ -185,14 +170,6 @@ class Chain:
         for output in outputs[: len(taken)]:
             view = view.after(output)
         yield from _masks(self.steps[len(taken) :], view)
-
-    def filtered(self, image: Rgb) -> Rgb:
-        """Return the image as the chain's filters leave it; itself where there are none."""
-        view = View.of(image)
-        for step in self.steps:
-            if not step.stage.yields_mask:
-                view = view.after(step.run(view))
-        return view.image
 
 
 def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:

@@ -79,7 +79,7 @@ class AbsentError(StageError):
     """A frame of which another method says nothing: the variant alone leaves it out."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Opinion:
     """What a method says of a frame."""
 
@@ -101,7 +101,7 @@ class Opinion:
         return Opinion(Packed.of(self.mask.pixels()[:, ::-1]), by_class=planes)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class View:
     """What a stage sees of a frame: views of one image share its arrays."""
 
@@ -150,7 +150,7 @@ class View:
         return replace(self, image=image, planes=planes, opinion=opinion)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Stage:
     """One step of a pipeline."""
 
@@ -241,7 +241,7 @@ def split(image: Rgb) -> Planes:
     return red, green, blue
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TrainingSet:
     """Labelled pixels of some frames, as one variant's filters left them."""
 
@@ -282,45 +282,29 @@ def check_arrays(
 ) -> None:
     """Check what the functions of a stage assume about its parameters.
 
-    A `ValueError` if a field has another shape or type, or holds a number that is not finite, or is
-    beyond `GREATEST` in an array; a sentence that names the field. ``parameters`` is a dataclass,
-    ``dtype`` the type of its arrays; single numbers may be of any real type and any size.
-    ``shapes`` has the shape of each field: a letter stands for a length of one or more, the same
-    wherever it occurs; ``()`` is a single number.
+    A `ValueError` if a field has another shape or type, or holds a number that is not finite or
+    beyond `GREATEST`; a sentence that names the field. ``parameters`` is a dataclass, ``dtype`` the
+    type of its arrays; single numbers may be of any real type. ``shapes`` has the shape of each
+    field: a letter stands for a length of one or more, the same wherever it occurs; ``()`` is a
+    single number.
     """
     lengths: dict[int | str, int] = {}
     for name, shape in shapes.items():
         array = np.asarray(getattr(parameters, name))
-        if not (
-            len(array.shape) == len(shape)
-            and all(
-                length > 0
-                and length == (each if isinstance(each, int) else lengths.setdefault(each, length))
-                for length, each in zip(array.shape, shape, strict=True)
-            )
-        ):
+        lengths = dict(zip(shape, array.shape, strict=False)) | lengths  # the first one holds
+        wanted = (each if isinstance(each, int) else lengths.get(each) for each in shape)
+        if array.shape != (*wanted,) or not array.size:
             raise ValueError(f"{name} has the shape {_text(array.shape)} instead of {_text(shape)}")
         if array.dtype != dtype if shape else array.dtype.kind not in "iuf":
             raise ValueError(f"{name} is of type {array.dtype} instead of {np.dtype(dtype)}")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} holds a number that is not finite")
-        if shape:
-            check_range(name, array, -GREATEST, GREATEST)
+        check_range(name, array, -GREATEST, GREATEST)
 
 
 def check_range(name: str, values: npt.ArrayLike, least: float, greatest: float) -> None:
-    """Raise a ValueError if a number lies outside a range, both ends included."""
+    """Raise a ValueError if a number lies outside a range, both ends included, or is none."""
     array = np.asarray(values, np.float64)  # no smaller type may have to hold the ends
     if not ((array >= least) & (array <= greatest)).all():
         raise ValueError(f"{name} holds a number outside {least:g} to {greatest:g}")
-
-
-def check_covariance(name: str, matrix: npt.NDArray[np.float64], least: float) -> None:
-    """Raise a ValueError if a matrix is not symmetric, or has an eigenvalue below ``least``."""
-    if not np.allclose(matrix, matrix.T):
-        raise ValueError(f"{name} is not symmetric, and so no covariance")
-    if np.linalg.eigvalsh(matrix)[0] < least:
-        raise ValueError(f"{name} has an eigenvalue below {least:g}, and so is no covariance")
 
 
 def _text(shape: tuple[int | str, ...]) -> str:

@@ -6,15 +6,16 @@ Code of somebody else runs only where its name stands in a ``chain``: as an entr
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
+import re
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,7 +24,7 @@ import numpy as np
 from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
-from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
+from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View, per_view
 from roadeval.runtime.discovery import by_name, found_in
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import visible
@@ -59,67 +60,60 @@ def stages_of(chain: Iterable[str]) -> tuple[Stage, ...]:
 
 @cache
 def _somebodys(name: str) -> Stage:
-    """Import a stage that is not this package's own."""
+    """Import a stage that is not this package's own; its results say which file defines it."""
     try:
         found = _imported(name)
-        default = name.partition(":")[2].rpartition(".")[2] if ":" in name else name
         module = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
         if callable(found) and not isinstance(found, type):
-            found = stage_of_function(default, found)
+            found = stage_of_function(re.split("[:.]", name)[-1], found)
         if not isinstance(found, Stage):
             raise TypeError(f"it is {type(found).__name__}, and neither a Stage nor a function")
         _check(found)
-        return _with_origin(guarded(found), name, getattr(module, "__file__", None))
+        found = guarded(found)
+        if (file := getattr(module, "__file__", None)) is None:
+            return replace(found, code="")
+        origin = {"stage": name, "file": Path(file).name, "sha256": sha256_of(Path(file))}
+        own = found.about
+
+        def about(settings: Any) -> Mapping[str, Any]:
+            return {**origin, **(own(settings) if own else {})}
+
+        return replace(found, about=about, code=origin["sha256"])
     except UnknownStageError:
         raise
     except Exception as error:  # whatever somebody's module raises
-        said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
-        raise UnknownStageError(f"stage {name!r} cannot be used: {said}") from error
+        raise UnknownStageError(f"stage {name!r} cannot be used: {_said(error)}") from error
 
 
-def _with_origin(stage: Stage, name: str, file: str | None) -> Stage:
-    """Return a stage whose results say which file defines it."""
-    if file is None:
-        return replace(stage, code="")
-    origin = {"stage": name, "file": Path(file).name, "sha256": sha256_of(Path(file))}
-    own = stage.about
-
-    def about(settings: Any) -> Mapping[str, Any]:
-        return {**origin, **(own(settings) if own else {})}
-
-    return replace(stage, about=about, code=origin["sha256"])
+def _said(error: Exception) -> str:
+    return visible(" ".join(f"{type(error).__name__}: {error}".split()))
 
 
 def _imported(name: str) -> Any:
-    if ":" not in name:
-        points = entry_points(group=GROUP, name=name)
+    module, _, attributes = name.partition(":")
+    if not attributes:
+        points = [*entry_points(group=GROUP, name=name)]
         if not points:
             raise UnknownStageError(f"there is no stage {name!r}; choose {', '.join(names())}")
-        return next(iter(points)).load()
-    module, _, attributes = name.partition(":")
+        return points[0].load()
     try:
-        found = import_module(module)
+        return attrgetter(attributes)(import_module(module))
     except ModuleNotFoundError as error:
         raise UnknownStageError(
             f"stage {name!r}: there is no module {error.name}: install it, or name its folder in "
             "PYTHONPATH"
         ) from error
-    for attribute in attributes.split("."):
-        found = getattr(found, attribute)
-    return found
 
 
 def _check(stage: Stage) -> None:
     """Raise a ValueError where a stage's names cannot stand in results."""
-    if not is_plain(stage.name):
-        raise ValueError(f"its name {stage.name!r} must be of letters, digits, '-' and '_' alone")
+    for each in (stage.name, *(spec.name for spec in stage.specs(stage.settings()))):
+        if not is_plain(each):
+            raise ValueError(f"its name {each!r} must be of letters, digits, '-' and '_' alone")
     if stage.name in STAGES:
         raise ValueError(f"its name {stage.name!r} is that of a stage of roadeval")
     if stage.fit is not None and stage.parameters is None:
         raise ValueError("it learns, and does not name the type of its parameters")
-    for spec in stage.specs(stage.settings()):
-        if not is_plain(spec.name):
-            raise ValueError(f"the name of its layer {spec.name!r} must be of letters and digits")
 
 
 @dataclass(frozen=True)
@@ -142,43 +136,34 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
             raise TypeError(f"its argument {argument} is none of {', '.join(TAKEN)}")
     if "image" not in arguments:
         raise TypeError("it has no argument image")
-    settings: type[Any] = NoSettings
-    if "settings" in arguments:
-        default = arguments["settings"].default
-        if isinstance(default, type) or not dataclasses.is_dataclass(default):
-            raise TypeError("the default of its argument settings is no instance of a dataclass")
-        settings = type(default)
-    spec = mask_spec(
-        name, ((inspect.getdoc(function) or name).partition("\n")[0].rstrip(".") or name)
-    )
+    default = arguments["settings"].default if "settings" in arguments else NoSettings()
+    if isinstance(default, type) or not is_dataclass(default):
+        raise TypeError("the default of its argument settings is no instance of a dataclass")
+    first_line = (inspect.getdoc(function) or "").partition("\n")[0].rstrip(".")
+    spec = mask_spec(name, first_line or name)
 
-    def bind(values: Any, _parameters: None) -> Callable[[View], Output]:
-        given = {"settings": values} if "settings" in arguments else {}
+    @per_view
+    def bind(settings: Any, _learnt: None, view: View) -> Output:
+        given = {"image": view.image, "moment": view.moment, "settings": settings}
+        return _output(function(**{key: given[key] for key in given if key in arguments}), spec)
 
-        def run(view: View) -> Output:
-            seen = {"moment": view.moment} if "moment" in arguments else {}
-            return _output(function(image=view.image, **seen, **given), spec)
-
-        return run
-
-    return Stage(name, spec.title, settings, bind, (spec,))
+    return Stage(name, spec.title, type(default), bind, (spec,))
 
 
 def _output(found: Any, spec: LayerSpec) -> Output:
     if isinstance(found, Output):
         if found.layers or found.mask is None:
             return found
-        return dataclasses.replace(found, layers=(Layer(spec, found.mask),))
-    array = np.asarray(found)
+        return replace(found, layers=(Layer(spec, found.mask),))
+    array, codes = np.asarray(found), None
     if array.ndim != 2:
         raise ValueError(f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask")
-    if array.dtype.kind != "f":
-        mask = Packed.of(array != 0)
-        return Output((Layer(spec, mask),), mask=mask)
-    if not ((array >= 0) & (array <= 1)).all():
-        raise ValueError("it returned floats that are no probabilities, from 0 to 1")
-    codes = np.rint(array * CERTAIN).astype(np.uint16)
-    mask = Packed.of(codes > round(CERTAIN / 2))
+    if array.dtype.kind == "f":
+        if not ((array >= 0) & (array <= 1)).all():
+            raise ValueError("it returned floats that are no probabilities, from 0 to 1")
+        codes = np.rint(array * CERTAIN).astype(np.uint16)
+        array = codes > round(CERTAIN / 2)
+    mask = Packed.of(array != 0)
     return Output((Layer(spec, mask),), mask=mask, probability=codes)
 
 
@@ -213,20 +198,25 @@ def _named(stage: Stage, what: str) -> Iterator[None]:
     except (RoadevalError, MemoryError):
         raise
     except Exception as error:  # whatever somebody's code raises
-        said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
-        raise StageError(f"stage {stage.name} {what}: {said}{_place(error)}") from error
+        # Where in somebody's file it arose, as (mine.py:12).
+        frames = traceback.extract_tb(error.__traceback__)
+        others = [each for each in frames if PACKAGE not in Path(each.filename).parents]
+        own = [each for each in others if each.filename == others[0].filename][-1:]
+        where = "".join(f" ({Path(each.filename).name}:{each.lineno})" for each in own)
+        raise StageError(f"stage {stage.name} {what}: {_said(error)}{where}") from error
 
 
-def _place(error: Exception) -> str:
-    """Return where in somebody's file an error arose, as `` (mine.py:12)``; else nothing."""
-    frames = traceback.extract_tb(error.__traceback__)
-    others = [each for each in frames if PACKAGE not in Path(each.filename).parents]
-    own = [each for each in others if each.filename == others[0].filename]
-    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+TYPES: Final[Mapping[LayerKind, tuple[type[np.generic], ...]]] = {
+    LayerKind.MASK: (np.bool_, np.integer),
+    LayerKind.LABELS: (np.uint8,),
+    LayerKind.RGB: (np.uint8,),
+    LayerKind.SCALAR: (np.generic,),
+}
+"""What a layer's array may hold, so that a recording can."""
 
 
 def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
-    """Raise an error where an output is none, or not of the image's size."""
+    """Raise an error where an output is none, or an array of another size or type than it must."""
     if not isinstance(output, Output):
         raise TypeError(f"it returned {type(output).__name__} and no Output")
     size = view.image.shape[:2]
@@ -234,23 +224,18 @@ def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSp
         raise TypeError("it handed out no mask (Packed.of makes one)")
     if output.mask is not None and output.mask.shape != size:
         raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
-    image, codes = output.image, output.probability
-    if image is not None and (image.shape != view.image.shape or image.dtype != np.uint8):
-        raise ValueError(f"its image is {image.dtype} {image.shape}, not uint8 {view.image.shape}")
-    if codes is not None and (codes.shape != size or codes.dtype != np.uint16):
-        raise ValueError(f"its probability is {codes.dtype} {codes.shape}, not uint16 {size}")
+    arrays: list[tuple[str, Any, tuple[int, ...], tuple[type[np.generic], ...]]] = [
+        ("image", output.image, view.image.shape, (np.uint8,)),
+        ("probability", output.probability, size, (np.uint16,)),
+    ]
     for layer in output.layers:
         if layer.spec not in specs:
             raise ValueError(f"it handed out a layer {layer.spec.name!r} that it does not announce")
-        _check_layer(layer, size)
-
-
-def _check_layer(layer: Layer, size: tuple[int, int]) -> None:
-    """Raise an error where a layer is not of the image's size, or of a type that no codec takes."""
-    name, kind, array = layer.spec.name, layer.spec.kind, layer.array
-    if array.shape[:2] != size:
-        raise ValueError(f"its layer {name!r} is {array.shape}, not {size}")
-    if kind is LayerKind.MASK and array.dtype.kind not in "biu":
-        raise TypeError(f"its layer {name!r} holds {array.dtype}, and no whole numbers")
-    if kind in (LayerKind.LABELS, LayerKind.RGB) and array.dtype != np.uint8:
-        raise TypeError(f"its layer {name!r} holds {array.dtype}, not uint8")
+        arrays.append((f"layer {layer.spec.name!r}", layer.array, size, TYPES[layer.spec.kind]))
+    for what, array, shape, types in arrays:
+        if array is not None and not (
+            array.shape[: len(shape)] == shape
+            and any(np.issubdtype(array.dtype, each) for each in types)
+        ):
+            wanted = f"{' or '.join(each.__name__ for each in types)} {shape}"
+            raise ValueError(f"its {what} is {array.dtype} {array.shape}, not {wanted}")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain, islice
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Role, Truth
 from roadeval.errors import RoadevalError
@@ -36,6 +34,9 @@ WIDTH: Final = 160
 _AT_ONCE: Final = 2
 """Variants that are fitted together; each holds its filtered images meanwhile."""
 
+Pipelines = Mapping[str, Pipeline]
+"""By variant."""
+
 
 class TrainingError(RoadevalError):
     """Frames from which nothing can be learnt."""
@@ -43,90 +44,66 @@ class TrainingError(RoadevalError):
 
 def fit(
     frames: Sequence[Frame],
-    pipelines: Mapping[str, Pipeline],
+    pipelines: Pipelines,
     settings: TrainingSettings,
-    warnings: Sequence[str] = (),
     base: Model | None = None,
 ) -> Model:
     """Train every variant that learns anything on decoded frames.
 
     Their truths, where they have any, make the baseline. A `TrainingError` if there is no frame, or
     if the frames show road alone or no road at all and some variant has something to learn. The
-    frames have truth, unless ``settings.source`` allows the patch. ``warnings`` are put before
-    those of the training itself. ``base`` is what the variants have learnt from other drives:
-    stages that can learn further do so, the others stay as they are.
+    frames have truth, unless ``settings.source`` allows the patch. ``base`` is what the variants
+    have learnt from other drives: stages that can learn further do so, the others stay as they are.
     """
-    learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
-    source, truths = _truths(frames, settings)
-    parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
-    found = [*warnings]
-    pixels = 0
-    if learning:
-        sampled = _sampled(frames, truths, settings)
-        if source == "truth":
-            road = sum(np.count_nonzero(truth == ROAD) for truth in truths)
-            sampled = dataclasses.replace(
-                sampled, share=(road / sum(np.count_nonzero(truth != IGNORE) for truth in truths))
+    if not frames:
+        raise TrainingError("there is no frame to train on in the selected range")
+    truths = [frame.truth for frame in frames if frame.truth is not None]
+    prior = BlindPrior.of_truths(truths).road if truths else None
+    source, share = "truth", None
+    if settings.source == "patch" or len(truths) < len(frames):
+        if settings.source == "truth":
+            raise TrainingError(
+                "there is no truth to train on: name its topic with `topics.truth`, give "
+                '`training.model`, or allow training.source = "patch"'
             )
-        pixels = len(sampled.road)
-        each = partial(_fit_variant, frames, sampled, {} if base is None else base.parameters)
-        for name, learnt, warned in ordered(each, learning.items(), _AT_ONCE):
+        source, truths = "patch", [patch_truth(frame.image, settings) for frame in frames]
+    else:
+        road = sum(np.count_nonzero(truth == ROAD) for truth in truths)
+        share = road / (sum(np.count_nonzero(truth != IGNORE) for truth in truths) or 1)
+    parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
+    warnings: list[str] = []
+    pixels = 0
+    if learning := [name for name, pipeline in pipelines.items() if pipeline.learning()]:
+        drawn = sample(truths, settings)
+        if not (pixels := len(drawn.road)):
+            raise TrainingError(
+                f"frames {frames[0].number} to {frames[-1].number} do not show both road and "
+                "non-road, so nothing can be learnt from them; choose other frames with "
+                "`frames.start` or `training.frames`, or give `training.model`"
+            )
+        images = tuple(frame.image for frame in frames)
+        drawn = replace(drawn, images=images, truths=tuple(truths), share=share)
+
+        def learn(name: str) -> tuple[str, dict[str, Any], list[str]]:
+            known = base.parameters.get(name, {}) if base else {}
+            learnt = _fitted(frames, drawn, pipelines[name], known)
+            return name, learnt, _collapsed(name, frames, pipelines[name], learnt)
+
+        for name, learnt, warned in ordered(learn, learning, _AT_ONCE):
             parameters[name] = learnt
-            found += warned
-    labelled = [frame.truth for frame in frames if frame.truth is not None]
+            warnings += warned
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
         pixels,
-        BlindPrior.of_truths(labelled).road if labelled else None,
-        tuple(found),
+        prior,
+        tuple(warnings),
     )
 
 
-def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, list[Truth]]:
-    if not frames:
-        raise TrainingError("there is no frame to train on in the selected range")
-    labelled = [frame.truth for frame in frames if frame.truth is not None]
-    if settings.source != "patch" and len(labelled) == len(frames):
-        return "truth", labelled
-    if settings.source == "truth":
-        raise TrainingError(
-            "there is no truth to train on: name its topic with `topics.truth`, give "
-            '`training.model`, or allow training.source = "patch"'
-        )
-    return "patch", [patch_truth(frame.image, settings) for frame in frames]
-
-
-def _sampled(
-    frames: Sequence[Frame], truths: list[Truth], settings: TrainingSettings
-) -> TrainingSet:
-    """Draw the pixels that every variant learns from."""
-    sampled = sample(truths, settings)
-    if not len(sampled.road):
-        raise TrainingError(
-            f"frames {frames[0].number} to {frames[-1].number} do not show both road and non-road, "
-            "so nothing can be learnt from them; choose other frames with `frames.start` or "
-            "`training.frames`, or give `training.model`"
-        )
-    images = tuple(frame.image for frame in frames)
-    return dataclasses.replace(sampled, images=images, truths=tuple(truths))
-
-
-def _fit_variant(
-    frames: Sequence[Frame],
-    sampled: TrainingSet,
-    base: Mapping[str, Mapping[str, Any]],
-    variant: tuple[str, Pipeline],
-) -> tuple[str, dict[str, Any], list[str]]:
-    """Return the variant's name, what its stages learn, and the warnings."""
-    name, pipeline = variant
-    learnt = _fit_stages(frames, sampled, pipeline, base.get(name, {}))
-    return name, learnt, _collapsed(name, frames, pipeline, learnt)
-
-
-def _fit_stages(
+def _fitted(
     frames: Sequence[Frame], training_set: TrainingSet, pipeline: Pipeline, base: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Fit the stages in order.
@@ -134,24 +111,25 @@ def _fit_stages(
     What follows a filter learns from the filtered images, and what hears another method from what
     that says of them.
     """
-    parameters: dict[str, Any] = dict(base)
-    heard = {stage.name for stage in pipeline.heard()}
+    parameters = dict(base)
+    heard = pipeline.heard()
     for stage in pipeline.stages():
         settings = pipeline.settings[stage.name]
         if stage.fit is not None and stage.name not in base:
             parameters[stage.name] = stage.fit(training_set, settings)
         elif stage.adapt is not None:
             parameters[stage.name] = stage.adapt(base[stage.name], training_set, settings)
-        if not stage.yields_mask:
-            only = pipeline.alone(stage.name).bind(parameters)
-            filtered = tuple(only.filtered(image) for image in training_set.images)
-            training_set = dataclasses.replace(training_set, images=filtered)
-        elif stage.name in heard:
-            (step,) = pipeline.alone(stage.name).bind(parameters).steps
-            seen = zip(frames, training_set.images, strict=True)
-            views = (View.of_frame(each).after(Output(image=image)) for each, image in seen)
-            opinions = tuple(view.after(step.run(view)).opinion for view in views)
-            training_set = dataclasses.replace(training_set, opinions=opinions)
+        if stage.yields_mask and stage not in heard:
+            continue
+        run = stage.bind(settings, parameters.get(stage.name))
+        seen = zip(frames, training_set.images, strict=True)
+        views = (View.of_frame(each).after(Output(image=image)) for each, image in seen)
+        after = (view.after(run(view)) for view in views)
+        if stage.yields_mask:
+            opinions = tuple(view.opinion for view in after)
+            training_set = replace(training_set, opinions=opinions)
+        else:
+            training_set = replace(training_set, images=tuple(view.image for view in after))
     return parameters
 
 
@@ -165,11 +143,10 @@ def _collapsed(
         with suppress(StageError):  # it is reported when the frame is replayed
             for name, output in chain.run(View.of_frame(frame)):
                 if output.mask is not None:
-                    pixels = frame.image[..., 0].size
-                    shares.setdefault(name, []).append(output.mask.area() / pixels)
+                    shares.setdefault(name, []).append(output.mask.pixels().mean())
     return [
         f"{variant}: {name} has collapsed: it calls {share:.1%} of its own training frames road"
-        for name, share in ((name, float(np.mean(values))) for name, values in shares.items())
+        for name, share in ((name, np.mean(values)) for name, values in shares.items())
         if not COLLAPSED <= share <= 1 - COLLAPSED
     ]
 
@@ -184,26 +161,19 @@ def sample(truths: Sequence[Truth], settings: TrainingSettings) -> TrainingSet:
     """
     rng = np.random.default_rng(settings.seed)
     share = max(1, min(settings.pixels_per_class, settings.max_pixels // (2 * len(truths))))
-    classes = [_draw(truths, value, share, rng) for value in (ROAD, NON_ROAD)]
-    size = min(*(len(drawn) for drawn in classes), settings.max_pixels // 2)
-    places = np.concatenate(
-        [drawn[np.sort(rng.permutation(len(drawn))[:size])] for drawn in classes]
-    )
-    frame, row, column = places.T
+    classes = []
+    for value in (ROAD, NON_ROAD):
+        drawn = []
+        for index, truth in enumerate(truths):
+            flat = np.flatnonzero(truth == value)
+            chosen = np.sort(rng.choice(flat, min(share, len(flat)), replace=False))
+            places = np.unravel_index(chosen, truth.shape)
+            drawn.append(np.stack([np.full(len(chosen), index), *places]))
+        classes.append(np.concatenate(drawn, axis=1))
+    size = min(*(drawn.shape[1] for drawn in classes), settings.max_pixels // 2)
+    kept = [drawn[:, np.sort(rng.permutation(drawn.shape[1])[:size])] for drawn in classes]
+    frame, row, column = np.concatenate(kept, axis=1)
     return TrainingSet((), frame, row, column, np.arange(2 * size) < size, settings.seed)
-
-
-def _draw(
-    truths: Sequence[Truth], value: int, share: int, rng: np.random.Generator
-) -> npt.NDArray[np.intp]:
-    """Return frame, row and column of some pixels of a value, at most ``share`` a frame."""
-    drawn = []
-    for index, truth in enumerate(truths):
-        flat = np.flatnonzero(truth == value)
-        chosen = rng.choice(flat, min(share, len(flat)), replace=False)
-        rows, columns = np.unravel_index(np.sort(chosen), truth.shape)
-        drawn.append(np.stack([np.full(len(chosen), index), rows, columns], axis=1))
-    return np.concatenate(drawn).astype(np.intp)
 
 
 def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
@@ -224,11 +194,11 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Schedule:
     """The frames of a run: which trained the model, which are left out, and which are evaluated."""
 
-    digests: frozenset[str]
+    digests: frozenset[str] = frozenset()
     """Hashes of the frames that trained the model."""
     gap: frozenset[int] = frozenset()
     """Numbers of the frames after them that are left out as well."""
@@ -260,7 +230,7 @@ BY_PATCH: Final = (
 )
 
 
-def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Schedule]:
+def from_file(path: Path, pipelines: Pipelines) -> tuple[Model, Schedule]:
     """Read a model file and check that it was made for these variants.
 
     Whether what it learnt fits their settings turns out when they are bound.
@@ -279,7 +249,7 @@ may leave out all others."""
 
 def from_log(
     frames: Frames,
-    pipelines: Mapping[str, Pipeline],
+    pipelines: Pipelines,
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
     *,
@@ -297,80 +267,122 @@ def from_log(
     those train that were picked by rank. Returned are the model of each seed, the first with the
     warnings of all, and which frames are left out.
     """
-    if base is not None:
-        _require_adaptable(pipelines)
-    ranked = _of_picks(frames, picks, on_frame) if picks and labelled else None
-    candidates, by_truth = _candidates(frames, labelled=labelled and picks is None)
-    by_truth = by_truth or ranked is not None
-    if base is not None and not by_truth and settings.source != "patch":
-        raise TrainingError(
-            "no frame of the range has road truth to adapt the model to, and what the reference "
-            "patch guesses may make it worse: leave `training.adapt` out, or insist with "
-            'training.source = "patch"'
-        )
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
     if not learning:
         made_for = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
         nothing = Model({name: {} for name in pipelines}, made_for, "none", frozenset(), 0)
-        return (nothing,), Schedule(frozenset(), picks=picks)
+        return (nothing,), Schedule(picks=picks)
     if not settings.frames:
         raise TrainingError(
             f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
             "or run what learns nothing with `only`"
         )
-    if settings.placement == "spread":
-        chosen = ranked or _spread_out(candidates, frames, settings, on_frame, by_truth=by_truth)
-    else:
-        chosen = ranked or _from_the_first(candidates, settings, on_frame, by_truth=by_truth)
-    held, schedule = chosen
+    held, schedule = HeldFrames(on_frame), Schedule()
+    if labelled and picks:
+        ranked = picks.stamps_of(Why.RANKED)
+        for frame in decoded(each for each in frames() if each.stamp_ns in ranked):
+            if frame.truth is not None and not picks.is_proposal(frame.stamp_ns, frame.truth):
+                held.add(frame)
+    with_truth = labelled and picks is None and any(each.labelled for each in frames())
+    by_truth = with_truth or bool(held.frames)
+    if base is not None:
+        _require_adaptable(pipelines, settings, by_truth=by_truth)
+    if not held.frames:
+        schedule = _choose(frames, settings, held, with_truth=with_truth)
     warnings = []
     if labelled and not by_truth:
-        what = "no frame that is read has road truth"
-        what = what if picks is None else "no frame that was picked by rank is labelled"
-        warnings.append(f"{what}: {BY_PATCH}")
+        which = "picked by rank is labelled" if picks else "read has road truth"
+        warnings.append(f"no frame that {'was' if picks else 'is'} {which}: {BY_PATCH}")
     if base is not None:
         how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
         warnings.append(
             f"the model of other drives ({settings.model}) was adapted to this drive with "
-            f"{len(held)} of its own {how}: the rates are not those on a drive that it has not seen"
+            f"{len(held.frames)} of its own {how}: the rates are not those on a drive that it has "
+            "not seen"
         )
-    models = _with_each_seed(held, pipelines, settings, warnings, base)
-    return models, replace(schedule, digests=models[0].digests, picks=picks)
+    models = {
+        seed: fit(held.frames, pipelines, replace(settings, seed=seed, seeds=1), base)
+        for seed in range(settings.seed, settings.seed + settings.seeds)
+    }
+    warnings += [
+        warning if seed == settings.seed else f"seed {seed}: {warning}"
+        for seed, model in models.items()
+        for warning in model.warnings
+    ]
+    first, *others = models.values()
+    schedule = replace(schedule, digests=first.digests, picks=picks)
+    return (replace(first, warnings=tuple(warnings)), *others), schedule
 
 
-def _require_adaptable(pipelines: Mapping[str, Pipeline]) -> None:
-    """Raise a `TrainingError` for a variant that learns, and cannot learn further."""
+def _require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_truth: bool) -> None:
+    """Raise a `TrainingError` where a model of other drives cannot or should not learn further."""
     for name, pipeline in pipelines.items():
         learning = [stage for stage in pipeline.stages() if stage.fit is not None]
         if learning and not any(stage.adapt for stage in learning):
-            stages = ", ".join(stage.name for stage in learning)
             raise TrainingError(
-                f"variant {name}: no stage of it can learn further ({stages}); use preset robust, "
-                "or leave `training.adapt` out"
+                f"variant {name}: no stage of it can learn further "
+                f"({', '.join(stage.name for stage in learning)}); use preset robust, or leave "
+                "`training.adapt` out"
             )
+    if not by_truth and settings.source != "patch":
+        raise TrainingError(
+            "no frame of the range has road truth to adapt the model to, and what the reference "
+            "patch guesses may make it worse: leave `training.adapt` out, or insist with "
+            'training.source = "patch"'
+        )
 
 
-def _with_each_seed(
-    frames: Sequence[Frame],
-    pipelines: Mapping[str, Pipeline],
-    settings: TrainingSettings,
-    warnings: Sequence[str],
-    base: Model | None,
-) -> tuple[Model, ...]:
-    """Train once with each seed; the first model has the warnings of all."""
-    first, *others = (fit(frames, pipelines, each, base=base) for each in settings.by_seed())
-    more = [
-        f"seed {seed}: {warning}"
-        for seed, model in enumerate(others, settings.seed + 1)
-        for warning in model.warnings
-    ]
-    return replace(first, warnings=(*warnings, *first.warnings, *more)), *others
+def _choose(
+    frames: Frames, settings: TrainingSettings, held: HeldFrames, *, with_truth: bool
+) -> Schedule:
+    """Hold ``settings.frames`` frames, and return which others are left out because of them.
+
+    They are the first ones, and the gap lies after them; or they are spread at equal distances, and
+    a gap lies on both sides of each. ``with_truth`` says that all of them are labelled, and that
+    one must be left to evaluate; a `TrainingError` if none is.
+    """
+    every: list[int] = []
+
+    def candidates() -> Iterator[LoggedFrame]:
+        for each in frames():
+            if each.labelled or not with_truth:
+                every.append(each.number)
+                yield each
+
+    following, lost = candidates(), dict[int, str]()
+    if is_spread := settings.placement == "spread":
+        deque(following, 0)
+        chosen = frozenset(evenly(every, settings.frames))
+        following = (each for each in frames(chosen) if each.number in chosen)
+    for frame in islice(decoded(following, lost), settings.frames):
+        held.add(frame)
+    gap = settings.gap or 0
+    if not is_spread:
+        deque(islice(following, gap + 1), 0)
+    elif settings.gap is None:
+        gap = max(1, len(every) // max(4 * len(held.frames), 1))
+    if lost and not held.frames:
+        raise TrainingError(
+            f"none of the {len(lost)} frames to train on can be decoded; the first: "
+            f"{next(iter(lost.values()))}"
+        )
+    trained = {frame.number for frame in held.frames}
+    places = {place for place, number in enumerate(every) if number in trained}
+    near = {place + by for place in places for by in range(-gap * is_spread, gap + 1)} - places
+    beside = frozenset(number for place, number in enumerate(every) if place in near)
+    left = [number for number in every if number not in beside | trained | lost.keys()]
+    if with_truth and trained and not left:
+        raise TrainingError(
+            f"the range has {len(every)} labelled frames, and training would take {len(trained)} "
+            f"of them and {len(beside)} more as a gap: none is left to evaluate; set "
+            f"`training.frames` to {max(len(every) // (2 + 2 * gap), 1)}, give `training.model`, "
+            "or run what learns nothing with `only`"
+        )
+    return Schedule(gap=beside, first=left[0] if left else None)
 
 
 def from_drives(
-    frames: Mapping[Path, Sequence[Frame]],
-    pipelines: Mapping[str, Pipeline],
-    settings: TrainingSettings,
+    frames: Mapping[Path, Sequence[Frame]], pipelines: Pipelines, settings: TrainingSettings
 ) -> Model:
     """Train on frames of some drives, by the drives' paths.
 
@@ -384,10 +396,11 @@ def from_drives(
             f"{bare[0]}: no road truth to train on in the range; name its topic with "
             '`topics.truth`, leave the drive out, or set training.source = "patch"'
         )
-    guessed = bare and settings.source == "auto"
-    guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
-    every = [frame for own in frames.values() for frame in own]
-    return fit(every, pipelines, settings, guess)
+    model = fit([frame for own in frames.values() for frame in own], pipelines, settings)
+    if not bare or settings.source == "patch":
+        return model
+    guessed = f"no drive has road truth in the range: {BY_PATCH}"
+    return replace(model, warnings=(guessed, *model.warnings))
 
 
 def spread(
@@ -401,14 +414,18 @@ def spread(
     seen = {frame.number: frame.labelled for frame in frames()}
     numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
     chosen = frozenset(evenly(numbers, count))
-    yield from decoded(each for each in frames() if each.number in chosen)
+    return decoded(each for each in frames() if each.number in chosen)
 
 
 class HeldFrames:
-    """The training frames of a run: decoded, all of them, as long as it trains."""
+    """The training frames of a run: decoded, all of them, as long as it trains.
 
-    def __init__(self) -> None:
+    ``on_frame`` is called with their number after each.
+    """
+
+    def __init__(self, on_frame: Callable[[int], None] = lambda _count: None) -> None:
         self.frames: list[Frame] = []
+        self._on_frame = on_frame
         self._bytes = 0
 
     def add(self, frame: Frame) -> None:
@@ -425,81 +442,7 @@ class HeldFrames:
                 "them with `frames.scale`"
             )
         self.frames.append(frame)
-
-
-def _candidates(frames: Frames, *, labelled: bool) -> tuple[Iterator[LoggedFrame], bool]:
-    """Return the labelled frames and True; if there are none, all frames and False."""
-    if labelled:
-        with_truth = (frame for frame in frames() if frame.labelled)
-        for first in with_truth:
-            return chain([first], with_truth), True
-    return iter(frames()), False
-
-
-Chosen = tuple[Sequence[Frame], Schedule]
-"""The frames that train, and what that means for the others."""
-
-
-def _of_picks(frames: Frames, picks: Picks, on_frame: Callable[[int], None]) -> Chosen | None:
-    """Choose all frames that were picked by rank and labelled since; None without any."""
-    held, ranked = HeldFrames(), picks.stamps_of(Why.RANKED)
-    for frame in decoded(e for e in frames() if e.labelled and e.stamp_ns in ranked):
-        if frame.truth is None or picks.is_proposal(frame.stamp_ns, frame.truth):
-            continue
-        held.add(frame)
-        on_frame(len(held.frames))
-    return (held.frames, Schedule(frozenset())) if held.frames else None
-
-
-def _from_the_first(
-    candidates: Iterator[LoggedFrame],
-    settings: TrainingSettings,
-    on_frame: Callable[[int], None],
-    *,
-    by_truth: bool,
-) -> Chosen:
-    """Choose the first ``settings.frames`` frames; the gap lies after them.
-
-    Only as many candidates are taken as are needed, in order. ``by_truth`` says that a frame must
-    be left to evaluate. A `TrainingError` if none is left.
-    """
-    gap = settings.gap or 0
-    held = _hold(candidates, settings.frames, on_frame)
-    following = [readable.number for readable in islice(candidates, gap + 1)]
-    if by_truth and held and len(following) <= gap:
-        raise _none_left(len(held), gap, len(held) + len(following))
-    first = following[gap] if len(following) > gap else None
-    return held, Schedule(frozenset(), frozenset(following[:gap]), first)
-
-
-def _spread_out(
-    candidates: Iterator[LoggedFrame],
-    frames: Frames,
-    settings: TrainingSettings,
-    on_frame: Callable[[int], None],
-    *,
-    by_truth: bool,
-) -> Chosen:
-    """Choose ``settings.frames`` frames at equal distances; a gap lies on both sides of each.
-
-    Without ``settings.gap`` the gap is a quarter of that distance, and at least one frame. The
-    parameters and errors are those of `_from_the_first`, but all candidates are taken, and those
-    that are chosen are read again.
-    """
-    every = [each.number for each in candidates]
-    asked = frozenset(evenly(every, settings.frames))
-    held = _hold((e for e in frames(asked) if e.number in asked), settings.frames, on_frame)
-    trained = {frame.number for frame in held}
-    places = [place for place, number in enumerate(every) if number in trained]
-    gap = settings.gap
-    if gap is None:
-        gap = max(1, len(every) // max(4 * len(trained), 1))
-    near = {place + by for place in places for by in range(-gap, gap + 1)} - {*places}
-    left = [number for place, number in enumerate(every) if place not in near | {*places}]
-    if by_truth and trained and not left:
-        raise _none_left(len(trained), len(near & {*range(len(every))}), len(every))
-    beside = frozenset(number for place, number in enumerate(every) if place in near)
-    return held, Schedule(frozenset(), beside, left[0] if left else None)
+        self._on_frame(len(self.frames))
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -512,38 +455,14 @@ def evenly(numbers: Sequence[int], count: int) -> list[int]:
     return [numbers[i * len(numbers) // taken] for i in range(taken)]
 
 
-def decoded(frames: Iterable[LoggedFrame], lost: list[str] | None = None) -> Iterator[Frame]:
-    """Decode what can be decoded; ``lost`` receives why others cannot.
+def decoded(frames: Iterable[LoggedFrame], lost: dict[int, str] | None = None) -> Iterator[Frame]:
+    """Decode what can be decoded; ``lost`` receives why others cannot, by their numbers.
 
     They are reported when they are replayed.
     """
-    for readable in frames:
+    for each in frames:
         try:
-            yield readable.decode()
+            yield each.decode()
         except RoadevalError as error:
             if lost is not None:
-                lost.append(str(error))
-
-
-def _hold(
-    candidates: Iterator[LoggedFrame], count: int, on_frame: Callable[[int], None]
-) -> list[Frame]:
-    """Decode the first ``count`` frames."""
-    held, lost = HeldFrames(), list[str]()
-    for frame in decoded(candidates, lost):
-        held.add(frame)
-        on_frame(len(held.frames))
-        if len(held.frames) == count:
-            break
-    if lost and not held.frames:
-        none = f"none of the {len(lost)} frames to train on can be decoded"
-        raise TrainingError(f"{none}; the first: {lost[0]}")
-    return held.frames
-
-
-def _none_left(trained: int, gap: int, total: int) -> TrainingError:
-    return TrainingError(
-        f"the range has {total} labelled frames, and training would take {trained} of them and "
-        f"{gap} more as a gap: none is left to evaluate; set `training.frames` to "
-        f"{max(total // 2 - gap, 1)}, give `training.model`, or run what learns nothing with `only`"
-    )
+                lost[each.number] = str(error)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
@@ -22,7 +23,7 @@ from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import Stage, check_arrays, check_range
 from roadeval.pipeline.stages import STAGES
 from roadeval.results.facts import another_format
-from roadeval.runtime.files import check_input, put
+from roadeval.runtime.files import check_input, put, writing
 from roadeval.version import VERSION as ROADEVAL
 
 FORMAT: Final = "roadeval-model"
@@ -32,6 +33,8 @@ WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
 """The version of roadeval by that of the file, where the file does not say it."""
 GREATEST_SIZE: Final = 1 << 29
 """Bytes that a model's arrays may take; those of `roadeval train` take a few million."""
+Arrays = dict[str, npt.NDArray[Any]]
+"""By name."""
 PRIOR: Final = "prior"
 """The array that belongs to no variant."""
 
@@ -40,7 +43,7 @@ class ModelError(RoadevalError):
     """A model file that cannot be used."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Model:
     """The result of training."""
 
@@ -84,14 +87,15 @@ class Model:
                 "train one with the same preset and variants"
             )
         # Through JSON, as the file has been: tuples and lists are the same there.
-        wanted = json.loads(json.dumps(pipeline.relevant()))
-        made_for = self.settings[variant]
+        wanted, made_for = json.loads(json.dumps(pipeline.relevant())), self.settings[variant]
         for name in sorted({*made_for, *wanted}):
-            if made_for.get(name) != wanted.get(name):
+            there, here = made_for.get(name, {}), wanted.get(name, {})
+            if there != here:
+                keys = [k for k in {**there, **here} if there.get(k) != here.get(k)]
+                differ = (f"{k} {there.get(k)} there, {here.get(k)} here" for k in keys)
                 raise ModelError(
                     f"{path}: the model was made for other settings of {name} in variant "
-                    f"{variant} ({_difference(made_for.get(name), wanted.get(name))}); "
-                    "train one with the settings of this run"
+                    f"{variant} ({', '.join(differ)}); train one with the settings of this run"
                 )
         for name in pipeline.learning():
             if name not in self.parameters.get(variant, {}):
@@ -101,42 +105,27 @@ class Model:
                 )
 
 
-def _difference(made_for: Any, wanted: Any) -> str:
-    if not (isinstance(made_for, dict) and isinstance(wanted, dict)):
-        return f"{made_for} there, {wanted} here"
-    keys = [k for k in {**made_for, **wanted} if made_for.get(k) != wanted.get(k)]
-    return ", ".join(f"{k} {made_for.get(k)} there, {wanted.get(k)} here" for k in keys)
-
-
 def save_model(model: Model, path: Path) -> None:
     """Write a model file: a NumPy archive of plain arrays and one JSON text.
 
     It appears under its name only when it is complete. The same model gives the same bytes.
     """
-    arrays: dict[str, npt.NDArray[Any]] = {}
-    for variant, stages in model.parameters.items():
-        for stage, parameters in stages.items():
-            own = arrays_of(parameters)
-            arrays |= {f"{variant}/{stage}/{name}": array for name, array in own.items()}
+    arrays = {
+        f"{variant}/{stage}/{name}": array
+        for variant, stages in model.parameters.items()
+        for stage, parameters in stages.items()
+        for name, array in arrays_of(parameters).items()
+    }
     if model.prior is not None:
         arrays[PRIOR] = model.prior
-    header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "roadeval": ROADEVAL,
-        "settings": model.settings,
-        "source": model.source,
-        "digests": sorted(model.digests),
-        "pixels": model.pixels,
-        "warnings": model.warnings,
-    }
-    arrays["header"] = np.frombuffer(json.dumps(header, sort_keys=True).encode(), np.uint8)
+    header = {name: getattr(model, name) for name in get_type_hints(_Header)}
+    header |= {"format": FORMAT, "version": VERSION, "roadeval": ROADEVAL}
+    text = json.dumps(header, sort_keys=True, default=sorted)  # a set has no order
+    arrays["header"] = np.frombuffer(text.encode(), np.uint8)
     content = BytesIO()
     np.savez_compressed(content, allow_pickle=False, **arrays)
-    try:
+    with writing(path, ModelError):
         put(path, content.getvalue())
-    except OSError as error:
-        raise ModelError(f"{path}: cannot write the model: {error.strerror}") from error
 
 
 def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
@@ -156,35 +145,38 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     header, arrays = _content(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
-    if header.get("version") != VERSION:
-        number = version if isinstance(version := header.get("version"), int) else 0
+    if (version := header.get("version")) != VERSION:
+        number = version if isinstance(version, int) else 0
         writer = header.get("roadeval") or WROTE.get(number)
         told = another_format(writer, later=number > VERSION, remedy="train it again")
         raise ModelError(f"{path}: {told}")
     try:
         return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
-        raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
+        reason = str(error)
+        if isinstance(error, ValidationError):
+            problem = error.errors(include_url=False)[0]
+            reason = f"{'.'.join(map(str, problem['loc']))}: {problem['msg'].lower()}"
+        raise ModelError(f"{path}: a damaged model file: {reason}; train it again") from error
 
 
-def kept_model(path: Path, stages: tuple[Stage, ...] = ()) -> Model:
+def kept_model(path: Path, stages: tuple[Stage, ...]) -> Model:
     """Read a model file as `load_model` does, or return the one read before.
 
     What a stage computes from a model alone is kept with it, as the SVM's table of colours.
     """
-    try:
+    with suppress(OSError):
         there = path.stat()
-    except OSError:
-        return load_model(path)  # which says what is wrong
-    return _kept(path, stages, there.st_ino, there.st_size, there.st_mtime_ns)
+        return _kept(path, stages, there.st_ino, there.st_size, there.st_mtime_ns)
+    return load_model(path)  # which says what is wrong
 
 
 @lru_cache(maxsize=2)
-def _kept(path: Path, stages: tuple[Stage, ...], _node: int, _size: int, _time: int) -> Model:
+def _kept(path: Path, stages: tuple[Stage, ...], *_state: int) -> Model:
     return load_model(path, stages)
 
 
-def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
+def _content(path: Path) -> tuple[Any, Arrays]:
     try:
         check_input(path)
         with ZipFile(path) as packed:
@@ -217,65 +209,46 @@ class _Header:
     warnings: tuple[str, ...]
 
 
-def _model(
-    content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]], known: Mapping[str, Stage]
-) -> Model:
+def _model(content: dict[str, Any], arrays: Arrays, known: Mapping[str, Stage]) -> Model:
     """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
-    names = [entry.name for entry in dataclasses.fields(_Header)]
-    given: dict[str, Any] = {name: content.get(name) for name in names}
-    header = _Header(**given)
-    parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
-    for name in arrays.keys() - {PRIOR}:
-        variant, _, rest = name.partition("/")
-        stage, _, entry = rest.partition("/")
+    header = _Header(**content)
+    prior = arrays.pop(PRIOR, None)
+    parts: dict[str, dict[str, Arrays]] = {variant: {} for variant in header.settings}
+    for name, array in arrays.items():
+        variant, stage, entry = (*name.split("/", 2), "", "")[:3]
         if variant not in parts:
             raise ValueError(f"array {name} belongs to no variant")
-        parts[variant].setdefault(stage, {})[entry] = arrays[name]
-    parameters = {
-        variant: {
-            stage: _parameters(f"{variant}/{stage}", known.get(stage), each)
-            for stage, each in stages.items()
-        }
-        for variant, stages in parts.items()
-    }
-    return Model(parameters, **vars(header), prior=arrays.get(PRIOR))
+        parts[variant].setdefault(stage, {})[entry] = array
+    parameters: dict[str, dict[str, Any]] = {}
+    for variant, stages in parts.items():
+        parameters[variant] = {}
+        for stage, own in stages.items():
+            where = f"{variant}/{stage}"
+            if stage not in known or (kind := known[stage].parameters) is None:
+                raise ValueError(f"{where} is no stage that learns")
+            try:
+                parameters[variant][stage] = from_arrays(kind, own)
+            except ValueError as error:
+                raise ValueError(f"{where}: {error}") from error
+    return Model(parameters, **vars(header), prior=prior)
 
 
-def _parameters(where: str, stage: Stage | None, arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
-    kind = None if stage is None else stage.parameters
-    if kind is None:
-        raise ValueError(f"{where} is no stage that learns")
-    try:
-        return from_arrays(kind, arrays)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from error
-
-
-def _line(error: ValueError) -> str:
-    """Return in one line what is wrong."""
-    if not isinstance(error, ValidationError):
-        return str(error)
-    problem = error.errors(include_url=False)[0]
-    return f"{'.'.join(map(str, problem['loc']))}: {problem['msg'].lower()}"
-
-
-def arrays_of(learnt: Any) -> dict[str, npt.NDArray[Any]]:
+def arrays_of(learnt: Any) -> Arrays:
     """Return the fields of a dataclass as arrays by name.
 
     Those of a field that is a dataclass, too, are ``field/name``; a part that is None has none.
     """
-    found: dict[str, npt.NDArray[Any]] = {}
-    parts = _parts(type(learnt))
+    found: Arrays = {}
     for field in dataclasses.fields(learnt):
         value = getattr(learnt, field.name)
-        if field.name not in parts:
-            found[field.name] = np.asarray(value)
-        elif value is not None:
+        if dataclasses.is_dataclass(value):
             found |= {f"{field.name}/{name}": array for name, array in arrays_of(value).items()}
+        elif value is not None:
+            found[field.name] = np.asarray(value)
     return found
 
 
-def from_arrays(kind: type[Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
+def from_arrays(kind: type[Any], arrays: Arrays) -> Any:
     """Return the dataclass whose arrays these are, see `arrays_of`.
 
     A `ValueError` if an array is missing, or is not known, or the dataclass refuses what it is
@@ -283,20 +256,18 @@ def from_arrays(kind: type[Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
     """
     parts = _parts(kind)
     names = {field.name for field in dataclasses.fields(kind)}
-    own = names - parts.keys()
     whole = {name for name in arrays if name.partition("/")[0] not in parts or name in parts}
-    if wrong := own ^ whole:
+    if wrong := (names - parts.keys()) ^ whole:
         raise ValueError(f"missing or unknown arrays: {', '.join(sorted(wrong))}")
-    values: dict[str, Any] = {}
-    for name in names:
-        if name not in parts:
-            array = arrays[name]
-            values[name] = array if array.ndim else array.item()
-            continue
-        of_part, optional = parts[name]
+    values: dict[str, Any] = {
+        name: array if array.ndim else array.item()
+        for name, array in arrays.items()
+        if name in names
+    }
+    for name, (part, optional) in parts.items():
         start = f"{name}/"
         inner = {key.removeprefix(start): arrays[key] for key in arrays if key.startswith(start)}
-        values[name] = from_arrays(of_part, inner) if inner or not optional else None
+        values[name] = from_arrays(part, inner) if inner or not optional else None
     return kind(**values)
 
 
@@ -306,10 +277,9 @@ def _parts(kind: type[Any]) -> dict[str, tuple[type[Any], bool]]:
         hints = get_type_hints(kind)
     except NameError:  # of names that type checkers alone import: a user's stage may have such
         return {}
-    found = {}
-    for field in dataclasses.fields(kind):
-        choices = get_args(hints[field.name]) or (hints[field.name],)
-        for choice in choices:
-            if dataclasses.is_dataclass(choice) and isinstance(choice, type):
-                found[field.name] = choice, type(None) in choices
-    return found
+    return {
+        name: (choice, type(None) in get_args(hint))
+        for name, hint in hints.items()
+        for choice in get_args(hint) or (hint,)
+        if dataclasses.is_dataclass(choice) and isinstance(choice, type)
+    }

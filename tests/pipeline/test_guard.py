@@ -34,10 +34,10 @@ def test_a_mask_may_hold_any_whole_numbers(held):
 )
 def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
     array = (IMAGE if spec is RGB else IMAGE[..., 0]).astype(held)
-    with pytest.raises(StageError, match=f"its layer '{spec.name}' holds {np.dtype(held)}"):
+    with pytest.raises(StageError, match=f"its layer '{spec.name}' is {np.dtype(held)}"):
         run(spec, array)
 
 
 def test_a_layer_of_another_size_is_named():
-    with pytest.raises(StageError, match=r"its layer 'mask' is \(3, 6\), not \(4, 6\)"):
+    with pytest.raises(StageError, match=r"its layer 'mask' is uint8 \(3, 6\), not .*\(4, 6\)"):
         run(MASK, IMAGE[:3, :, 0])

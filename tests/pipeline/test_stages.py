@@ -71,7 +71,7 @@ def test_an_output_that_cannot_be_is_an_error(name, said):
         ("no_such_module:road", "there is no module no_such_module: install it"),
         ("pickle:loads", "its argument data is none of image"),
         ("blur", "there is no stage 'blur'; choose"),
-        (":", "cannot be used"),
+        (":", "there is no stage ':'; choose"),
     ],
 )
 def test_what_is_no_stage_is_named_with_the_reason(name, said):

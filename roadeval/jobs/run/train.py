@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,16 +38,11 @@ def train(
         raise TrainingError(
             "`training.seeds`: a model file holds one training; set training.seed for another"
         )
-    held, total = HeldFrames(), settings.frames * len(entries)
-
-    def show() -> None:
-        on_progress(Progress(len(held.frames), total, "training"))
-
+    total = settings.frames * len(entries)
+    held = HeldFrames(lambda count: on_progress(Progress(count, total, "training")))
     with holding(output, inputs=[each.path for each in entries]):
         drawn = {
-            Path(f"{each.shown} {each.camera}".rstrip()): draw(
-                each, each.config(config), held, show
-            )
+            Path(f"{each.shown} {each.camera}".rstrip()): draw(each, each.config(config), held)
             for each in entries
         }
         frames = {path: own for path, (own, _) in drawn.items()}
@@ -65,12 +59,7 @@ def train(
 
 
 def draw(
-    drive: DriveEntry,
-    own: RunConfig,
-    held: HeldFrames,
-    on_frame: Callable[[], None] = lambda: None,
-    *,
-    labelled: bool = False,
+    drive: DriveEntry, own: RunConfig, held: HeldFrames, *, labelled: bool = False
 ) -> tuple[list[Frame], list[str]]:
     """Decode the training frames of a drive and hold them; return also what of it was lost.
 
@@ -92,7 +81,6 @@ def draw(
                 return [], []
             held.add(frame)
             frames.append(frame)
-            on_frame()
         account = streams[-1].accounting
         losses = [*log.losses, *account.losses]
         if missing := len(account.undecodable):

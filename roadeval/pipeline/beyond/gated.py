@@ -38,7 +38,6 @@ from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stret
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
 from roadeval.pipeline.stage import (
-    GREATEST,
     Output,
     Stage,
     TrainingSet,
@@ -217,9 +216,8 @@ class ShadedRoad:
     def __post_init__(self) -> None:
         check_arrays(self, np.float64, place=GRID)
         check_range("place", self.place, 0, 1)
-        check_arrays(self, np.float32, planes=("K", FEATURES), bias=("K",), weights=("K",))
-        check_arrays(self, np.float32, offset=())
-        check_range("offset", self.offset, -GREATEST, GREATEST)
+        shapes = {"planes": ("K", FEATURES), "bias": ("K",), "weights": ("K",), "offset": ()}
+        check_arrays(self, np.float32, **shapes)
 
 
 def fit(sample: TrainingSet, settings: GatedSettings) -> ShadedRoad:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Values
-from roadeval.pipeline.stage import GREATEST, check_arrays, check_range
+from roadeval.pipeline.stage import check_arrays
 from roadeval.runtime.imports import whole
 
 CODES: Final = 256
@@ -69,7 +69,6 @@ class HiddenLayer:
             weights=("K",),
             shift=(),
         )
-        check_range("shift", self.shift, -GREATEST, GREATEST)
 
     @property
     def inputs(self) -> int:

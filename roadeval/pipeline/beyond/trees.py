@@ -96,10 +96,8 @@ class Forest:
         check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
         check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
         check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=())
-        check_arrays(self, np.float32, inputs=())
         if not isinstance(self.inputs, int):
             raise ValueError("inputs is no whole number")
-        check_range("offset", self.offset, -GREATEST, GREATEST)
         check_range("inputs", self.inputs, 1, GREATEST)
         check_range("feature", self.feature, 0, self.inputs - 1)
         if not (self.kept >> np.uint32(LEAVES - 1)).all():

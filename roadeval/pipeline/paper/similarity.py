@@ -18,7 +18,6 @@ from roadeval.pipeline.stage import (
     TrainingSet,
     View,
     check_arrays,
-    check_covariance,
     check_range,
     stage_settings,
 )
@@ -52,7 +51,10 @@ class RoadColour:
         check_range("mean", self.mean, 0, 255)
         check_range("covariance", self.covariance, -(255**2), 255**2)
         # One grey alone has no variance; the rest is rounding, and far below the least ridge.
-        check_covariance("covariance", self.covariance, -1e-6)
+        if np.linalg.eigvalsh(self.covariance)[0] < -1e-6:
+            raise ValueError("covariance has an eigenvalue below 0, and so is no covariance")
+        if not np.allclose(self.covariance, self.covariance.T):
+            raise ValueError("covariance is not symmetric, and so no covariance")
 
 
 def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:

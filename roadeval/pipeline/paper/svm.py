@@ -22,7 +22,6 @@ from roadeval.pipeline.colour_table import (
     sums_of_terms,
 )
 from roadeval.pipeline.stage import (
-    GREATEST,
     Output,
     Stage,
     TrainingSet,
@@ -84,7 +83,6 @@ class SupportVectors:
         check_arrays(self, np.float64, vectors=("m", 3), weights=("m",), offset=())
         check_range("mean", self.mean, 0, 255)
         check_range("scale", self.scale, 1e-6, 255)
-        check_range("offset", self.offset, -GREATEST, GREATEST)
 
 
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
