@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -58,8 +58,7 @@ def as_plain(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")
 
 
-@dataclass(frozen=True, slots=True)
-class Counts:
+class Counts(NamedTuple):
     """Pixels by outcome; road is the positive class, ignored pixels are in none (section 5)."""
 
     tp: int = 0
@@ -71,11 +70,6 @@ class Counts:
     def n(self) -> int:
         """Road and non-road pixels of the truth, N in Eq. 24-25."""
         return self.tp + self.tn + self.fp + self.fn
-
-    def __add__(self, other: Counts) -> Counts:
-        return Counts(
-            self.tp + other.tp, self.tn + other.tn, self.fp + other.fp, self.fn + other.fn
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +86,7 @@ class Tally:
     rates: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(NamedTuple):
     """Pixels that one mask repairs and spoils against another.
 
     ``repaired`` are newly right, ``spoiled`` newly wrong, of the ``labelled`` ones.
@@ -102,13 +95,6 @@ class Change:
     repaired: int = 0
     spoiled: int = 0
     labelled: int = 0
-
-    def __add__(self, other: Change) -> Change:
-        return Change(
-            self.repaired + other.repaired,
-            self.spoiled + other.spoiled,
-            self.labelled + other.labelled,
-        )
 
 
 Contour = tuple[float, float, Sums]

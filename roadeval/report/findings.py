@@ -19,7 +19,7 @@ from roadeval.evaluation.stats import mean_distribution
 from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
-from roadeval.results.rows import as_arrays, window_rows
+from roadeval.results.rows import as_arrays, window_table
 
 WINDOWS: Final = 30
 """Points of the figures over the drive, at most."""
@@ -127,7 +127,7 @@ class Findings:
         if not count or (count <= WINDOWS and len(windows)):
             return windows
         size *= -(-count // WINDOWS)
-        return as_arrays("windows", window_rows(score.windows(rows, size)))
+        return window_table(score.camera_masks(rows), size)
 
     @cached_property
     def filtered(self) -> Rows:

@@ -7,32 +7,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import astuple
+from dataclasses import asdict, astuple
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import Change, Counts, Doubt, Frame, FrameResult, Rows, Transition
+from roadeval.data import Doubt, Frame, FrameResult, Rows, Tally
 from roadeval.evaluation.regions import ALL
-from roadeval.evaluation.score import SIGNS, at_levels
-from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind
+from roadeval.evaluation.score import SIGNS, Camera, at_levels, windows
+from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, TYPES, UNSCORED
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
-    from roadeval.evaluation.score import Scoreboard, Window
+    from roadeval.evaluation.score import Scoreboard
     from roadeval.results.facts import Facts
 
-Row = tuple[str | int | float, ...]
+Row = tuple[Any, ...]
 """A row's cells in the order of its table's columns, without the key."""
-ARRAYS: Final = {
-    **dict.fromkeys((Kind.NAME, Kind.TEXT), "str"),
-    **dict.fromkeys((Kind.COUNT, Kind.TIME), "int64"),
-    **dict.fromkeys((Kind.RATE, Kind.NUMBER), "float64"),
-    Kind.FLAG: "bool",
-}
-"""The NumPy type of each kind of column."""
-
-
 LOST: Final = 3
 """Exit code of a replay that has lost a part of its log."""
 ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
@@ -59,55 +51,36 @@ def doubt_rows(frame: Frame, doubts: Iterable[Doubt]) -> dict[str, list[Row]]:
 
 def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
     """Return a frame's rows of each table of evaluated frames; empty for others."""
-    frame = result.frame
+    frame, tallies = result.frame, result.tallies
+    number, finals = frame.number, {tally.variant: tally.stage for tally in tallies}
+    when = number, frame.stamp_ns, frame.log_time_ns
     return {
-        "frames": [
-            (
-                *(frame.number, frame.stamp_ns, frame.log_time_ns, tally.variant, tally.stage),
-                *(*_counts(tally.counts), *tally.rates.values()),
-            )
-            for tally in result.tallies
-        ],
+        "frames": [(*when, each.variant, each.stage, *_numbers(each)) for each in tallies],
         "regions": [
-            (frame.number, tally.variant, tally.stage, region, *_counts(counts))
-            for tally in result.tallies
-            for region, counts in tally.regions.items()
+            (number, each.variant, each.stage, region, *counts, counts.n)
+            for each in tallies
+            for region, counts in each.regions.items()
         ],
         "oracles": [
-            (
-                *(frame.number, tally.variant, oracle, tally.stage),
-                *(*_counts(tally.counts), *tally.rates.values()),
-            )
-            for oracle, tallies in result.oracles.items()
-            for tally in tallies
+            (number, each.variant, oracle, each.stage, *_numbers(each))
+            for oracle, own in result.oracles.items()
+            for each in own
         ],
         "disagreements": [
-            (frame.number, one, other, change.repaired, change.spoiled, change.labelled)
-            for one, other, change in _pairs(result.changes)
+            (number, one[0], other[0], *result.changes[*one, *other])
+            for one, other in combinations(finals.items(), 2)
         ],
-        "edges": [*_edges(result)],
+        "edges": [
+            (number, variant, finals[variant], measure, f"{at}m" if at else "ahead", *ends)
+            for variant, own in result.metres.items()
+            for (measure, at), found in zip(own.measures, own.ends[0].tolist(), strict=True)
+            for ends in [[round(end, 3) for end in found]]
+        ],
     }
 
 
-def _edges(result: FrameResult) -> Iterator[Row]:
-    """Yield the rows of ``edges``: where masks end, and where the truth does."""
-    stages = {tally.variant: tally.stage for tally in result.tallies}
-    for variant, own in result.metres.items():
-        for (measure, at), (mask, truth) in zip(own.measures, own.ends[0].tolist(), strict=True):
-            where = f"{at}m" if at else "ahead"
-            ends = round(mask, 3), round(truth, 3)
-            yield (result.frame.number, variant, stages[variant], measure, where, *ends)
-
-
-def _pairs(changes: Mapping[Transition, Change]) -> Iterator[tuple[str, str, Change]]:
-    """Yield each pair of variants once, with how their final masks differ."""
-    seen: set[str] = set()
-    for (one, _, other, _), change in changes.items():
-        if one == other:
-            continue
-        seen.add(one)
-        if other not in seen:
-            yield one, other, change
+def _numbers(tally: Tally) -> Row:
+    return *tally.counts, tally.counts.n, *tally.rates.values()
 
 
 def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
@@ -126,36 +99,15 @@ def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
     for name, counts in board.curves.counts.items():
         other, road = at_levels(counts)
         levels = (other + road).nonzero()[0]
-        columns = (each[levels].tolist() for each in (road, other))
-        rows = zip(levels.tolist(), *columns, strict=True)
-        probabilities += [(*name, *row) for row in rows]
+        columns = np.column_stack((levels, road[levels], other[levels]))
+        probabilities += [(*name, *row) for row in columns.tolist()]
     return {
-        "windows": window_rows(board.windows()),
-        "changes": [
-            (*step, change.repaired, change.spoiled, change.labelled)
-            for step, change in board.changes.items()
-        ],
+        "windows": [tuple(row.values()) for row in board.windows()],
+        "changes": [(*step, *change) for step, change in board.changes.items()],
         "heat": heat,
         "probabilities": probabilities,
         "metres": [astuple(each) for each in board.metres()],
     }
-
-
-def window_rows(windows: Iterable[Window]) -> list[Row]:
-    """Return the rows of ``windows``."""
-    return [
-        (
-            *(each.number, each.first_frame, each.last_frame, each.frames),
-            *(each.variant, each.stage),
-            *each.rates.values(),
-            *each.pooled.values(),
-        )
-        for each in windows
-    ]
-
-
-def _counts(counts: Counts) -> tuple[int, ...]:
-    return counts.tp, counts.tn, counts.fp, counts.fn, counts.n
 
 
 def csv_lines(key: Key, rows: Mapping[str, Iterable[Row]]) -> dict[str, str]:
@@ -177,12 +129,13 @@ def as_arrays(name: str, rows: Iterable[Row]) -> Rows:
     """Return rows of a table as arrays, without the key."""
     columns = TABLES[name].columns[len(KEY) :]
     cells = [*zip(*rows, strict=True)] or [()] * len(columns)
-    return Rows(
-        {
-            column.name: np.array(each, ARRAYS[column.kind])
-            for column, each in zip(columns, cells, strict=True)
-        }
-    )
+    pairs = zip(columns, cells, strict=True)
+    return Rows({column.name: np.array(each, TYPES[column.kind]) for column, each in pairs})
+
+
+def window_table(masks: Camera, size: int) -> Rows:
+    """Return the rows of ``windows`` of so many frames, see `roadeval.evaluation.score.windows`."""
+    return as_arrays("windows", (tuple(row.values()) for row in windows(masks, size)))
 
 
 def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
@@ -232,23 +185,10 @@ def score_rows(
 def effect_rows(facts: Facts) -> Iterator[dict[str, Any]]:
     """Yield the rows of ``effects``: each variant minus ``unfiltered``, and minus ``blind``."""
     for each in facts.effects:
+        mask = {"base": each.base, "variant": each.variant, "stage": each.stage}
         for metric, found in each.rates.items():
-            yield {
-                "base": each.base,
-                "variant": each.variant,
-                "stage": each.stage,
-                "final": each.final,
-                "metric": metric,
-                "mean": found.mean,
-                "standard_error": found.standard_error,
-                "low": found.low,
-                "high": found.high,
-                "p": found.p,
-                "frames": found.units,
-                "effective_frames": found.effective,
-                "worse": found.worse,
-                "better": found.better,
-            }
+            frames = {"frames": found.units, "effective_frames": found.effective}
+            yield {**mask, "final": each.final, "metric": metric, **asdict(found), **frames}
 
 
 def cells(table: str, key: Key, rows: Iterable[Mapping[str, Any]]) -> list[list[Any]]:

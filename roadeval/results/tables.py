@@ -15,7 +15,7 @@ import numpy as np
 from roadeval.data import Rows, is_plain
 from roadeval.data.result import Cells
 from roadeval.errors import RoadevalError
-from roadeval.results.schema import ARROW, KEY, TABLES, TAG, Column, Kind, TableSchema
+from roadeval.results.schema import KEY, TABLES, TAG, TYPES, Column, Kind, TableSchema
 from roadeval.runtime.documents import BYTES, LONG, check_texts
 from roadeval.runtime.files import NewFile, check_input
 
@@ -38,7 +38,6 @@ FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 2}
 """Of a fleet's folder and its tables; the version rises where a column changes its meaning."""
 AGAIN: Final = "run the fleet's command again"
 _ANEW: Final = "make the results again with roadeval replay"
-_WORDS: Final = (Kind.NAME, Kind.TEXT)
 
 
 class ResultsError(RoadevalError):
@@ -149,7 +148,7 @@ def _coded(table: TableSchema) -> pa.Schema:
     import pyarrow as pa
 
     words = pa.dictionary(pa.int32(), pa.string())
-    types = ((c.name, words if c.kind in _WORDS else ARROW[c.kind]) for c in table.columns)
+    types = ((c.name, words if c.is_word else TYPES[c.kind]) for c in table.columns)
     return pa.schema([*types])
 
 
@@ -175,7 +174,7 @@ def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
     """Refuse, as a ValueError, a column that lacks a value, or a name that is none."""
     if cells.null_count:
         raise ValueError(f"column {column.name} lacks a value")
-    if column.kind not in _WORDS:
+    if not column.is_word:
         return
     words = {word for chunk in cells.chunks for word in chunk.dictionary.to_pylist()}
     if len(words) > WORDS:
@@ -189,7 +188,7 @@ def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
 def _arrays(table: pa.Table, columns: Iterable[Column]) -> Rows:
     return Rows(
         {
-            column.name: (_words if column.kind in _WORDS else _numbers)(table[column.name])
+            column.name: (_words if column.is_word else _numbers)(table[column.name])
             for column in columns
         }
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation.score import CameraMasks, FrameCounts, drive_effects
+from roadeval.evaluation.score import FrameCounts, drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings()
@@ -11,15 +11,15 @@ SETTINGS = EvaluationSettings()
 
 def effects_of(masks, settings=SETTINGS):
     """The differences of a drive of one camera."""
-    return drive_effects([CameraMasks(np.arange(100), masks)], settings)
+    return drive_effects([masks], settings)
 
 
 def a_mask(variant, stage, errors, positions=None):
     """A mask's frames of 100 pixels, so many of which are wrong: all of them FP."""
     wrong = np.array(errors)
     counts = np.stack([np.full(len(wrong), 50), 50 - wrong, wrong, np.zeros_like(wrong)], axis=1)
-    places = range(len(wrong)) if positions is None else positions
-    return FrameCounts(variant, stage, np.array(places), counts)
+    places = np.array(range(len(wrong)) if positions is None else positions)
+    return FrameCounts(variant, stage, places, places, counts)
 
 
 def of(*masks):

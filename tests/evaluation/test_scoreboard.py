@@ -77,7 +77,7 @@ def test_totals_and_windows_follow_the_order_of_the_variants() -> None:
     assert list(board.totals()) == ["filtered", "unfiltered", "blind"]
     assert list(board.totals()["filtered"]) == ["svm", "post"]
     assert board.totals()["filtered"]["post"]["FN"] == 3
-    assert [(row.number, row.variant, row.stage) for row in list(board.windows())[:5]] == [
+    assert [(row["window"], row["variant"], row["stage"]) for row in board.windows()[:5]] == [
         (0, "filtered", "svm"),
         (0, "filtered", "post"),
         (0, "unfiltered", "svm"),

@@ -39,15 +39,19 @@ def a_drive(variants):
     return rows_of(a_table({(name, "post"): DRIVE[name, "post"].tolist() for name in names}))
 
 
+def totals_of(rows):
+    return score.totals(score.camera_masks(rows))
+
+
 def replayed(rows):
     effects = drive_effects([score.camera_masks(rows)], SETTINGS)
-    return effects, verdict(score.totals(rows), effects)
+    return effects, verdict(totals_of(rows), effects)
 
 
 def a_fleet_of(rows, folder):
     """The facts of a fleet of this drive."""
     effects, _ = replayed(rows)
-    about = "", DriveFacts("street"), FrameAccount(), score.totals(rows)
+    about = "", DriveFacts("street"), FrameAccount(), totals_of(rows)
     facts = Facts(*about, **as_parts(effects))
     about = {"status": "scored", "evaluated": len(rows.distinct("frame")), "log_digest": "d1"}
     tables = {
@@ -100,7 +104,7 @@ def test_the_sentence_of_a_replay_is_that_of_the_comparison_but_for_what_brings_
     rows = a_drive(CASES[2])
     effects, told = replayed(rows)
     (effect,) = (e for e in effects if (e.base, e.variant) == ("unfiltered", "filtered"))
-    found, totals = effect.rates["ERR"], score.totals(rows)
+    found, totals = effect.rates["ERR"], totals_of(rows)
     ends = levels(found, totals["unfiltered"]["post"], totals["filtered"]["post"])
     assert ends is not None
     said = sentence(found, "the filter", "ERR of post", levels=ends)

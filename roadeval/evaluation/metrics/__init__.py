@@ -51,6 +51,11 @@ def of(counts: Counts) -> dict[str, float]:
     return {name: metric.function(counts) for name, metric in METRICS.items()}
 
 
+def pooled(counts: npt.NDArray[np.int64]) -> dict[str, float]:
+    """Compute the tabled metrics of summed counts, ``(4,)``, by names as ``pooled_ERR``."""
+    return {f"pooled_{name}": value for name, value in of(Counts(*counts.tolist())).items()}
+
+
 def overlap(counts: Counts) -> dict[str, float]:
     """Compute the metrics without a column in tables."""
     return {name: metric.function(counts) for name, metric in OVERLAP.items()}

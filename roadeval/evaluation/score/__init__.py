@@ -1,22 +1,21 @@
 """The score of a drive: counts and rates frame by frame, summed up over frames and windows."""
 
 from roadeval.evaluation.score.counts import (
-    CameraMasks,
+    Camera,
     EdgesAndFlicker,
     FourCounts,
     FrameCounts,
     GrowingCounts,
     Name,
-    Window,
     boundary_f,
     count,
-    cut,
     edge_of,
     error_map,
     final_stages,
     means,
     over_cameras,
     sum_up,
+    windows,
 )
 from roadeval.evaluation.score.frame import (
     BlindPrior,
@@ -38,8 +37,6 @@ from roadeval.evaluation.score.rows import (
     region_totals,
     scene_ns,
     stages_of,
-    totals,
-    windows,
     worst,
 )
 from roadeval.evaluation.score.scoreboard import (
@@ -51,6 +48,8 @@ from roadeval.evaluation.score.scoreboard import (
     corrected,
     drive_effects,
     evidence,
+    totals,
+    within,
 )
 from roadeval.evaluation.score.thresholds import (
     LEVELS,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from array import array
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise, zip_longest
+from operator import itemgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,7 +19,6 @@ from roadeval.data import (
     FINAL_STAGE,
     OUTCOMES,
     Contour,
-    Counts,
     FrameResult,
     Layer,
     Mask,
@@ -34,6 +33,7 @@ from roadeval.data import (
 from roadeval.data.arrays import IGNORED, Bits, Floats, Sums
 from roadeval.evaluation import metrics
 from roadeval.evaluation.region import disk, grow, square
+from roadeval.evaluation.stats import CameraRates
 from roadeval.kernels import KERNELS
 
 Name = tuple[str, str]
@@ -73,37 +73,36 @@ def flat(masks: Bits | Sequence[Bits]) -> Bits:
     return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameCounts:
+class FrameCounts(NamedTuple):
     """The counts of one stage of one variant, frame by frame."""
 
     variant: str
     stage: str
-    positions: npt.NDArray[np.int64]
-    """``(n,)`` int64: places among the evaluated frames, rising. A mask that the log itself carries
-    may be missing on some."""
+    frames: Sums
+    """``(n,)`` int64: frame numbers, rising. A mask that the log itself carries may be missing on
+    some."""
+    stamps: Sums
+    """``(n,)`` int64, nanoseconds."""
     counts: FourCounts
+
+    @property
+    def name(self) -> Name:
+        """Its variant and stage."""
+        return self.variant, self.stage
 
     @property
     def rates(self) -> Floats:
         """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
         return metrics.table(self.counts)
 
-    def paired(self, base: FrameCounts) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
-        """Return the positions of the frames that both masks have, ``(n,)``, and the rates there.
-
-        The rates are ``(n, m)`` of this mask and of the base.
-        """
-        both, mine, theirs = np.intersect1d(self.positions, base.positions, return_indices=True)
-        return both, self.rates[mine], base.rates[theirs]
+    def paired(self, base: FrameCounts) -> CameraRates:
+        """Return the rates of this mask and of the base on the frames that both have."""
+        _, mine, theirs = np.intersect1d(self.frames, base.frames, return_indices=True)
+        return CameraRates(self.stamps[mine], self.rates[mine], base.rates[theirs])
 
 
-class CameraMasks(NamedTuple):
-    """The masks of a camera of a drive."""
-
-    stamps: npt.NDArray[np.int64]
-    """``(n,)``: nanoseconds of each evaluated frame, to which the masks' positions lead."""
-    masks: Sequence[FrameCounts]
+Camera = Sequence[FrameCounts]
+"""The masks of a camera of a drive."""
 
 
 class GrowingCounts:
@@ -112,18 +111,23 @@ class GrowingCounts:
     def __init__(self) -> None:
         self._rows: Final[defaultdict[Name, array[int]]] = defaultdict(partial(array, "I"))
 
-    def add(self, position: int, tallies: Iterable[Tally]) -> None:
-        """Add the evaluated frame at ``position``, counted from 0."""
+    def add(self, frame: int, tallies: Iterable[Tally]) -> None:
+        """Add the evaluated frame of a number; they come in order."""
         for each in tallies:
-            c = each.counts
-            self._rows[each.variant, each.stage].extend((position, c.tp, c.tn, c.fp, c.fn))
+            self._rows[each.variant, each.stage].extend((frame, *each.counts))
 
-    def so_far(self) -> dict[Name, FrameCounts]:
-        """Return what was added, mask by mask as they first came."""
-        tables = {
-            name: np.array(rows, np.int64).reshape(-1, 5) for name, rows in self._rows.items()
-        }
-        return {name: FrameCounts(*name, own[:, 0], own[:, 1:]) for name, own in tables.items()}
+    def so_far(self, when: Sums) -> dict[Name, FrameCounts]:
+        """Return what was added, mask by mask as they first came.
+
+        ``when`` are ``(n, 2)`` int64: number and stamp of each frame, rising.
+        """
+        found = {}
+        for name, rows in self._rows.items():
+            own = np.array(rows, np.int64).reshape(-1, 5)
+            places = np.searchsorted(when[:, 0], own[:, 0])
+            frames, stamps = when[places].T
+            found[name] = FrameCounts(*name, frames, stamps, own[:, 1:])
+        return found
 
 
 class RegionSums:
@@ -141,8 +145,7 @@ class RegionSums:
         found = {
             (t.variant, t.stage, name): own for t in tallies for name, own in t.regions.items()
         }
-        counts = np.array([(c.tp, c.tn, c.fp, c.fn) for c in found.values()], np.int64)
-        counts = counts.reshape(-1, 4)
+        counts = np.array([*found.values()], np.int64).reshape(-1, 4)
         rates = metrics.table(counts)
         known = ~np.isnan(rates)
         columns = counts.any(axis=1), counts, np.where(known, rates, 0.0), known
@@ -191,55 +194,44 @@ def _means(sums: Floats, defined: npt.NDArray[Any]) -> dict[str, float]:
 
 
 def _total(frames: int, counts: FourCounts, sums: Floats, defined: npt.NDArray[Any]) -> Total:
-    pooled = Counts(*counts.tolist())
     undefined = (frames - defined.astype(np.int64)).tolist()
     return {
         "frames": frames,
-        **dict(zip((*OUTCOMES, "N"), (*counts.tolist(), pooled.n), strict=True)),
+        **dict(zip((*OUTCOMES, "N"), (*counts.tolist(), counts.sum().item()), strict=True)),
         **_means(sums, defined),
-        **{f"pooled_{name}": value for name, value in metrics.of(pooled).items()},
+        **metrics.pooled(counts),
         "undefined": dict(zip(metrics.METRICS, undefined, strict=True)),
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Window:
-    """One stage of one variant over consecutive evaluated frames."""
-
-    number: int
-    """From 0."""
-    first_frame: int
-    last_frame: int
-    """Frame numbers of the window's ends, both inclusive."""
-    frames: int
-    """Evaluated frames that have this mask; the last window may hold fewer than the others."""
-    variant: str
-    stage: str
-    rates: dict[str, float]
-    """Mean of the frames' rates, an undefined one left out (the paper's average)."""
-    pooled: dict[str, float]
-    """The rates of the summed counts."""
-
-
-def cut(mask: FrameCounts, frame_numbers: Sequence[int], size: int) -> Iterator[Window]:
+def windows(masks: Sequence[FrameCounts], size: int) -> list[dict[str, Any]]:
     """Cut a drive into windows of ``size`` consecutive evaluated frames.
 
-    ``frame_numbers`` are those of all evaluated frames, in order.
+    Returned are the rows of ``windows.csv``, by window and then mask. Frames are evaluated where
+    any of the masks is; of windows with fewer than ``size`` the last is one. Rates are the means of
+    the frames', an undefined one left out (the paper's average), those of ``pooled_*`` are of the
+    summed counts.
     """
-    window_of, rates = mask.positions // size, mask.rates
-    for number in np.unique(window_of).tolist():
-        here = slice(*np.searchsorted(window_of, [number, number + 1]))
-        last = min((number + 1) * size, len(frame_numbers)) - 1
-        yield Window(
-            number=number,
-            first_frame=frame_numbers[number * size],
-            last_frame=frame_numbers[last],
-            frames=here.stop - here.start,
-            variant=mask.variant,
-            stage=mask.stage,
-            rates=means(rates[here]),
-            pooled=metrics.of(Counts(*mask.counts[here].sum(axis=0).tolist())),
-        )
+    numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *(mask.frames for mask in masks)]))
+    rows = []
+    for mask in masks:
+        window_of, rates = np.searchsorted(numbers, mask.frames) // size, mask.rates
+        for window in np.unique(window_of).tolist():
+            here = slice(*np.searchsorted(window_of, [window, window + 1]))
+            frames = numbers[window * size : (window + 1) * size].tolist()
+            rows.append(
+                {
+                    "window": window,
+                    "first_frame": frames[0],
+                    "last_frame": frames[-1],
+                    "frames": here.stop - here.start,
+                    "variant": mask.variant,
+                    "stage": mask.stage,
+                    **means(rates[here]),
+                    **metrics.pooled(mask.counts[here].sum(axis=0)),
+                }
+            )
+    return sorted(rows, key=itemgetter("window"))
 
 
 def episodes(stamps: Sums, errors: Floats, limit: float) -> dict[str, Any]:
@@ -279,19 +271,21 @@ TRIMAP: Final = (1, 2, 4, 8, 16, 32)
 """Widths around the truth's edge, in pixels, in which errors are counted."""
 
 
-@dataclass(slots=True)
-class _Sums:
+class _Sums(NamedTuple):
     """Of one variant."""
 
-    scores: Floats = field(default_factory=lambda: np.zeros(2))
-    frames: Sums = field(default_factory=lambda: np.zeros(2, np.int64))
-    """Boundary F and boundary IoU, and the frames that have each."""
-    trimap: Sums = field(default_factory=lambda: np.zeros((len(TRIMAP), 2), np.int64))
-    pairs: int = 0
-    labelled: int = 0
-    changed: int = 0
-    moved: int = 0
-    """Pairs of frames; the pixels that both label; where the mask, and where the truth changes."""
+    scores: Floats
+    frames: Sums
+    """``(2,)``: boundary F and boundary IoU, and the frames that have each."""
+    trimap: Sums
+    pairs: Sums
+    """``(4,)``: pairs of frames; the pixels that both label; where the mask, and where the truth
+    changes."""
+
+
+def _no_sums() -> _Sums:
+    shapes = (2,), (len(TRIMAP), 2), (4,)
+    return _Sums(np.zeros(2), *(np.zeros(shape, np.int64) for shape in shapes))
 
 
 class EdgesAndFlicker:
@@ -310,7 +304,7 @@ class EdgesAndFlicker:
 
     def __init__(self, width: int) -> None:
         self._width: Final = width
-        self._sums: Final[defaultdict[str, _Sums]] = defaultdict(_Sums)
+        self._sums: Final = defaultdict[str, _Sums](_no_sums)
         self._before: tuple[TruthBits, Mapping[str, Packed]] | None = None
 
     def add(self, result: FrameResult) -> None:
@@ -321,9 +315,9 @@ class EdgesAndFlicker:
             return
         for name, (*scores, counts) in result.contours.items():
             own = self._sums[name]
-            own.scores += [0.0 if math.isnan(each) else each for each in scores]
-            own.frames += ~np.isnan(scores)
-            own.trimap += counts
+            own.scores[:] += np.nan_to_num(scores)
+            own.frames[:] += ~np.isnan(scores)
+            own.trimap[:] += counts
         masks = {v.variant: mask for v in result.variants for _, mask in v.masks()}
         before, self._before = self._before, (now, masks)
         if before is None or before[0].shape != now.shape:
@@ -331,11 +325,8 @@ class EdgesAndFlicker:
         labelled = now.labelled & before[0].labelled
         count, moved = ones(labelled), ones((now.road ^ before[0].road) & labelled)
         for name in masks.keys() & before[1].keys():
-            own = self._sums[name]
-            own.pairs += 1
-            own.labelled += count
-            own.moved += moved
-            own.changed += ones((masks[name].bits ^ before[1][name].bits) & labelled)
+            changed = ones((masks[name].bits ^ before[1][name].bits) & labelled)
+            self._sums[name].pairs[:] += 1, count, changed, moved
 
     def interrupt(self) -> None:
         """Note that the next frame does not follow the one before."""
@@ -347,19 +338,23 @@ class EdgesAndFlicker:
         So too ``boundary_IoU``; ``trimap`` has the pixels of all frames. Undefined is None. The
         baseline, whose mask is always the same, has no flicker.
         """
-        return {
-            name: {
-                "boundary_F": float(own.scores[0] / own.frames[0]) if own.frames[0] else None,
-                "frames": int(own.frames[0]),
+        found = {}
+        for name, own in self._sums.items():
+            pairs, labelled, *moved = own.pairs.tolist()
+            scores, frames = own.scores.tolist(), own.frames.tolist()
+            f, iou = (s / n if n else None for s, n in zip(scores, frames, strict=True))
+            flicker, of_truth = (pixels / labelled if labelled else None for pixels in moved)
+            found[name] = {
+                "boundary_F": f,
+                "frames": frames[0],
                 "width": self._width,
-                "boundary_IoU": float(own.scores[1] / own.frames[1]) if own.frames[1] else None,
+                "boundary_IoU": iou,
                 "trimap": dict(zip(map(str, TRIMAP), own.trimap.tolist(), strict=True)),
-                "flicker": own.changed / own.labelled if own.labelled else None,
-                "truth_flicker": own.moved / own.labelled if own.labelled else None,
-                "pairs": own.pairs,
+                "flicker": flicker,
+                "truth_flicker": of_truth,
+                "pairs": pairs,
             }
-            for name, own in self._sums.items()
-        }
+        return found
 
 
 def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, float]:

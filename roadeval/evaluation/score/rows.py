@@ -18,12 +18,10 @@ from roadeval.data.arrays import Floats
 from roadeval.evaluation import metrics
 from roadeval.evaluation.regions import HALVES
 from roadeval.evaluation.score.counts import (
-    CameraMasks,
+    Camera,
     FourCounts,
     FrameCounts,
     Total,
-    Window,
-    cut,
     final_stages,
     means,
     sum_up,
@@ -52,14 +50,6 @@ def counts_of(rows: Rows) -> FourCounts:
     return np.stack([rows[name] for name in OUTCOMES], axis=1)
 
 
-def totals(rows: Rows) -> dict[str, dict[str, Total]]:
-    """Sum up the rows of ``frames`` by variant and stage, as in ``summary.json``."""
-    sums: dict[str, dict[str, Total]] = {}
-    for variant, stage, places in rows.masks():
-        sums.setdefault(variant, {})[stage] = sum_up(counts_of(rows.take(places)))
-    return sums
-
-
 def region_totals(regions: Rows) -> dict[tuple[str, str, str], Total]:
     """Sum up the rows of ``regions`` by variant, stage and region, frames that have it alone."""
     table, found = counts_of(regions), {}
@@ -76,26 +66,13 @@ def overlap(total: Mapping[str, Any]) -> dict[str, float]:
     return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
 
 
-def camera_masks(rows: Rows) -> CameraMasks:
+def camera_masks(rows: Rows) -> Camera:
     """Return the masks of the rows of ``frames`` of a camera, in the table's order."""
-    stamps = dict(zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True))
-    return CameraMasks(np.array([*stamps.values()], np.int64), [*mask_counts(rows)])
-
-
-def mask_counts(rows: Rows) -> Iterator[FrameCounts]:
-    """Yield the counts of each variant's stages, in the table's order."""
-    places = {number: place for place, number in enumerate(rows.distinct("frame"))}
-    for variant, stage, chosen in rows.masks():
-        own = rows.take(chosen)
-        positions = np.array([places[number] for number in own["frame"].tolist()], np.int64)
-        yield FrameCounts(variant, stage, positions, counts_of(own))
-
-
-def windows(rows: Rows, size: int) -> Iterator[Window]:
-    """Cut the drive into windows of ``size`` evaluated frames, one mask after the other."""
-    numbers = rows.distinct("frame")
-    for mask in mask_counts(rows):
-        yield from cut(mask, numbers, size)
+    return [
+        FrameCounts(variant, stage, own["frame"], own["stamp_ns"], counts_of(own))
+        for variant, stage, places in rows.masks()
+        for own in [rows.take(places)]
+    ]
 
 
 def merged(chains: Iterable[Iterable[str]]) -> list[str]:

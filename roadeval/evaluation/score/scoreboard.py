@@ -1,20 +1,19 @@
 """The scoreboard of a drive: frames are scored one by one, added in order and summed up.
 
 Its differences are every variant minus ``unfiltered`` and minus ``blind``, and what was tuned minus
-its method. The paper gives no
-number for figures 3a and 3b, and their curves are lost. What is left are claims that one mask is
-wrong less often than another; each window of ten frames bears one out or does not.
+its method. The paper gives no number for figures 3a and 3b, and their curves are lost. What is left
+are claims that one mask is wrong less often than another; each window of ten frames bears one out
+or does not.
 """
 
 from __future__ import annotations
 
-import heapq
 import math
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter
+from operator import add
 from typing import Any, Final
 
 import numpy as np
@@ -36,18 +35,17 @@ from roadeval.data import (
 from roadeval.evaluation.metres import Surveys
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
-    CameraMasks,
+    Camera,
     EdgesAndFlicker,
     FrameCounts,
     GrowingCounts,
     Name,
     RegionSums,
     Total,
-    Window,
-    cut,
     episodes,
     final_stages,
     sum_up,
+    windows,
 )
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.metres import Measured, MetreSums
@@ -77,38 +75,36 @@ class Effect:
     rates: Mapping[str, Difference]
 
 
-def drive_effects(cameras: Sequence[CameraMasks], settings: EvaluationSettings) -> list[Effect]:
+def within(cameras: Sequence[CameraRates], rate: str, settings: EvaluationSettings) -> Difference:
+    """Return the difference of a rate within a drive, given all rates of two masks by camera."""
+    place, better = [*METRICS].index(rate), METRICS[rate].higher_is_better
+    own = [CameraRates(e.stamps, e.rates[:, place], e.base[:, place]) for e in cameras]
+    return within_drive(own, settings, higher_is_better=better)
+
+
+def drive_effects(cameras: Sequence[Camera], settings: EvaluationSettings) -> list[Effect]:
     """Compute the differences of a drive: of final masks, and of the filter stage by stage."""
-    masks = [{(mask.variant, mask.stage): mask for mask in each.masks} for each in cameras]
+    masks = [{mask.name: mask for mask in each} for each in cameras]
     by_name = dict.fromkeys(name for own in masks for name in own)
     finals = final_stages(by_name)
     tuned = {name.removesuffix(TUNED): name for name in finals if name.endswith(TUNED)}
     found = []
     for base in (base for base in (*BASES, *tuned) if base in finals):
         family = []
-        for variant, last in finals.items():
+        for variant, stage in by_name:
             if variant in (base, BASELINE) or variant != tuned.get(base, variant):
                 continue
-            for stage in (stage for name, stage in by_name if name == variant):
-                final = stage == last
-                base_stage = finals[base] if final else stage
-                of_filter = (base, variant) == (UNFILTERED, FILTERED)
-                if final or (of_filter and (base, stage) in by_name):
-                    pairs = [
-                        (each.stamps, *own[variant, stage].paired(own[base, base_stage]))
-                        for each, own in zip(cameras, masks, strict=True)
-                        if {(variant, stage), (base, base_stage)} <= own.keys()
-                    ]
-                    rates = {
-                        rate: within_drive(
-                            [CameraRates(s[at], new[:, n], old[:, n]) for s, at, new, old in pairs],
-                            settings,
-                            higher_is_better=metric.higher_is_better,
-                        )
-                        for n, (rate, metric) in enumerate(METRICS.items())
-                        if rate in COMPARED
-                    }
-                    family.append(Effect(base, variant, stage, final, rates))
+            final = stage == finals[variant]
+            other = base, finals[base] if final else stage
+            of_filter = (base, variant) == (UNFILTERED, FILTERED)
+            if final or (of_filter and other in by_name):
+                pairs = [
+                    own[variant, stage].paired(own[other])
+                    for own in masks
+                    if {(variant, stage), other} <= own.keys()
+                ]
+                rates = {rate: within(pairs, rate, settings) for rate in COMPARED}
+                family.append(Effect(base, variant, stage, final, rates))
         found += corrected(family)
     return found
 
@@ -134,23 +130,24 @@ CLAIMS: Final[Mapping[str, tuple[str, Name, Name]]] = {
 Section 5 claims so of the filter, section 4.3 of the SVM, section 4.4 of the post-processing."""
 
 
-def evidence(windows: Iterable[Window], size: int) -> dict[str, dict[str, int]]:
+def evidence(windows: Iterable[Mapping[str, Any]], size: int) -> dict[str, dict[str, int]]:
     """Count the windows that bear out each claim whose masks the drive has; equal rates do not.
 
     By claim: how many full ``windows``, of ``size`` frames in both masks, have both rates, and in
-    how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames.
+    how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames. Given are
+    rows as of `roadeval.evaluation.score.windows`.
     """
-    masks: dict[Name, dict[int, Window]] = {}
-    for window in windows:
-        masks.setdefault((window.variant, window.stage), {})[window.number] = window
+    masks: defaultdict[Name, dict[int, Mapping[str, Any]]] = defaultdict(dict)
+    for row in windows:
+        masks[row["variant"], row["stage"]][row["window"]] = row
     found = {}
     for name, (rate, better, worse) in CLAIMS.items():
         if better in masks and worse in masks:
             counted = dict.fromkeys(("held", "windows", "short_held", "short"), 0)
             for number in masks[better].keys() & masks[worse].keys():
                 mine, other = masks[better][number], masks[worse][number]
-                full = min(mine.frames, other.frames) == size
-                difference = mine.rates[rate] - other.rates[rate]
+                full = min(mine["frames"], other["frames"]) == size
+                difference = mine[rate] - other[rate]
                 counted["windows" if full else "short"] += not math.isnan(difference)
                 counted["held" if full else "short_held"] += difference < 0
             found[name] = counted
@@ -184,8 +181,8 @@ class Scoreboard:
         self._surveys: Final = Surveys(ground, settings) if ground else None
         self._metres: Final = MetreSums()
         self._above: Final = Curves()
-        self._frames: Final[list[int]] = []
-        self._stamps: Final = array("q")
+        self._when: Final = array("q")
+        """Number and stamp of each evaluated frame."""
         self._roles: Final[Counter[str]] = Counter()
         self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
         self._counts: Final = GrowingCounts()
@@ -231,22 +228,21 @@ class Scoreboard:
             return doubts
         for name, health in result.health.items():
             self._health[name][health] += 1
-        position = len(self._frames)
-        self._counts.add(position, result.tallies)
+        number = result.frame.number
+        self._when.extend((number, result.frame.stamp_ns))
+        self._counts.add(number, result.tallies)
         for oracle, tallies in result.oracles.items():
-            self._oracles[oracle].add(position, tallies)
+            self._oracles[oracle].add(number, tallies)
         for seed, tallies in result.repeats.items():
-            self._repeats[seed].add(position, tallies)
+            self._repeats[seed].add(number, tallies)
         self._regions.add(result.tallies)
         for name, layer in result.errors.items():
             self.heat[name].add(layer.array.astype(np.uint8, copy=False))
         for step, change in result.changes.items():
-            self.changes[step] += change
+            self.changes[step] = Change(*map(add, self.changes[step], change))
         self.curves.add(result.histograms)
         self._metres.add(result.metres)
         self._above.add(result.above)
-        self._frames.append(result.frame.number)
-        self._stamps.append(result.frame.stamp_ns)
         return doubts
 
     def lose(self) -> None:
@@ -260,15 +256,7 @@ class Scoreboard:
 
     def totals(self) -> Totals:
         """Sum up by variant and stage: see `roadeval.evaluation.score.sum_up`."""
-        return _totals(self._masks())
-
-    def oracles(self) -> dict[str, dict[str, dict[str, Total]]]:
-        """Sum up by variant, stage replaced by the truth, and stage after it, as in `totals`."""
-        sums: dict[str, dict[str, dict[str, Total]]] = {}
-        for oracle, masks in self._oracles.items():
-            for variant, own in _totals([*masks.so_far().values()]).items():
-                sums.setdefault(variant, {})[oracle] = own
-        return sums
+        return totals(self.masks())
 
     def regions(self) -> dict[tuple[str, str, str], Total]:
         """Sum up by variant, stage and region, as in `totals`."""
@@ -278,10 +266,9 @@ class Scoreboard:
         """Yield the measures in metres; none where the camera is not known."""
         return self._metres.totals(self._above)
 
-    def windows(self) -> Iterator[Window]:
-        """Cut the drive into windows: by window, then variant and stage."""
-        rows = (cut(mask, self._frames, self._settings.window) for mask in self._masks())
-        return heapq.merge(*rows, key=attrgetter("number"))
+    def windows(self) -> list[dict[str, Any]]:
+        """Cut the drive into windows."""
+        return windows(self.masks(), self._settings.window)
 
     def effects(self) -> list[Effect]:
         """Return the paired differences of the drive."""
@@ -302,24 +289,21 @@ class Scoreboard:
         ``difference``, by stage the mean paired differences, filtered minus unfiltered. It is empty
         without a further seed; a mask that no training has to do with is not in it.
         """
-        further = [masks.so_far() for _, masks in sorted(self._repeats.items())]
+        further = [self._so_far(masks) for _, masks in sorted(self._repeats.items())]
         if not further:
             return {}
-        own = {(mask.variant, mask.stage): mask for mask in self._masks()}
-        trainings, names = [own, *further], [name for name in own if name in further[-1]]
-        totals: dict[str, dict[str, dict[str, list[float]]]] = {}
+        trainings = [{mask.name: mask for mask in each} for each in (self.masks(), *further)]
+        names = [name for name in trainings[0] if name in trainings[-1]]
+        sums: dict[str, dict[str, dict[str, list[float]]]] = {}
         difference: dict[str, dict[str, list[float]]] = {}
-        for name in names:
-            sums = [sum_up(training[name].counts) for training in trainings]
-            totals.setdefault(name[0], {})[name[1]] = {
-                rate: [each[rate] for each in sums]
-                for rate in (*METRICS, *(f"pooled_{rate}" for rate in METRICS))
-            }
         for variant, stage in names:
+            each = [sum_up(training[variant, stage].counts) for training in trainings]
+            rates = (*METRICS, *(f"pooled_{rate}" for rate in METRICS))
+            sums.setdefault(variant, {})[stage] = {r: [own[r] for own in each] for r in rates}
             if variant == FILTERED and (UNFILTERED, stage) in names:
-                each = [_mean_difference(training, stage) for training in trainings]
-                difference[stage] = {rate: [one[rate] for one in each] for rate in COMPARED}
-        return {"totals": totals, "difference": difference}
+                changes = [_mean_difference(training, stage) for training in trainings]
+                difference[stage] = {rate: [one[rate] for one in changes] for rate in COMPARED}
+        return {"totals": sums, "difference": difference}
 
     def summary(self) -> dict[str, Any]:
         """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
@@ -327,31 +311,35 @@ class Scoreboard:
         for (variant, stage), (total, runs) in self._seconds.items():
             seconds.setdefault(variant, {})[stage] = total / runs
         curves, beyond, masks = self.curves.totals(), self._edges.totals(), self.masks()
-        for mask in {each.variant: each for each in masks.masks}.values():  # the final ones
-            stamps, errors = masks.stamps[mask.positions], mask.rates[:, [*METRICS].index(TESTED)]
-            beyond[mask.variant]["episodes"] = episodes(stamps, errors, DEGRADED_ERR)
+        for mask in {each.variant: each for each in masks}.values():  # the final ones
+            errors = mask.rates[:, [*METRICS].index(TESTED)]
+            beyond[mask.variant]["episodes"] = episodes(mask.stamps, errors, DEGRADED_ERR)
+        oracles: dict[str, dict[str, Any]] = {}
+        for oracle, counts in self._oracles.items():
+            for variant, own in totals(self._so_far(counts)).items():
+                oracles.setdefault(variant, {})[oracle] = own
         return {
-            "totals": self.totals(),
+            "totals": totals(masks),
             "beyond": beyond,
             **({"curves": curves} if curves else {}),
-            "oracles": self.oracles(),
-            "windows": -(-len(self._frames) // self._settings.window),
+            "oracles": oracles,
+            "windows": -(-len(self._when) // (2 * self._settings.window)),
             "claims": evidence(self.windows(), self._settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
         }
 
-    def masks(self) -> CameraMasks:
-        """Return the counts of every mask, as the camera of a drive."""
-        return CameraMasks(np.array(self._stamps, np.int64), self._masks())
+    def masks(self) -> Camera:
+        """Return the counts of every mask, by variant in the tables' order, then as stages ran."""
+        return sorted(self._so_far(self._counts), key=lambda mask: self._order.index(mask.variant))
 
-    def _masks(self) -> list[FrameCounts]:
-        """Return the counts by variant in the tables' order, then by stage as they ran."""
-        masks = self._counts.so_far().values()
-        return sorted(masks, key=lambda mask: self._order.index(mask.variant))
+    def _so_far(self, counts: GrowingCounts) -> Camera:
+        when = np.array(self._when, np.int64).reshape(-1, 2)
+        return [*counts.so_far(when).values()]
 
 
-def _totals(masks: Sequence[FrameCounts]) -> Totals:
+def totals(masks: Camera) -> Totals:
+    """Sum up masks by variant and stage, as in ``summary.json``: see `sum_up`."""
     sums: Totals = {}
     for mask in masks:
         sums.setdefault(mask.variant, {})[mask.stage] = sum_up(mask.counts)
@@ -360,6 +348,7 @@ def _totals(masks: Sequence[FrameCounts]) -> Totals:
 
 def _mean_difference(training: Mapping[Name, FrameCounts], stage: str) -> dict[str, float]:
     """Return the mean difference of each rate, filtered minus unfiltered."""
-    _, new, base = training[FILTERED, stage].paired(training[UNFILTERED, stage])
-    known = {rate: own[~np.isnan(own)] for rate, own in zip(METRICS, (new - base).T, strict=True)}
+    pair = training[FILTERED, stage].paired(training[UNFILTERED, stage])
+    columns = zip(METRICS, (pair.rates - pair.base).T, strict=True)
+    known = {rate: own[~np.isnan(own)] for rate, own in columns}
     return {rate: float(own.mean()) if len(own) else math.nan for rate, own in known.items()}

@@ -35,7 +35,7 @@ from roadeval.report.pdf.typeset import pdf, write_file
 from roadeval.report.sections.frames import FrameBrowser, browser, strip
 from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
-from roadeval.results.rows import as_arrays, window_rows
+from roadeval.results.rows import window_table
 from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
@@ -273,7 +273,7 @@ def over_drive(compared: Compared) -> list[Chart]:
     rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
     size = compared.comparison.settings.window
     size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
-    windows = as_arrays("windows", window_rows(score.windows(rows, size)))
+    windows = window_table(score.camera_masks(rows), size)
     return over_windows(windows, [TESTED], _looks_of(masks) | looks([BASELINE]))
 
 

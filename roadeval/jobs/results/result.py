@@ -127,8 +127,8 @@ class DriveResult:
         if not self.complete:
             assert self.recording is not None
             layout, settings = self.recording.layout, EvaluationSettings()
-            effects = drive_effects([score.camera_masks(self.rows)], settings)
-            totals = score.totals(self.rows)
+            masks = score.camera_masks(self.rows)
+            effects, totals = drive_effects([masks], settings), score.totals(masks)
             return Facts(
                 verdict(totals, effects),
                 DriveFacts(

@@ -121,26 +121,27 @@ def _estimate(run: Run) -> EstimateFacts | None:
     picks = run.schedule.picks
     if picks is None:
         return None
-    masks = run.board.masks()
-    finals, every = final_stages((m.variant, m.stage) for m in masks.masks), picks.every_score()
-    places = np.array([picks.places.get(stamp, -1) for stamp in masks.stamps.tolist()], np.int64)
+    masks, every = run.board.masks(), picks.every_score()
+    finals = final_stages(mask.name for mask in masks)
     rates: dict[str, dict[str, Estimate]] = {}
     problem = _not_random(run, picks)
-    for mask in masks.masks:
+    for mask in masks:
         if problem or finals[mask.variant] != mask.stage:
             continue
         for number, rate in enumerate(METRICS):
             values = mask.rates[:, number]
             known = np.isfinite(values)
             if rate in SHORT and known.any():
-                scores = every[places[mask.positions[known]]]
+                stamps = mask.stamps[known].tolist()
+                scores = every[[picks.places.get(stamp, -1) for stamp in stamps]]
                 found = estimate(values[known], scores, every, run.config.evaluation.confidence)
                 rates.setdefault(mask.variant, {})[rate] = found
     apart: dict[str, dict[str, float | None]] = {
         str(frame): dict(own) for frame, own in run.board.apart.items()
     }
-    numbers = len(every), picks.drawn, len(masks.stamps)
-    return EstimateFacts(*numbers, picks.drawn / len(every), rates, apart, problem)
+    labels = len({frame for mask in masks for frame in mask.frames.tolist()})
+    chance = picks.drawn / len(every)
+    return EstimateFacts(len(every), picks.drawn, labels, chance, rates, apart, problem)
 
 
 def _not_random(run: Run, picks: Picks) -> str:
