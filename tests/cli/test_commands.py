@@ -26,13 +26,6 @@ def test_the_patch_trains_a_log_without_truth(bare, capsys):
     assert "guess" not in told.err
 
 
-def test_who_did_not_ask_for_the_patch_is_warned(bare, capsys):
-    assert main(["train", "bare.mcap", "-o", "m.model"]) == 0
-    assert (
-        "warning: no drive has road truth in the range: the model learnt" in capsys.readouterr().err
-    )
-
-
 def test_what_holds_for_one_drive_is_read_from_a_manifest(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ids.toml").write_text('[[drives]]\npath = "ids.mcap"\nlabels = { road = [3] }\n')
@@ -81,14 +74,3 @@ def test_images_and_masks_become_one_log(folder, capsys):
     assert "images without a mask: 2.jpg" in said.err
     main(["info", f"{folder}/d.mcap"])
     assert "truth: /truth/road" in capsys.readouterr().out
-
-
-def test_masks_in_colours_are_packed_with_a_word_on_what_replay_needs(folder, capsys):
-    for number in range(2):
-        colours = np.full((6, 8, 3), (128, 64, 128), np.uint8)
-        cv2.imwrite(str(folder / "masks" / f"{number}.png"), colours)
-    words = ["pack", f"{folder}/imgs", "--truth", f"{folder}/masks", "-o", f"{folder}/d.mcap"]
-    assert main(words) == 0
-    (line,) = (line for line in capsys.readouterr().err.splitlines() if "replay" in line)
-    assert "/truth/road holds the colours 128,64,128" in line
-    assert line.endswith("with --road-color")

@@ -40,8 +40,3 @@ def test_a_width_that_no_terminal_has_is_no_width(columns, capsys, monkeypatch):
     messages.warning("beware")
     console.results().print("a line of some words")
     assert capsys.readouterr() == ("a line of some words\n", "roadeval: warning: beware\n")
-
-
-def test_a_line_for_machines_is_escaped_too(capsys):
-    console.emit(f'["{HOSTILE}"]')
-    assert capsys.readouterr().out == '["\\u001b[2Ja\nb\\u202e"]\n'

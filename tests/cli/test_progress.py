@@ -68,13 +68,3 @@ def test_at_a_terminal_there_is_a_bar(monkeypatch):
     assert "replaying" in shown
     assert "60 of 100" in shown
     assert "frames/s" in shown
-
-
-def test_the_bar_has_no_end_before_the_first_frame(monkeypatch):
-    screen = Console(file=io.StringIO(), force_terminal=True, width=80)
-    monkeypatch.setattr(console, "diagnostics", lambda: screen)
-    with progress.watched() as watch:
-        watch(step(0, 100, "training"))
-    shown = screen.file.getvalue()
-    assert "training" in shown
-    assert "0 of 100" not in shown

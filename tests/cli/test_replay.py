@@ -146,13 +146,6 @@ def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
     assert capsys.readouterr().err == "roadeval: lost: frame 7: its JPEG ends early\n"
 
 
-def test_the_truth_s_colours_arrive(asked):
-    words = "replay d.mcap --road-color 64,32,32 --road-color 255,0,0 --ignore-color 1,2,3"
-    assert main(words.split()) == 0
-    assert asked["config"].labels.road_colors == ((64, 32, 32), (255, 0, 0))
-    assert asked["config"].labels.ignore_colors == ((1, 2, 3),)
-
-
 @pytest.mark.parametrize(
     "words",
     ["--road-color 1,2", "--road-color red", "--mask-topic net", "--mask-topic truth=/x"],
@@ -160,18 +153,3 @@ def test_the_truth_s_colours_arrive(asked):
 def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
     assert main(["replay", "drive.mcap", *words.split()]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("--masks masks/", "'masks/': write --masks NAME=masks/, as --masks mine=masks/"),
-        ("--masks =masks/", "'=masks/': write --masks NAME=masks/, as --masks mine=masks/"),
-        ("--net n.onnx", "'n.onnx': write --net NAME=n.onnx, as --net mine=n.onnx"),
-        ("--variant a.toml", "'a.toml': write --variant NAME=a.toml, as --variant mine=a.toml"),
-        ("--mask-topic mine=", "'mine=' has nothing after '='"),
-    ],
-)
-def test_a_path_without_a_name_is_shown_with_one(words, said, capsys):
-    assert main(["replay", "d.mcap", *words.split()]) == 2
-    assert capsys.readouterr().err == (f"roadeval: error: {said}; see 'roadeval replay --help'\n")

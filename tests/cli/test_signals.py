@@ -48,13 +48,6 @@ def test_a_later_signal_would_end_the_process_at_once():
     assert handlers == [signal.SIG_DFL, signal.SIG_DFL]
 
 
-def test_the_earlier_handlers_come_back():
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    with signals.raised():
-        assert signal.getsignal(signal.SIGTERM) != before[1]
-    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
-
-
 WHILE_IT_LOADS = """
 import os, signal, sys
 

@@ -40,18 +40,6 @@ def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
     assert shown.err.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--scale", "50%"), "--scale': must be a number, as 0.5;"),
-        (("--every", "2.5"), "--every': must be a whole number;"),
-    ],
-)
-def test_what_is_no_number_is_said_in_plain_words(words, said, capsys):
-    assert main(["replay", "a.mcap", *words]) == 2
-    assert said in capsys.readouterr().err
-
-
 def test_a_mistyped_command_is_guessed(capsys):
     assert main(["rplay"]) == 2
     assert "Did you mean 'replay'?" in capsys.readouterr().err

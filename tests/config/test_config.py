@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import ConfigError, RunConfig, configure, load_config
+from roadeval.config import ConfigError, RunConfig, configure, load_config, network_variant
 from roadeval.config.settings import SECTIONS
 from roadeval.data import RESERVED
 from roadeval.pipeline.stages import STAGES
@@ -101,12 +101,6 @@ def test_a_time_may_be_a_number_or_a_date(tmp_path, text, start):
     assert load_config(write(tmp_path, f"[frames]\nstart = {text}")).frames.start == start
 
 
-def test_a_file_that_is_no_text_is_one_line(tmp_path):
-    (tmp_path / "c.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigError, match="cannot be read"):
-        load_config(tmp_path / "c.toml")
-
-
 def test_the_two_variants_differ_by_the_filter_alone():
     filtered, unfiltered = RunConfig().variants()
     assert (filtered.name, unfiltered.name) == ("filtered", "unfiltered")
@@ -162,3 +156,16 @@ def test_names_that_are_no_plain_word_are_refused(name):
 
 def test_no_stage_is_called_like_a_table_of_the_run():
     assert not STAGES.keys() & {*SECTIONS, "chain", "preset", "variants"}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("size = [8, 8]\n", "file must name the network"),
+        ('file = "n.onnx"\nsise = [8, 8]\n', r"net\.sise: there is no such setting"),
+    ],
+)
+def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, said):
+    with pytest.raises(ConfigError, match=said) as caught:
+        network_variant("mine", str(write(tmp_path, text)))
+    assert str(tmp_path / "c.toml") in str(caught.value)

@@ -124,11 +124,6 @@ def test_every_setting_is_documented_with_its_range():
     assert max(map(len, lines)) <= 100
 
 
-def test_a_file_that_begins_with_a_mark_of_byte_order_is_read(tmp_path):
-    (tmp_path / "run.toml").write_text("[frames]\nevery = 2\n", encoding="utf-8-sig")
-    assert load_config(tmp_path / "run.toml").frames.every == 2
-
-
 @pytest.mark.parametrize("table", ["", "[variants.theirs]\n"])
 def test_a_file_that_the_user_has_not_named_loads_no_code(tmp_path, table):
     path = tmp_path / "run.toml"

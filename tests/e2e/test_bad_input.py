@@ -11,7 +11,6 @@ import pytest
 from roadeval.cli.app import main
 from roadeval.logs import LogWriter
 from tests.e2e.commands import here
-from tests.fixtures.make import make
 
 SECOND = 1_000_000_000
 
@@ -53,12 +52,6 @@ def refused(tmp_path, capsys):
     return refused
 
 
-def test_a_log_without_images(refused, tmp_path):
-    line = refused(make("real/talker_lz4.mcap", tmp_path))
-    assert "no image topic" in line
-    assert "/chatter" in line
-
-
 def test_two_cameras_to_choose_from(refused, write):
     line = refused(write("/left", "/right"))
     assert "/left, /right" in line
@@ -69,20 +62,6 @@ def test_truth_of_another_size(refused, write):
     line = refused(write("/camera", mask_size=(12, 8)))
     assert "/road_mask is 16x12, but /camera is 8x6" in line
     assert "--resize-truth" in line
-
-
-def test_an_output_that_cannot_be_written(refused, write, tmp_path):
-    (tmp_path / "taken").write_text("a file, and no folder")
-    drive = write("/camera", mask_size=(6, 4))
-    line = refused(drive, "--train-frames", 2, "--save", tmp_path / "taken" / "out.rrd")
-    assert "taken" in line
-
-
-def test_an_impossible_setting(refused, write, tmp_path):
-    (tmp_path / "mine.toml").write_text("[shadow]\nring_width = -1\n")
-    line = refused(write("/camera", mask_size=(6, 4)), "--config", tmp_path / "mine.toml")
-    assert "mine.toml" in line
-    assert "ring_width" in line
 
 
 def test_nothing_left_to_evaluate(refused, write):

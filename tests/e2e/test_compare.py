@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.e2e.commands import DEMO, Replayed, here, replay, roadeval
-from tests.report.making import text
 from tests.results.fleet.making import fleet_of
 
 LIMIT = ("--fail-if", "post.filtered.ERR > +0.5pp")
@@ -54,23 +53,6 @@ def test_a_worse_configuration_ends_with_4_and_the_sentence_that_says_why(demo, 
     assert "frames that out evaluated are left out" in run.stderr
 
 
-def test_the_files_are_written_by_their_endings(demo, worse, tmp_path):
-    names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
-    words = [word for name in names for word in ("-o", name)]
-    run = here("compare", demo.recording, worse.reports, *words, *LIMIT, "-q")
-    assert run.returncode == 4
-    assert run.stdout == ""
-    document, markdown, content = (name.read_bytes() for name in names)
-    final = next(
-        change
-        for change in json.loads(content)["changes"]
-        if (change["variant"], change["stage"]) == ("filtered", "post")
-    )
-    told = f"{100 * final['base']['ERR']:.2f} | {100 * final['new']['ERR']:.2f}"
-    assert told in markdown.decode()
-    assert told.replace(" | ", " ") in text(document)
-
-
 def test_ci_gets_a_case_a_condition_as_junit(demo, worse, tmp_path):
     kept = ("--fail-if", "svm.filtered.ERR > 99%")
     words = (*LIMIT, *kept, "--junit", tmp_path / "compare.xml", "-q")
@@ -105,19 +87,6 @@ def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tm
     assert title == "# roadeval: failed, 1 of 2 limits not judged"
     assert heading == "**Not judged**"
     assert why.partition(":")[0].replace(">", "\\>") in reason
-
-
-def test_the_variants_of_one_recording_are_compared_with_each_other(demo):
-    run = here("compare", demo.recording, "--json")
-    assert run.returncode == 0, run.stderr
-    content = json.loads(run.stdout)
-    assert [each["label"] for each in content["results"]] == ["unfiltered", "filtered"]
-    final = next(change for change in content["changes"] if change["final"])
-    difference = demo.summary["difference"]["post"]["ERR"]["mean"]
-    assert final["difference"]["ERR"]["mean"] == pytest.approx(difference)
-    # The same difference: the same fact but for what brings it about.
-    told = content["verdict"].replace("filtered instead of unfiltered", "the filter")
-    assert told.partition(" (")[0] in demo.summary["verdict"]
 
 
 @pytest.mark.parametrize(

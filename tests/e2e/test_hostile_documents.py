@@ -96,12 +96,6 @@ def fleet(tmp_path):
     return fleet_of(tmp_path / "week", 4, frames=0)
 
 
-def test_a_fleets_summary_that_holds_too_much_is_refused(fleet):
-    changed(fleet / "fleet.json", verdict="x" * 1_000_000)
-    for command in ("report", "inspect"):
-        assert "a text of 1,000,000 letters" in refused(command, fleet)
-
-
 @pytest.mark.parametrize(
     ("column", "value", "rows", "reason"),
     [

@@ -7,7 +7,6 @@ import shutil
 import pandas as pd
 import pytest
 
-from roadeval.results.fleet import FleetFolder
 from tests.e2e.commands import here
 from tests.fixtures.browser import missing, violations, wait_until
 from tests.results.fleet.making import fleet_of
@@ -57,20 +56,6 @@ def test_a_page_is_one_file_of_at_most_10_mb_and_asks_for_nothing(drive, watched
     assert seen.elsewhere == []
     assert [url for url in seen.requests if url.startswith("file:")] == [drive.as_uri()]
     assert seen.complaints == []
-
-
-def test_its_numbers_are_those_of_the_summary(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    table = tab.locator("#summary table").first
-    titles = [each.inner_text().strip() for each in table.locator("thead th").all()]
-    for row in table.locator("tbody tr").all():
-        cells = [each.inner_text().strip() for each in row.locator("th, td").all()]
-        told = dict(zip(titles, cells, strict=True))
-        total = demo.summary["totals"][told["final mask"]]["post"]
-        for rate in ("ERR", "FPR", "FNR", "ACC"):
-            assert told[rate] == f"{100 * total[rate]:.2f}"
-        assert told["pooled ERR"] == f"{100 * total['pooled_ERR']:.2f}"
-    assert tab.locator(".verdict").inner_text() == demo.summary["verdict"]
 
 
 def test_every_evaluated_frame_is_in_the_table_with_its_rates(drive, demo, watched):
@@ -195,14 +180,6 @@ def test_a_page_opens_on_six_screens_at_most(drive, fleet, watched):
     assert len(ticks) > 4
 
 
-def test_contents_are_open_beside_the_page_and_closed_above_it(drive, watched):
-    for width, there in ((1440, True), (390, False)):
-        tab = watched(drive.as_uri(), width=width).tab
-        assert tab.locator(".outline a").first.is_visible() == there
-    tab.set_viewport_size({"width": 1440, "height": 900})
-    tab.locator(".outline a").first.wait_for(state="visible")
-
-
 def test_a_slider_lies_between_two_variants(drive, watched):
     tab = watched(drive.as_uri()).tab
     assert tab.locator("select.left").input_value() == "filtered: errors"
@@ -302,17 +279,6 @@ def test_two_variants_are_chosen_for_the_whole_page(drive, watched):
     assert shown(tab, "#summary tbody th") == ["filtered", "unfiltered", "blind"]
 
 
-def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
-    section = tab.locator("#what-the-filter-and-the-variants-change")
-    assert section.locator(".area .level").count() == section.locator(".area .band").count() == 1
-    section.locator(".area").hover()
-    mean = demo.summary["difference"]["post"]["ERR"]
-    ends = " to ".join(f"{100 * mean[end]:+.2f}" for end in ("low", "high"))
-    told = f"mean and its interval\n{100 * mean['mean']:+.2f} pp ({ends})".replace("-", "\u2212")
-    assert told in tab.locator(".tip:visible").inner_text()
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (390, "dark")])
 def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
     drive, fleet, scheme, width, watched
@@ -379,25 +345,6 @@ def test_of_500_drives_something_is_seen_within_a_second(many, watched):
         paints.append(tab.evaluate(f"() => {PAINT}.startTime"))
     # The best of three: other work of the machine is not the page's.
     assert min(paints) < 1000
-
-
-def test_of_many_drives_the_worst_have_a_row_each_with_its_interval(many, watched):
-    seen = watched(many.as_uri())
-    row = seen.tab.locator("#drive-by-drive .row").nth(1)
-    effects = FleetFolder(many.parent / "year").table("effects").to_pylist()
-    changes = {
-        row["drive"]: row
-        for row in effects
-        if (row["base"], row["metric"], row["final"]) == ("unfiltered", "ERR", True)
-        and row["mean"] is not None
-    }
-    second = sorted(changes.values(), key=lambda row: (-row["mean"], row["drive"]))[1]
-    assert row.locator(".name").inner_text().startswith(second["drive"].rpartition("-")[0])
-    mean, low, high = (f"{100 * second[end]:.2f}" for end in ("mean", "low", "high"))
-    told = row.locator("circle").get_attribute("data-told")
-    assert told == f"worse: {mean} pp ({low} to {high})"
-    assert seen.complaints == []
-    assert violations(seen.tab) == []
 
 
 def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):

@@ -142,18 +142,6 @@ def test_proposals_as_they_are_count_as_no_labels(work, truths):
     assert "2 labels are as they were proposed" in done.stderr
 
 
-def test_outlines_as_they_were_proposed_count_as_no_labels(work, truths):
-    done = here("pick", "out.rrd", "-n", 10, "-o", "outlines", "--format", "labelme", cwd=work)
-    assert done.returncode == 0, done.stderr
-    for each in (work / "outlines" / "proposals").iterdir():
-        shutil.copy(each, work / "outlines" / "labels")
-    words = ("--truth", "outlines", "--road-label", "road", *HIDDEN)
-    done = here("replay", "street.mcap", "--reports", "o", "--record", "none", *words, cwd=work)
-    assert done.returncode == 0, done.stderr
-    assert "10 labels are as they were proposed" in done.stderr
-    assert json.loads((work / "o" / "summary.json").read_text())["totals"] == {}
-
-
 def test_a_label_of_a_frame_that_was_not_picked_is_in_no_number(work, truths, labelled):
     folder = work / "to_label"
     label(folder, truths)

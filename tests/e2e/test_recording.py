@@ -53,12 +53,6 @@ def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, tmp_
         assert float(row["ERR"]) == (found[2] + found[3]) / truth.count()
 
 
-def test_the_recording_carries_the_same_records_as_the_files(car_park):
-    recording = Recording(car_park.recording)
-    assert len(recording.frames) == len(car_park.table("frames"))
-    assert len(recording.windows) == len(car_park.table("windows"))
-
-
 @pytest.mark.parametrize("drive", ["demo", "unlabelled"])
 def test_rerun_finds_no_fault_with_the_file(drive, request):
     code, said = rerun("verify", request.getfixturevalue(drive).recording)

@@ -1,7 +1,6 @@
 """``roadeval report``: one PDF that says what the tables say, from the recording alone."""
 
 import io
-import json
 import re
 import shutil
 import signal
@@ -43,46 +42,6 @@ def test_a_drive_has_eight_pages_at_most_and_no_frame_twice(made):
     assert len(set(frames)) == len(frames) > 2
     (figure,) = (page for page in pages if "The paper's figure 2: input" in page)
     assert figure.count("truth") >= 4
-
-
-def test_the_log_is_named_by_its_hash_with_the_command_that_makes_the_results_again(words, demo):
-    log = demo.summary["log"]
-    assert log["digest"] in words
-    assert f"roadeval replay {log['path']} --config drive.rrd" in words
-
-
-@pytest.fixture(scope="module")
-def of_folder(demo, tmp_path_factory):
-    """The report of a copy of the demo's results folder, and the folder."""
-    folder = tmp_path_factory.mktemp("of_folder") / "results"
-    shutil.copytree(demo.reports, folder)
-    run = here("report", folder)
-    assert run.returncode == 0, run.stderr
-    return text((folder / "report.pdf").read_bytes()), folder
-
-
-def test_a_results_folder_gives_the_same_numbers_without_pictures(of_folder, words):
-    told, _ = of_folder
-    assert "Made without pictures" in told
-    table = re.search(r"final mask ERR .*? precision (.*?) \d+ of \d+ frames were evaluated", told)
-    assert table
-    assert table[1] in words
-
-
-def test_a_results_folder_names_the_command_where_its_recording_is_there(demo, of_folder, tmp_path):
-    told, folder = of_folder
-    worst = json.loads(here("inspect", demo.recording, "--list", "--json").stdout)
-    assert re.sub(r"\s", "", f"{demo.recording} --frame {worst[0]['frame']}") in told.replace(
-        " ", ""
-    )
-    moved = json.loads((folder / "summary.json").read_text())
-    moved["run"]["output"]["save"] = str(tmp_path / "gone.rrd")
-    shutil.copytree(folder, tmp_path / "moved")
-    (tmp_path / "moved" / "summary.json").write_text(json.dumps(moved))
-    assert here("report", tmp_path / "moved").returncode == 0
-    told = text((tmp_path / "moved" / "report.pdf").read_bytes())
-    assert "the recording of this run is not where it was written" in told
-    assert "--frame" not in told
 
 
 KILLED = """
@@ -138,21 +97,6 @@ def test_a_killed_run_of_sparse_truth_shows_no_scored_frame_whose_truth_is_missi
     for frame in seen & scored:
         opened.recording.truth(frame)
         opened.recording.layer("unfiltered", "errors", frame)
-
-
-@pytest.mark.parametrize("of", ["recording", "reports"])
-def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, tmp_path):
-    run = here("report", getattr(ignored, of), "-o", tmp_path / "report.pdf")
-    assert run.returncode == 0, run.stderr
-    words = text((tmp_path / "report.pdf").read_bytes())
-    for said in (
-        "Nothing to compare: ERR is undefined on every frame.",
-        "frames, undefined and left out: ACC on ",
-        "ERR is undefined on every frame, so what the filter does to it is unknown.",
-        "ERR of filtered is undefined on every frame, so no frame is the worst.",
-    ):
-        assert said in words
-    assert "undefined on some of" not in words
 
 
 def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetched(

@@ -129,15 +129,6 @@ def test_a_comparison_of_the_variants_has_the_numbers_of_the_replay(rig: Path):
         assert getattr(change.difference["ERR"], end) == pytest.approx(wanted[end], abs=1e-12)
 
 
-def test_the_first_screen_lists_the_cameras(rig: Path):
-    shown = (rig / "screen.txt").read_text()
-    assert "rig: 3 cameras, 46 of 76 frames were evaluated" in shown
-    listed = [
-        line.split()[0] for line in shown.splitlines() if line[:5] in ("front", "copy ", "rear ")
-    ]
-    assert listed
-
-
 def test_reports_show_all_cameras_and_each(rig: Path):
     (folder := rig / "made").mkdir()
     for name in ("all.pdf", "all.html"):

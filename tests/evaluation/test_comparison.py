@@ -227,13 +227,6 @@ def test_half_of_the_drives_must_be_in_common_for_a_condition_on_a_change():
     assert judge(found, [Condition.parse("post.filtered.ERR > 5%")], SETTINGS)[0].drives == 9
 
 
-def test_certainty_over_five_drives_is_not_judged_and_the_reason_is_told():
-    found = compare([a_fleet("a", noisy(5)), a_fleet("b", noisy(5, 14))], SETTINGS)
-    with pytest.raises(ConditionError, match=r"5 drives are too few for an interval \(6 are"):
-        judge(found, [Condition.parse("post.filtered.ERR > 1pp surely")], SETTINGS)
-    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
-
-
 # --- Conditions -----------------------------------------------------------------------------------
 
 

@@ -28,11 +28,6 @@ def count(masks, truth, regions):
 MASK = pixels("#.#.", "####")
 
 
-def test_masks_keep_their_order() -> None:
-    (none, _), (all_, _) = count([np.zeros_like(TRUTH), np.ones_like(TRUTH)], TRUTH, {})
-    assert (none, all_) == (Counts(tn=3, fn=4), Counts(tp=4, fp=3))
-
-
 @pytest.mark.parametrize("odd", [pixels("##", "##", "##", "##"), pixels("####")])
 def test_another_shape_is_refused_even_with_as_many_pixels(odd: np.ndarray) -> None:
     with pytest.raises(ValueError, match="shape"):

@@ -90,12 +90,6 @@ def test_an_edge_that_is_shifted_is_as_far_off_as_it_was_shifted(shift: float):
         assert difference(found, RIGHT, at) == pytest.approx(-shift, abs=across)
 
 
-def test_an_edge_outside_the_picture_is_none():
-    found = measured(road(3, 3), road(3, 3))
-    assert np.isnan(difference(found, LEFT, 5))
-    assert difference(found, LEFT, 10) == 0
-
-
 def test_an_edge_beside_what_the_truth_does_not_know_is_none():
     truth = road(3, 3)
     truth[(LEFTWARDS > 3) & (AHEAD < 80)] = 255

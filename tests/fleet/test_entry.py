@@ -59,16 +59,6 @@ def test_groups_that_hold_copies_of_one_log_are_one(tmp_path):
     assert [*groups_of(entries).values()] == [*["monday"] * 4, "friday"]
 
 
-def test_folders_of_the_same_files_are_copies(tmp_path):
-    entries = []
-    for name in ("x", "y"):
-        (tmp_path / name).mkdir()
-        drive(tmp_path / name, "0.mcap", b"one")
-        drive(tmp_path / name, "1.mcap", b"two")
-        entries.append(entry_of(str(tmp_path / name)))
-    assert len(set(groups_of(entries).values())) == 1
-
-
 def test_what_cannot_be_read_and_what_lies_elsewhere_stands_alone(tmp_path):
     entries = [
         entry_of(str(tmp_path / "missing.mcap")),

@@ -1,12 +1,10 @@
 """Logs behind URLs, of which only parts are read."""
 
-from pathlib import Path
-
 import pytest
 
 import roadeval
 from roadeval.fleet import FleetError, readable, remote
-from roadeval.logs import LogError, describe, open_log
+from roadeval.logs import describe, open_log
 from tests.fleet.serving import Server
 from tests.jobs.making import settings, write_log
 from tests.logs.test_digest import FRAMES, flipped, write
@@ -64,15 +62,3 @@ def test_a_log_that_changes_while_it_is_read_is_named(server, tmp_path, monkeypa
         flipped(path, path.stat().st_size // 2, path)
         with pytest.raises(FleetError, match=r"noise\.mcap: it changed while it was read"):
             log.verify()
-
-
-def test_what_is_no_log_behind_a_url_is_named(server, tmp_path):
-    Path(tmp_path / "page.mcap").write_bytes(b"\x1f\x8b" + bytes(99))
-    with pytest.raises(LogError, match="not an MCAP file but compressed as a whole by gzip"):
-        open_log(readable(server.url("page.mcap")))
-
-
-def test_a_wrong_scheme_is_named(tmp_path):
-    with pytest.raises(FleetError, match=r"^ftp://host/a\.mcap: no scheme that is known; choose"):
-        readable("ftp://host/a.mcap")
-    assert readable(tmp_path / "a.mcap") == tmp_path / "a.mcap"

@@ -56,10 +56,6 @@ def refused(url: str) -> str:
     return message
 
 
-def test_a_path_is_itself(tmp_path):
-    assert readable(str(tmp_path / "a b.mcap")) == tmp_path / "a b.mcap"
-
-
 def test_what_is_behind_a_url_is_read(server):
     url = server.url("whole/Monday%20rain.mcap")
     assert fetched(url) == CONTENT
@@ -129,12 +125,6 @@ def test_a_part_that_breaks_off_goes_on_where_it_broke(server):
 )
 def test_a_host_that_cannot_be_reached_is_told(server, host, message):
     assert refused(f"http://me:geheim@{host}/a") == f"http://{host}/a: {message}"
-
-
-def test_a_stamp_of_a_url_asks_for_its_head_alone(server):
-    size, tag = stamp(server.url("whole/a.mcap"))
-    assert (size, len(tag)) == (len(CONTENT), 34)
-    assert [method for method, _, _ in server.asked] == ["HEAD"]
 
 
 def test_a_stamp_is_found_where_only_reading_is_allowed(server):

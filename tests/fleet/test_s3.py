@@ -70,13 +70,6 @@ def test_a_stamp_tells_whether_an_object_has_changed(filled, s3):
     assert stamp("s3://bucket/top.mcap")[1] != before[1]
 
 
-def test_a_bucket_that_denies_access_is_an_error(filled, monkeypatch):
-    monkeypatch.setenv("AWS_SKIP_SIGNATURE", "true")
-    url = "s3://bucket/top.mcap"
-    with pytest.raises(RoadevalError, match="the server denies access"):
-        readable(url)
-
-
 def test_a_log_in_a_bucket_is_read_by_its_parts(filled, tmp_path):
     (tmp_path / "top.mcap").write_bytes(LOG)
     with (

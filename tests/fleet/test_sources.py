@@ -49,16 +49,6 @@ def test_a_file_of_any_name_is_a_drive(folder):
     assert found("b.log", "no_suffix", folder / "a.mcap") == ["b.log", "no_suffix", "a.mcap"]
 
 
-def test_an_entry_has_an_absolute_path_a_name_and_an_identity(folder):
-    put("Monday, rain.mcap")
-    (entry,) = find_drives(["Monday, rain.mcap"])
-    assert entry.path == folder / "Monday, rain.mcap"
-    assert entry.source == str(entry.path)
-    assert (entry.name, entry.known) == ("Monday, rain", (None, {}, {}))
-    assert entry.id.startswith("Monday_rain-")
-    assert len(entry.id) == len("Monday_rain-") + 12
-
-
 @pytest.mark.parametrize("name", ["\u202e!?", "-rf", "..", "x" * 200, "a\nb", "ü", "\udcff"])
 def test_an_identity_is_plain_and_short_whatever_the_name(folder, name):
     put(f"{name}.mcap")
@@ -89,12 +79,6 @@ def test_a_split_bag_is_one_drive_in_a_search_and_by_itself(folder):
     assert [entry.name for entry in find_drives(["d/run"])] == ["run"]
 
 
-def test_a_bag_that_cannot_be_read_is_still_a_drive(folder):
-    put("d/run/metadata.yaml", content=b"rosbag2_bagfile_information:\n  version: 9\n")
-    put("d/run/run_0.db3", "d/a.mcap")
-    assert found("d") == ["d/a.mcap", "d/run"]
-
-
 @pytest.mark.parametrize(
     "words", [["d/run/*.mcap"], ["d/**/*.mcap"], ["d/run", "d/run/bag_1.mcap"]]
 )
@@ -118,11 +102,6 @@ def test_a_glob_matches_files_and_folders(folder):
     assert found("d/2/*") == ["d/2/b.mcap", "d/2/c/d.mcap"]
     assert found("d/2/*.log") == ["d/2/x.log"]
     assert found("e[1].mcap") == ["e[1].mcap"]
-
-
-def test_a_drive_that_is_named_twice_counts_once_at_its_first_place(folder):
-    put("a.mcap", "b.mcap")
-    assert found("b.mcap", ".", "../drives/b.mcap") == ["b.mcap", "a.mcap"]
 
 
 def test_a_manifest_says_more_of_a_drive_that_is_named_beside_it(folder):

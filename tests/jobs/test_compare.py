@@ -10,13 +10,12 @@ import pytest
 
 from roadeval import compare, replay, replay_fleet
 from roadeval.errors import RoadevalError
-from roadeval.jobs.results.result import asked, contents
+from roadeval.jobs.results.result import asked
 from roadeval.pipeline import stages
 from roadeval.results.fleet import FleetFolder, frames_path
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import settings, write_log
 from tests.results.fleet.making import fleet_of
-from tests.results.making import facts_of
 
 
 @pytest.fixture(scope="module")
@@ -42,18 +41,6 @@ def test_the_drives_that_are_worse_are_found_and_no_others(compared):
     assert compared.sides == ()
 
 
-def test_the_variants_of_one_fleet_are_compared_over_its_drives(fleets):
-    found = compare(fleets[0], fail_if=["post.filtered.ERR > +50pp"]).comparison
-    (final,) = (change for change in found.changes if change.final)
-    assert (final.variant, final.drives, final.difference["ERR"].unit) == ("filtered", 8, "drives")
-    effects = FleetFolder(fleets[0]).facts.effects
-    told = next(e.rates["ERR"] for e in effects if e.base == "unfiltered")
-    own = final.difference["ERR"]
-    assert (own.mean, own.low, own.high, own.p) == pytest.approx(
-        (told.mean, told.low, told.high, told.p)
-    )
-
-
 def test_drives_that_have_moved_are_known_by_their_logs(fleets, tmp_path):
     base, new = fleets
     moved = shutil.copytree(new, tmp_path / "moved")
@@ -75,25 +62,6 @@ def _rename_drives(path):
     names = [name.replace("-0", "-f") for name in table["drive"].to_pylist()]
     place = table.column_names.index("drive")
     parquet.write_table(table.set_column(place, "drive", pa.array(names)), path)
-
-
-def test_code_networks_masks_and_truth_that_are_others_are_named():
-    def facts(digest):
-        return facts_of(
-            methods={
-                "grey": {"road": {"stage": "greyroad:road", "sha256": digest}},
-                "odd": {"road": "text"},
-            },
-            settings={"net1": {"chain": ["net", "post"], "net": {"sha256": digest}}},
-            masks={"truth": {"sha256": digest}, "mine": {"sha256": digest}},
-        )
-
-    assert contents(facts("0123456789")) == {
-        "truth": "01234567",
-        "code of grey (greyroad:road)": "01234567",
-        "network net1": "01234567",
-        "masks mine": "01234567",
-    }
 
 
 def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):

@@ -1,6 +1,5 @@
 """A fleet that goes on in its folder: the result is that of one go, whatever has changed."""
 
-import errno
 import os
 import shutil
 from pathlib import Path
@@ -11,7 +10,7 @@ import pytest
 import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.run import prepared
-from tests.e2e.test_fleet import Here, ThreadTasks, run, tables, write
+from tests.e2e.test_fleet import Here, run, tables, write
 
 
 @pytest.fixture(scope="module")
@@ -164,15 +163,3 @@ def test_a_nearly_full_disk_ends_the_run_and_the_same_command_goes_on(logs, tmp_
     run(logs, tmp_path / "g", keep="all")
     assert files(tmp_path / "f") == files(tmp_path / "g")
     assert tables(tmp_path / "f") == tables(tmp_path / "g")
-
-
-def test_no_room_for_a_folds_model_ends_the_run(logs, tmp_path, monkeypatch):
-    def fail(*_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with monkeypatch.context() as full:
-        full.setattr("roadeval.training.model.put", fail)
-        with pytest.raises(RoadevalError, match="cannot be written: No space left on device; what"):
-            run(logs, tmp_path / "f", executor=ThreadTasks(), folds=2)
-    again, _ = run(logs, tmp_path / "f", executor=ThreadTasks(), folds=2)
-    assert again.counts == {"scored": 2}

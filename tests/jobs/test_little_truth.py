@@ -139,14 +139,6 @@ def test_a_stride_that_misses_every_label_says_so(places, tmp_path):
     assert every.summary["frames"]["evaluated"] == 3
 
 
-def test_an_unknown_variant_is_wrong_usage(places):
-    run = here("replay", places / "drive.mcap", "--only", "nett", cwd=places)
-    assert run.returncode == 2
-    assert len(run.stderr.splitlines()) == 1
-    assert "nett" in run.stderr
-    assert "filtered" in run.stderr
-
-
 def test_the_summary_says_where_truth_lies(places, tmp_path):
     def stated(folder, name):
         return replay(folder, tmp_path / name, "6", ("net",)).summary["masks"]["truth"]
@@ -218,12 +210,3 @@ def test_train_and_info_take_truth_beside_the_log(places, tmp_path):
     picks = json.loads(run.stdout)["picks"]
     assert f"truth: {places / '21'} (21 labels, paired by number; " in picks[1]
     assert "no truth" not in " ".join(picks)
-
-
-def test_a_report_shows_frames_without_a_label_among_the_others(places, tmp_path):
-    saved = {"output": {"record": "all", "save": str(tmp_path / "out.rrd")}}
-    done = replay(places, tmp_path / "reports", "6", ("net",), **saved)
-    evaluated = {*pd.read_csv(tmp_path / "reports" / "frames.csv").frame}
-    assert not {*done.facts.examples} <= evaluated
-    roadeval.write_report(tmp_path / "out.rrd", tmp_path / "report.pdf")
-    assert (tmp_path / "report.pdf").stat().st_size > 10_000

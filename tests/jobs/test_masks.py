@@ -11,7 +11,6 @@ import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.run.prepared import identity
 from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
-from tests.e2e.commands import here
 from tests.jobs.making import FRAMES, settings, write_log
 
 IN_LOG = "/net/road_mask_prediction"
@@ -110,21 +109,6 @@ def test_a_frame_without_a_mask_is_left_out_of_its_variant_and_told(outcome):
     assert "13 of the 26 frames read have no mask" in told
 
 
-def test_masks_of_training_frames_alone_give_no_score(places, tmp_path):
-    (tmp_path / "few").mkdir()
-    for number in range(3):
-        name = f"frame_{number:04d}.png"
-        (tmp_path / "few" / name).write_bytes((places / "number" / name).read_bytes())
-    config = settings(record="none").override({"masks": {"few": {"path": str(tmp_path / "few")}}})
-    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
-    assert "few" not in done.summary["totals"]
-    assert "few: 23 of the 26 frames read have no mask of it: it has no score" in done.warnings
-
-
-def test_a_report_shows_frames_without_a_mask(outcome, tmp_path):
-    assert roadeval.write_report(outcome.recording, tmp_path / "out.pdf").stat().st_size
-
-
 def test_curves_are_counted_on_the_evaluated_frames(outcome, places):
     recording = roadeval.Recording(outcome.recording)
     truths, levels = [], []
@@ -213,24 +197,6 @@ def test_a_broken_mask_costs_its_frame_and_is_named(places, tmp_path):
     done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
     (loss,) = done.losses
     assert loss.startswith(f"frame 15: {tmp_path}/frame_0015.png: ")
-
-
-def test_the_command_takes_them_and_says_what_is_wrong_with_a_file(places, tmp_path):
-    (tmp_path / "own.toml").write_text(f'path = "{places}/confidence"\nthreshold = 0.5\n')
-    (tmp_path / "bad.toml").write_text(f'path = "{places}/confidence"\nthreshold = 5\n')
-    words = ("replay", places / "drive.mcap", "-q", "--record", "none", "--reports", tmp_path / "r")
-    assert (
-        here(
-            *words, "--masks", f"a={places}/number", "--masks", f"b={tmp_path}/own.toml"
-        ).returncode
-        == 0
-    )
-    bad = here(*words, "--masks", f"b={tmp_path}/bad.toml")
-    assert bad.returncode == 1
-    assert "bad.toml: masks.b.threshold: must be at most 1" in bad.stderr
-    twice = here(*words, "--masks", f"a={places}/number", "--masks", f"a={places}/npy")
-    assert twice.returncode == 2
-    assert "the name is taken" in twice.stderr
 
 
 def test_masks_of_other_content_make_another_recording_wherever_they_lie(places):

@@ -82,11 +82,6 @@ def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
     assert "in always_fails" in str(caught.value.__cause__)
 
 
-def test_one_that_cannot_learn_is_named(drive, tmp_path):
-    with pytest.raises(roadeval.RoadevalError, match="stage unfit cannot learn: ValueError"):
-        run(drive, tmp_path, variants={"mine": somebodys("UNFIT")})
-
-
 def test_what_it_learns_stands_in_a_model_file(drive, tmp_path):
     path, variants = tmp_path / "m.model", {"mine": somebodys("LEARNS")}
     config = settings(variants=variants, train_frames=4)

@@ -40,13 +40,6 @@ def once(drive, tmp_path_factory):
     return folder, run(drive, folder, jobs=2)
 
 
-def test_training_and_unlabelled_frames_are_in_no_table(once):
-    folder, _ = once
-    assert sorted(set(frames_of(folder).frame)) == [*range(10, 20), *range(21, 26)]
-    regions = pd.read_csv(folder / "reports" / "regions.csv")
-    assert set(regions.frame) == set(frames_of(folder).frame)
-
-
 def test_training_frames_of_the_drive_itself_are_left_out_and_warned_of(drive, tmp_path):
     model = roadeval.train([drive], tmp_path / "m.model", settings(train_frames=5))
     outcome = run(drive, tmp_path, model=tmp_path / "m.model")
@@ -54,13 +47,6 @@ def test_training_frames_of_the_drive_itself_are_left_out_and_warned_of(drive, t
     assert outcome.summary["frames"]["evaluated"] == 20
     warned = "5 of the model's 5 training frames lie in this drive; their"
     assert any(warned in text for text in outcome.summary["warnings"])
-
-
-def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
-    other = write_log(tmp_path / "other.mcap")
-    monkeypatch.setattr("roadeval.training.learning.GREATEST_MEMORY", 15 * 10_000)
-    with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
-        roadeval.train([drive, other], tmp_path / "m.model")
 
 
 def test_folders_are_made_and_a_run_that_is_refused_leaves_nothing(drive, tmp_path):
@@ -179,29 +165,6 @@ def test_where_figures_cannot_be_written_the_earlier_outputs_stay_all_three(
     assert roadeval.Recording(left).complete
     left.unlink()
     assert contents(folder) == before | {"out.mcap": b"an earlier log"}
-
-
-def test_a_recording_whose_name_is_taken_away_at_the_end_is_told_where_it_is(
-    drive, tmp_path, monkeypatch
-):
-    def take(*given):
-        (tmp_path / "out.rrd").mkdir()
-        return []
-
-    monkeypatch.setattr(drawn, "write_figures", take)
-    with pytest.raises(RoadevalError, match=r"out\.rrd: cannot be written: Is a") as caught:
-        run(drive, tmp_path, max_frames=12)
-    (left,) = tmp_path.glob("out.*.partial.rrd")
-    assert caught.value.__notes__ == [f"the partial recording is {left}"]
-    assert ResultsFolder(tmp_path / "reports").facts.frames.evaluated == 2
-
-
-def test_a_run_that_ends_removes_an_earlier_one_s_partial_recording(drive, tmp_path):
-    left = tmp_path / "out.0123abcd.partial.rrd"
-    left.write_text("some frames")
-    run(drive, tmp_path, max_frames=12)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.rrd", "reports"]
-    assert not [*(tmp_path / "reports").glob(".*")]
 
 
 def test_a_run_that_fails_leaves_an_earlier_one_s_partial_recording(drive, tmp_path):

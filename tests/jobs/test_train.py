@@ -49,11 +49,6 @@ def test_a_drive_may_have_a_range_of_its_own(drives, tmp_path):
     assert len(train([drives[0], few], tmp_path).digests) == 4
 
 
-def test_a_model_file_holds_one_training(drives, tmp_path):
-    with pytest.raises(RoadevalError, match=r"`training.seeds`: a model file holds one training"):
-        train(drives[:1], tmp_path, seeds=2)
-
-
 def test_frames_that_cannot_be_decoded_are_named_and_counted(drives, tmp_path):
     broken = write_log(tmp_path / "broken.mcap", broken=8)  # frames 0, 8 and 16 train
     model = train([broken], tmp_path)

@@ -167,17 +167,6 @@ def test_decide_trained_takes_that_threshold(at_trained):
     assert any(each.startswith("other: its threshold is") for each in outcome.warnings)
 
 
-def test_a_network_may_have_its_threshold_chosen(folder, tmp_path):
-    red_network(tmp_path / "red.onnx", size=SIZE[::-1], bias=-150.0)
-    (tmp_path / "net.toml").write_text('file = "red.onnx"\ndecide = "trained"\n')
-    config = configure(SMALL).with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
-    alone = config.override({"only": ["mine"]})
-    _, rows = replay(folder / "drive.mcap", alone, tmp_path / "r")
-    assert err(rows, "mine") < err(rows, "mine", "net")
-    # Its own threshold does not matter to what is learnt on top of it.
-    assert "threshold" not in config.with_tuned(["mine"]).pipelines()["mine_tuned"].settings
-
-
 def test_labels_of_scored_frames_do_not_choose_the_threshold(folder, tmp_path):
     masks = {"mine": {**confidences(tmp_path / "a"), "decide": "trained"}}
     config = configure({**SMALL, "masks": masks, "only": ["mine"]})

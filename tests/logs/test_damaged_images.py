@@ -103,12 +103,6 @@ def test_colours_shared_by_pixels_need_an_even_size(
         read(path)
 
 
-def test_a_bayer_image_too_small_to_convert_is_refused(tmp_path: Path) -> None:
-    images = [raw(i, grey(9, 1 + 7 * i, 1 + 7 * i), "bayer_rggb8") for i in range(2)]
-    path = ros2_log(tmp_path / "a.mcap", [("/camera", i, each) for i, each in enumerate(images)])
-    assert all(found is not None for found in read(path)[0])
-
-
 def test_messages_of_two_kinds_on_a_topic_are_read_as_what_they_are(tmp_path: Path) -> None:
     """The writer logs the second kind under the schema of the first."""
     pixels = grey(60, WIDTH, HEIGHT)

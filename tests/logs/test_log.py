@@ -9,7 +9,6 @@ import pytest
 from mcap.writer import CompressionType
 
 from roadeval.logs import (
-    FrameError,
     FrameSettings,
     LabelSettings,
     LogConfig,
@@ -19,7 +18,6 @@ from roadeval.logs import (
     open_log,
 )
 from roadeval.logs.container import records
-from roadeval.logs.container.records import Message
 from roadeval.logs.topics.reader import UNREADABLE
 from tests.fixtures.shared import shared
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
@@ -116,23 +114,6 @@ def test_chunks_too_big_for_memory_are_read_all_the_same(
         frames = [frame.decode() for frame in log.frames(log.select())]
     assert [frame.stamp_ns for frame in frames] == STAMPS
     assert log.damage == ()
-
-
-def test_a_stamp_that_cannot_be_read_is_told_from_every_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = ros2_log(tmp_path / "drive.mcap", [("/cam", i, compressed(i, b"")) for i in range(3)])
-    with open_log(path) as log:
-        reader = log._readers["/cam"]
-        read = reader.message
-
-        def message(position: int) -> Message:
-            if position == 1:
-                raise FrameError("torn")
-            return read(position)
-
-        monkeypatch.setattr(reader, "message", message)
-        assert [reader.stamp(i) for i in (0, 1, 2, 1)] == [0, UNREADABLE, 2, UNREADABLE]
 
 
 @pytest.mark.parametrize("stamp", [2**63 - 1, 2**63, 10**40, -(10**40)])

@@ -6,7 +6,6 @@ from onnx import TensorProto
 
 from roadeval.networks import NetSettings, Network, NetworkError
 from tests.networks.making import SIZE, network
-from tests.networks.test_onnx_file import with_weights_beside
 
 IMAGE = np.zeros((24, 32, 3), np.uint8)
 
@@ -53,13 +52,6 @@ def test_what_an_output_means_follows_from_its_classes_and_what_makes_it(
 ):
     found = read(network(tmp_path / "n.onnx", classes=classes, last=last))
     assert (found.activation, found.decide) == (activation, decide)
-
-
-def test_weights_beside_the_file_are_used(tmp_path):
-    path = with_weights_beside(tmp_path)
-    found = Network.of(NetSettings(file=str(path)))
-    whole = Network.of(NetSettings(file=str(tmp_path / "whole.onnx")))
-    assert np.array_equal(found.road(IMAGE).codes, whole.road(IMAGE).codes)
 
 
 # --- What is asked for ----------------------------------------------------------------------------

@@ -63,13 +63,6 @@ def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
         assert np.abs(codes / CERTAIN - alone).max() < 1e-4
 
 
-def test_two_classes_can_be_road_together(tmp_path):
-    path = network(tmp_path / "n.onnx", classes=3, values=balanced(IMAGE, 3))
-    both = opened(path, road=(0, 2)).road(IMAGE)
-    rest = opened(path, road=(1,)).road(IMAGE)
-    assert np.array_equal(both.mask, 1 - rest.mask)
-
-
 def test_classes_are_brought_to_the_frame_by_the_nearest_pixel(tmp_path):
     values = balanced(IMAGE)
     path = network(tmp_path / "n.onnx", values=values, last="ArgMax")
@@ -101,15 +94,6 @@ def test_channels_can_come_last(last, tmp_path):
     one, other = (opened(path).road(FRAME) for path in (first, tail))
     assert np.array_equal(one.mask, other.mask)
     assert opened(tail).settings.layout == "NHWC"
-
-
-def test_whole_numbers_are_handed_over_as_they_are(tmp_path):
-    values = balanced(IMAGE)
-    values["w1"] /= 255
-    path = network(tmp_path / "n.onnx", values=values, dtype=2)
-    road = opened(path).road(IMAGE)
-    plain = opened(network(tmp_path / "p.onnx", values=balanced(IMAGE))).road(IMAGE)
-    assert np.abs(road.codes.astype(int) - plain.codes).max() <= 2
 
 
 def test_a_letterbox_shows_the_whole_frame_and_no_more(tmp_path):

@@ -72,17 +72,6 @@ def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
     assert capsys.readouterr().out.startswith("roadeval ")
 
 
-def test_a_run_finds_its_workers_where_the_number_of_processors_is_unknown(monkeypatch, tmp_path):
-    monkeypatch.setattr("os.cpu_count", lambda: None)
-    outcome = roadeval.replay(
-        write_log(tmp_path / "drive.mcap", numbers=range(12)),
-        roadeval.configure({"output": {"record": "none"}}),
-        save=tmp_path / "out.rrd",
-        reports=tmp_path / "reports",
-    )
-    assert outcome.summary["frames"]["evaluated"] == 2
-
-
 def test_a_second_run_on_an_output_needs_nothing_of_posix(monkeypatch, tmp_path):
     def run():
         config = roadeval.configure({"output": {"record": "none"}})

@@ -57,12 +57,6 @@ def test_an_image_that_need_not_be_exact_comes_back_nearly_and_at_full_size():
     assert np.abs(back.astype(int) - image).mean() < 10
 
 
-def test_an_exact_image_comes_back_equal():
-    image = DRAW.integers(0, 256, (HEIGHT, WIDTH, 3)).astype(np.uint8)
-    spec = LayerSpec("aligned", LayerKind.RGB, "")
-    np.testing.assert_array_equal(there_and_back(spec, image), image)
-
-
 @pytest.mark.parametrize("spec", [POST, NDI, LayerSpec("aligned", LayerKind.RGB, "")])
 def test_a_damaged_picture_is_refused(spec):
     chosen = codec(spec, WIDTH, HEIGHT)

@@ -62,9 +62,3 @@ def test_the_camera_has_the_loaders_pinhole_and_place(both: tuple[Path, Path]):
     assert ours["Transform3D:parent_frame"] == ["base_link"]
     mounting = roadeval.Recording(both[0]).facts.drive.calibration.mounting
     assert np.allclose(ours["Transform3D:translation"][0], mounting.translation)
-
-
-def test_a_recording_knows_the_logs_point_clouds_for_its_view_of_space(tmp_path: Path):
-    log = ros2(tmp_path / "a.mcap", {"/front/camera_info": info()}, clouds=("/lidar/points",))
-    roadeval.replay(log, save=tmp_path / "out.rrd", reports=tmp_path / "reports")
-    assert roadeval.Recording(tmp_path / "out.rrd").layout.clouds == ("/lidar/points",)

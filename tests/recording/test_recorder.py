@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, views
-from roadeval.recording.recorder import LEAST_FREE
 from roadeval.recording.rows import PendingRows
 from tests.recording.making import (
     RESULTS,
@@ -54,18 +53,6 @@ def test_an_interrupt_before_the_first_frame_leaves_nothing(place, tmp_path, mon
     with pytest.raises(KeyboardInterrupt), Recorder(tmp_path / "out.rrd", layout()):
         pass
     assert not list(tmp_path.iterdir())
-
-
-def test_flushed_frames_wait_no_more(drive, tmp_path):
-    with Recorder(tmp_path / "out.rrd", layout()) as recorder:
-        for each in drive[:5]:
-            recorder.write(recorder.encode(each, 0), lines(each))
-        recorder.flush()
-        partial = Recording(recorder.partial)
-        assert partial.frame_numbers == (0, 1, 2, 3, 4)
-        assert list(partial.frames.frame) == [2, 3, 4]
-        recorder.finish(RESULTS)
-    assert Recording(recorder.path).frame_numbers == (0, 1, 2, 3, 4)
 
 
 @pytest.mark.parametrize("stop", [RuntimeError, KeyboardInterrupt, SystemExit])
@@ -144,10 +131,6 @@ def test_a_killed_run_leaves_all_but_the_frames_that_wait(frames, images, number
     np.testing.assert_array_equal(back, next(result(last).variants[0].masks())[1].pixels())
 
 
-def test_of_a_complete_recording_no_frame_is_unsure(recording):
-    assert recording.unsure == ()
-
-
 def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
     leave_free(monkeypatch, 1 << 20)
     for path in (tmp_path / "out.rrd", tmp_path / "new" / "er" / "out.rrd"):
@@ -174,15 +157,6 @@ def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_c
     assert rerun("verify", recorder.partial) == 0
     assert Recording(recorder.partial).frame_numbers == tuple(given)
     assert 10 < len(given) < len(drive)
-
-
-def test_what_waits_has_its_room_on_the_disk_beside_the_least(drive, tmp_path, monkeypatch):
-    with _recorder(tmp_path / "out.rrd") as recorder:
-        leave_free(monkeypatch, LEAST_FREE + 1)
-        recorder.check_disk_space()
-        recorder.write(recorder.encode(drive[3], 0), lines(drive[3]))
-        with pytest.raises(RecordingError, match="the disk is full"):
-            recorder.check_disk_space()
 
 
 @pytest.mark.parametrize(("rule", "shown"), [("all", 1000), ("every:4", 250), ("worst:50", 50)])
@@ -274,19 +248,3 @@ def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
 
 def _recorder(path):
     return Recorder(path, layout())
-
-
-def test_what_fails_at_the_close_alone_is_raised_and_what_failed_first_is_kept(
-    tmp_path, monkeypatch
-):
-    def fail(recorder):
-        raise RecordingError("cannot be written any further")
-
-    monkeypatch.setattr(Recorder, "_send_all", fail)
-    with (
-        pytest.raises(RecordingError, match="cannot be written"),
-        Recorder(tmp_path / "a.rrd", layout()),
-    ):
-        pass
-    with pytest.raises(KeyError, match="first"), Recorder(tmp_path / "b.rrd", layout()):
-        raise KeyError("first")

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
 
@@ -75,12 +74,6 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
         assert rows_of(recording, path, component) == {4: 1, 5: 1, 6: 0, 11: 1, 12: 0}
 
 
-def test_rates_facts_and_milliseconds_are_series(recording):
-    assert recording.scalars("/metrics/filtered/post/ERR").tolist() == [0.25] * 17
-    assert recording.scalars("/timing/filtered/shadow").tolist() == [4.0] * 19
-    assert recording.scalars("/facts/filtered/shadow/components")[18] == 3.0
-
-
 @pytest.mark.parametrize(
     ("version", "told"),
     [
@@ -103,11 +96,6 @@ def test_a_recording_that_tells_no_format_is_of_an_earlier_version(recording, tm
     assert rerun("filter", *words) == 0
     with pytest.raises(RecordingError, match=r"made by an earlier version of roadeval, whose"):
         Recording(tmp_path / "out.rrd")
-
-
-def test_an_unknown_layer_is_answered_with_those_that_exist(recording):
-    with pytest.raises(RecordingError, match=r"no /filtered/depth; there are .*/filtered/ndi"):
-        recording.layer("filtered", "depth", 3)
 
 
 @pytest.mark.parametrize("content", [b"", b"RR", b"\x89MCAP0\r\n", b"frame,stamp_ns\n"])
@@ -160,15 +148,3 @@ def test_a_picture_costs_the_chunk_that_holds_it(drive, recording, monkeypatch):
         again.layer("filtered", "post", 99)
     assert read == chunks[:1]
     assert again.frame_numbers == tuple(each.frame.number for each in drive)
-
-
-def test_rows_that_were_put_together_with_others_may_have_no_list_at_all(recording, monkeypatch):
-    batch = pa.RecordBatch.from_pydict(
-        {"frame": [1, 2, 3, 4], "Scalars:scalars": pa.array([[0.5], None, [], [0.25]])}
-    )
-    again = Recording(recording.path)
-    path = "/metrics/filtered/post/ERR"
-    monkeypatch.setattr(rrd_file, "rows_of", lambda _: (path, batch))
-    assert again.scalars(path).to_dict() == {1: 0.5, 4: 0.25}
-    batch = batch.slice(0, 2)
-    assert again.scalars(path).to_dict() == {1: 0.5}

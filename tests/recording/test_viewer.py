@@ -20,13 +20,6 @@ def fake(tmp_path, monkeypatch):
     monkeypatch.setattr(viewer, "_program", lambda: str(script))
 
 
-def test_without_a_driver_the_package_that_brings_one_is_named(tmp_path, monkeypatch):
-    monkeypatch.delenv("VK_ICD_FILENAMES", raising=False)
-    monkeypatch.setattr(viewer, "DRIVERS", tmp_path)
-    with pytest.raises(RecordingError, match="apt-get install mesa-vulkan-drivers"):
-        viewer.screenshot(tmp_path / "x.rrd", tmp_path / "x.png")
-
-
 def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine_alone(
     fake, tmp_path
 ):
@@ -121,18 +114,3 @@ def test_another_recording_takes_the_place_of_the_first(windows):
         ("a.rrd", True),
         ("b.rrd", False),
     ]
-
-
-def test_a_window_that_was_closed_is_opened_again(windows):
-    window = WindowViewer()
-    window.show(Path("a.rrd"), 1)
-    windows[0]["process"].code = 0
-    window.show(Path("a.rrd"), 2)
-    assert [each["frames"] for each in windows] == [[1], [2]]
-
-
-def test_without_a_screen_it_says_what_to_do(windows, monkeypatch):
-    monkeypatch.setattr(viewer, "has_screen", lambda: False)
-    with pytest.raises(RecordingError, match="on a machine that has one"):
-        WindowViewer().show(Path("a.rrd"), 1)
-    assert windows == []

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from roadeval.data import Doubt
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording import Recorder, Recording, RecordRule
 from roadeval.recording import recorder as recorder_module
-from roadeval.recording.recorder import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
 from tests.results.making import lines
 
@@ -58,15 +57,6 @@ def test_without_truth_the_most_doubtful_frames_are_kept(tmp_path):
             each = replace(result(number), tallies=(), errors={}, doubts=doubts)
             each = replace(each, frame=replace(each.frame, truth=None))
             recorder.write(recorder.encode(each, number))
-        recorder.finish(RESULTS)
-    assert list(Recording(recorder.path).frame_numbers) == [1, 3]
-
-
-def test_flushed_pictures_are_the_worst(tmp_path):
-    with selective(tmp_path / "out.rrd", "worst:2") as recorder:
-        write(recorder)
-        recorder.flush()
-        assert set(Recording(recorder.partial).frame_numbers) == {1, 3}
         recorder.finish(RESULTS)
     assert list(Recording(recorder.path).frame_numbers) == [1, 3]
 
@@ -130,19 +120,3 @@ def test_no_more_is_held_than_there_is_room_for_and_the_run_says_so(tmp_path, mo
             recorder.write(each)
         recorder.finish(RESULTS)
     assert Recording(recorder.path).frame_numbers == (1, 3, 5)
-
-
-def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp_path, monkeypatch):
-    def fail(self, encoded):
-        raise RecordingError("the disk is full")
-
-    def fill(recorder):
-        with recorder:
-            recorder.write(recorder.encode(result(0), 0))
-            monkeypatch.setattr(WorstFrames, "offer", fail)
-            recorder.write(recorder.encode(result(1), 1))
-
-    recorder = selective(tmp_path / "out.rrd", "worst:3")
-    with pytest.raises(RecordingError, match="the disk is full"):
-        fill(recorder)
-    assert Recording(recorder.partial).frame_numbers == (0,)

@@ -1,21 +1,11 @@
 """Which charts are made of which rows: each number where it belongs, in its own look."""
 
-from dataclasses import replace
-from itertools import combinations
-
 from roadeval.evaluation.stats import Difference
-from roadeval.report.chart import ChartKind, looks, looks_of_results
+from roadeval.report.chart import ChartKind, looks_of_results
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import DRAWN, MEAN, ForestRow
 
 # --- Looks ----------------------------------------------------------------------------------------
-
-
-def test_variants_differ_by_more_than_their_colour():
-    names = ["filtered", "unfiltered", "blind", "a", "b", "c", "d", "e"]
-    for one, other in combinations(looks(names).values(), 2):
-        assert one.colour != other.colour
-        assert replace(one, colour="") != replace(other, colour="")
 
 
 def test_of_several_results_a_variant_keeps_its_hue_and_a_result_its_dash():

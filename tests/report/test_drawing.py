@@ -69,19 +69,6 @@ def test_a_level_lies_across_with_its_interval_and_belongs_to_the_values():
     assert values(plain, drawn(plain))["level"]["low"] is None
 
 
-def test_positions_of_their_own_have_a_range_of_their_own():
-    chart = lines(series([40.0, 90.0], [1, 1]), across="recall", x_range=(40, 101))
-    made = drawn(chart)
-    assert made.across == "recall, %"
-    assert [text for _, text in made.x_ticks] == ["40", "60", "80", "100"]
-    assert span_of_frames([chart]) == Span(0, 1)
-
-
-def test_a_mark_outside_of_the_axes_is_not_drawn():
-    made = drawn(lines(series([0, 10], [5.0, 50.0]), across="recall", y_range=(40, 60)))
-    assert made.shapes[0].marks == [(100, 50)]
-
-
 def test_of_a_long_drive_neighbours_are_averaged():
     long = thinned(series(list(range(10)), [float(n) for n in range(10)]), most=5)
     assert long.x == [0, 2, 4, 6, 8]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
-from itertools import combinations, groupby, pairwise
+from itertools import groupby
 from pathlib import Path
-from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -107,23 +106,6 @@ def names(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.texts[2:]]
 
 
-@pytest.mark.parametrize("rows", [1, 12, 3600])
-def test_labels_never_touch_each_other(rows: int) -> None:
-    (ax,) = drawn(error_rate("drive", rows_of(a_table(rows)))).axes
-    boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
-    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
-
-
-@pytest.mark.parametrize("variants", [BY_DEFAULT, ("filtered", "unfiltered", LONG, "b", "c", "d")])
-def test_the_legend_covers_nothing(variants: tuple[str, ...]) -> None:
-    figure = drawn(fp_fn_rate("drive", rows_of(a_table(5, variants))))
-    legend = figure.axes[0].get_legend().get_window_extent()
-    for other in [*(ax.patch for ax in figure.axes), *figure.texts]:
-        assert not legend.overlaps(other.get_window_extent())
-    assert legend.x1 <= figure.bbox.x1
-    assert len(figure.axes[0].get_legend().get_texts()) == len(variants)
-
-
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
     ax = drawn(fp_fn_rate("drive", rows_of(table))).axes[1]
@@ -139,11 +121,6 @@ def test_a_long_drive_is_drawn_as_means_of_rows() -> None:
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
     assert line.get_ydata()[0] == pytest.approx(first.mean())
     assert "the mean of 24 rows of 10 frames" in texts(figure)
-
-
-def test_figure_2_without_truth_has_no_column_for_it() -> None:
-    figure = masks_of([an_example(truth=False)])
-    assert names(figure) == ["frame 7", "camera image", "filtered", "unfiltered"]
 
 
 def test_masks_are_tinted_and_the_rest_is_darker() -> None:
@@ -174,17 +151,6 @@ def test_a_frame_without_a_mask_is_faded_in_its_column() -> None:
     assert "faded: there is no mask" in texts(figure)
 
 
-@pytest.mark.parametrize("size", [(20, 64), (64, 36)])
-def test_names_fit_beside_and_above_pictures_of_any_shape(size: tuple[int, int]) -> None:
-    image, mask = np.full((*size, 3), 90, np.uint8), np.ones(size, np.uint8)
-    figure = drawn(masks_of([ExampleFrame(999, image, mask, dict.fromkeys([LONG, "b"], mask))]))
-    for picture in placed(figure):
-        assert picture.box.height / picture.box.width == pytest.approx(size[0] / size[1])
-    boxes = [text.get_window_extent() for text in figure.texts]
-    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 for box in boxes)
-    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
-
-
 @pytest.mark.parametrize("width", [40, 1000])
 def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
     rng = np.random.default_rng(0)
@@ -200,20 +166,6 @@ def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
     assert figures[0].get_figheight() == figures[1].get_figheight()
     for mine, its in zip(*(pictures(figure)[0] for figure in figures), strict=True):
         np.testing.assert_array_equal(mine, its)
-
-
-def test_a_picture_covers_its_box_in_a_vector_file() -> None:
-    figure = masks_of([an_example()])
-    content = BytesIO()
-    figure.savefig(content, format="svg", dpi=200)
-    found = ElementTree.fromstring(content.getvalue()).iter("{http://www.w3.org/2000/svg}image")
-    places = [[float(each.attrib[k]) for k in ("x", "y", "width", "height")] for each in found]
-    width, height = 72 * figure.get_size_inches()
-    boxes = [each.box.transformed(figure.transFigure.inverted()) for each in placed(figure)]
-    assert places == [
-        pytest.approx([width * b.x0, height * (1 - b.y1), width * b.width, height * b.height])
-        for b in boxes
-    ]
 
 
 def test_a_png_shows_what_matplotlib_would_save(tmp_path: Path) -> None:

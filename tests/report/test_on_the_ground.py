@@ -45,14 +45,3 @@ def test_an_edge_that_a_wrong_camera_could_explain_is_marked():
     # Were the camera otherwise, no end would be seen: that is as unsure as can be.
     assert plain(free.rows[0][1]) == f"{UNSURE}0.00"
     assert plain(free.rows[0][2]) == "\N{EN DASH}"
-
-
-def test_nothing_is_marked_where_no_other_camera_was_counted():
-    measures = [("left_edge", "10m"), ("right_edge", "10m"), ("free_distance", "ahead")]
-    rows = [row("filtered", *measure, 0.1, math.nan) for measure in measures]
-    edges, free = edges_tables(rows, NAMES)
-    assert plain(edges.rows[0][2]) == plain(free.rows[0][1]) == "+0.10"
-    errors = [row(name, "ERR", "0-10m", 0.1, math.nan) for name in NAMES]
-    table = distance_table(errors, NAMES, brief=True)
-    assert [plain(line[1]) for line in table.rows] == ["10.0", "10.0"]
-    assert UNSURE not in table.caption

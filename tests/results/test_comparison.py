@@ -6,7 +6,6 @@ import pytest
 
 from roadeval.evaluation.comparison import Condition
 from roadeval.results.comparison import (
-    as_dict,
     changed_settings,
     headline,
     judged,
@@ -80,32 +79,3 @@ def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told
     judgement = Condition.parse(text).judge(a_change(WORSE))
     assert judged(judgement) == f"post.filtered.ERR of new {told.format(text)}"
     assert " over 8 drives" in judged(replace(judgement, drives=8))
-
-
-def test_the_file_holds_the_facts_beside_the_sentences():
-    change = a_change(WORSE)
-    found = a_comparison(change, warnings=("2 frames are left out",))
-    judgements = [Condition.parse("post.filtered.ERR > 1pp surely").judge(change)]
-    content = as_dict(found, judgements)
-    assert content["verdict"] == verdict(found)
-    assert content["warnings"] == ("2 frames are left out",)
-    (condition,) = content["conditions"]
-    assert condition.pop("sentence") == judged(judgements[0])
-    assert condition.pop("after") == pytest.approx(0.112)
-    assert condition.pop("value") == pytest.approx(0.012)
-    assert condition == {
-        "text": "post.filtered.ERR > 1pp surely",
-        "stage": "post",
-        "variant": "filtered",
-        "rate": "ERR",
-        "operator": ">",
-        "limit": 1.0,
-        "is_change": True,
-        "surely": True,
-        "result": "new",
-        "drives": 1,
-        "before": 0.1,
-        "low": 0.005,
-        "high": 0.02,
-        "holds": False,
-    }

@@ -124,8 +124,3 @@ def test_text_that_is_not_the_summarys_is_refused_and_named():
 def test_a_name_that_no_result_can_hold_is_damage(name):
     with pytest.raises(ResultsError, match="damaged"):
         read_table("oracles", HEADER + line() + line(variant=name))
-
-
-def test_a_long_one_is_quoted_in_part():
-    with pytest.raises(ResultsError, match=r"column variant holds '\+{40}', which is no name"):
-        read_table("oracles", HEADER + line(variant="+" * 10_000))

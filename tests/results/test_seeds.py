@@ -1,19 +1,13 @@
 """What several seeds come to."""
 
-import io
 import math
 
 import pytest
-from rich.console import Console
 
-from roadeval.cli.screens.replay import show
 from roadeval.data.words import points
-from roadeval.jobs.run.replay import Outcome
-from roadeval.report.blocks import Table
-from roadeval.report.sections.summary import section
 from roadeval.report.tables import seeds_table
 from roadeval.results.sentences import spread_in_words
-from tests.report.making import a_total, plain_rows, some_findings
+from tests.report.making import plain_rows
 
 SEEDS = {
     "seeds": [7, 8, 9],
@@ -48,12 +42,3 @@ def test_every_variant_has_a_row_and_the_filter_s_effect_has_one():
     ]
     assert "with seeds 7 to 9 of the training" in table.caption
     assert "All else is of seed 7." in table.caption
-
-
-def test_terminal_and_report_have_the_table():
-    shown, totals = io.StringIO(), {name: {"post": a_total(0.1)} for name in SEEDS["totals"]}
-    found = some_findings(totals=totals, seeds=SEEDS)
-    show(Outcome(None, None, found.facts, (), (), ()), Console(file=shown, width=100))
-    assert "7.09 (6.69 to 7.47)" in shown.getvalue()
-    *_, table = (block for block in section(found) if isinstance(block, Table))
-    assert plain_rows(table)[0][1] == "7.09 (6.69 to 7.47)"

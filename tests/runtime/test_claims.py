@@ -120,12 +120,6 @@ def test_without_locks_nothing_is_certain(without, tmp_path, monkeypatch):
     assert names(tmp_path) == []
 
 
-def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, monkeypatch):
-    monkeypatch.setattr("time.sleep", lambda _seconds: (other.kill(), other.wait()))
-    with claimed(tmp_path / "out", tmp_path, wait=True) as certain:
-        assert certain
-
-
 def test_a_folder_that_cannot_be_written_to_is_an_os_error(tmp_path):
     with pytest.raises(FileNotFoundError):
         claim(tmp_path / "missing")

@@ -6,9 +6,7 @@ import time
 import pytest
 
 from roadeval.runtime.documents import (
-    LONG_TOGETHER,
     LONGEST,
-    check_texts,
     read_bounded,
     read_json,
     read_toml,
@@ -68,12 +66,6 @@ def test_toml_that_holds_too_much_is_refused_at_once(text, reason):
     with pytest.raises(ValueError, match=reason):
         read_toml(text)
     assert time.process_time() - begun < 2
-
-
-def test_lines_are_texts_of_their_own():
-    check_texts(["\n".join(["x" * 900] * 2_000)])
-    with pytest.raises(ValueError, match="long texts"):
-        check_texts(["\n".join([MANY] * (LONG_TOGETHER // 1_000))])
 
 
 def test_a_document_is_a_file_that_ends(tmp_path):

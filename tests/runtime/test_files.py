@@ -88,15 +88,7 @@ def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
     files.check_output(tmp_path / "new", folder=True)
 
 
-OWN = ["out.0123abcd.partial.rrd", "out.0123abcd.partial.rrd-images"]
 OTHERS = ["out.rrd", "out.partial.rrd", "out.b.0123abcd.partial.rrd", ".out.0123abcd.partial.rrd"]
-
-
-def test_only_an_output_s_own_unfinished_names_are_found(tmp_path):
-    for name in (*OWN, *OTHERS):
-        (tmp_path / name).touch()
-    found = files.own_names(tmp_path / "out.rrd", hidden=False)
-    assert sorted(each.name for each in found) == OWN
 
 
 def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
@@ -107,18 +99,6 @@ def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
                 each.touch()
             assert set(files.own_names(tmp_path / name, hidden=hidden)) == given
             assert len(given) == 4
-
-
-def test_two_that_write_one_file_do_not_mix_and_the_last_one_stays(tmp_path):
-    one, other = (files.NewFile(tmp_path / "file") for _ in range(2))
-    for file, text in ((one, "one"), (other, "other")):
-        file.begin()
-        file.partial.write_text(text)
-    for file in (other, one):
-        file.publish()
-        file.discard()
-    assert (tmp_path / "file").read_text() == "one"
-    assert names(tmp_path) == ["file"]
 
 
 def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):

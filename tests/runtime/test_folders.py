@@ -64,14 +64,6 @@ def no_exchange(_one, _other):
     raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
 
-def test_it_bears_its_name_when_it_is_published(tmp_path):
-    new = begun(tmp_path / "a" / "folder", {"table": "new"})
-    assert not new.path.exists()
-    new.publish()
-    assert read(new.path) == {"table": "new"}
-    assert [each.name for each in new.path.parent.iterdir()] == ["folder"]
-
-
 def test_the_earlier_content_is_replaced_and_what_is_of_others_stays(folder):
     (folder / "notes").write_text("mine")
     (folder / "link").symlink_to("notes")
@@ -80,28 +72,6 @@ def test_the_earlier_content_is_replaced_and_what_is_of_others_stays(folder):
     assert read(folder) == {"table": "new", "only_new": "new", **mine}
     assert (folder / "link").is_symlink()
     assert [each.name for each in folder.parent.iterdir()] == ["folder"]
-
-
-def test_what_was_begun_can_be_discarded(folder):
-    new = begun(folder, {"table": "new"})
-    new.discard()
-    new.discard()
-    assert read(folder) == {"table": "old", "only_old": "old"}
-    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
-
-
-def test_what_a_killed_run_had_begun_goes(folder):
-    begun(folder, {"table": "new"})
-    (begun(folder, {"table": "half of"}).partial / "seal").unlink()
-    recover(folder)
-    assert read(folder) == {"table": "old", "only_old": "old"}
-    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
-
-
-def test_a_file_of_others_that_the_new_content_has_is_its_own_now(folder):
-    (folder / "figure").write_text("of others")
-    write(folder, table="new", figure="new")
-    assert read(folder) == {"table": "new", "figure": "new"}
 
 
 def test_a_folder_of_others_is_never_moved_nor_replaced(folder):

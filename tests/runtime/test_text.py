@@ -6,8 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roadeval.cli import messages
-from roadeval.errors import RoadevalError
 from roadeval.runtime.text import (
     UNENCODABLE,
     as_markdown,
@@ -78,10 +76,3 @@ def test_markdown_shows_the_text_itself():
 )
 def test_urls_lose_what_is_secret(text, left):
     assert without_secrets(text) == left.replace("http://h/b", "http:/h/b")
-
-
-def test_no_error_and_no_message_tells_a_password(capsys):
-    text = "http://u:geheim@host/a: is not there"
-    assert str(RoadevalError(text)) == "http://host/a: is not there"
-    messages.warning(text)
-    assert "geheim" not in capsys.readouterr().err

@@ -2,22 +2,17 @@
 
 import json
 import re
-import zipfile
 from contextlib import suppress
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from roadeval.cli.app import main
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.beyond.trees import Blend
 from roadeval.training import TrainingSettings, fit, save_model
 from roadeval.training.learning import from_file
-from tests.e2e.commands import DEMO
 from tests.training.making import frame
 
 SMALL = {"preset": "robust", "trees": {"trees": 10, "features": ["place"]}}
@@ -118,11 +113,6 @@ def test_the_sentence_says_what_is_wrong(arrays, tmp_path, name, damage, why):
     assert re.search(why, sentence)
 
 
-def test_a_machine_without_support_vectors_is_refused(arrays, tmp_path):
-    none = {"filtered/svm/vectors": np.zeros((0, 3)), "filtered/svm/weights": np.zeros(0)}
-    assert "vectors has the shape (0, 3) instead of (m, 3)" in refusal(arrays | none, tmp_path)
-
-
 @pytest.mark.parametrize(
     "stage", ["filtered/similarity", "filtered/svm", "gated/gated", "robust/trees"]
 )
@@ -135,18 +125,6 @@ def test_a_stage_that_learnt_nothing_is_refused(arrays, tmp_path, stage):
 @pytest.mark.parametrize("name", ["night/svm/mean", "filtered/post/mean", "filtered/x/y", "x", "/"])
 def test_an_array_that_belongs_nowhere_is_refused(arrays, tmp_path, name):
     assert name.rpartition("/")[0] in refusal({**arrays, name: np.zeros(3)}, tmp_path)
-
-
-def test_what_is_no_array_is_refused(arrays, tmp_path):
-    """A file of an archive that does not begin as an array comes out of it as bytes."""
-    with zipfile.ZipFile(tmp_path / "x.model", "w") as archive:
-        for name, array in arrays.items():
-            content = BytesIO()
-            np.save(content, array)
-            text = content.getvalue()
-            archive.writestr(f"{name}.npy", b"?" + text[1:] if name == "prior" else text)
-    with pytest.raises(RoadevalError, match="not a model file, or a damaged one"):
-        from_file(tmp_path / "x.model", PIPELINES)
 
 
 @pytest.mark.parametrize(
@@ -187,26 +165,3 @@ def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
         path.write_bytes(spoilt)
         with suppress(RoadevalError):
             from_file(path, TWO)
-
-
-def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
-    tmp_path, tmp_path_factory, capsys, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    small = tmp_path_factory.mktemp("small") / "small.toml"
-    small.write_text('preset = "robust"\n[trees]\ntrees = 10\nfeatures = ["place"]\n')
-    pipelines = configure(SMALL).pipelines()
-    sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
-    known = sound.parameters["unfiltered"]["trees"]
-    twice = {n: np.tile(getattr(known.network, n), 2) for n in ("lowest", "scale", "planes")}
-    network = replace(known.network, ranks=np.tile(known.network.ranks, (2, 1)), **twice)
-    forest = replace(known.forest, feature=known.forest.feature + np.int32(3), inputs=6)
-    beyond = {"trees": Blend(forest, network, known.sizes)}
-    save_model(replace(sound, parameters={"unfiltered": beyond}), Path("x.model"))
-    words = ["replay", str(DEMO), "--config", str(small), "--model", "x.model", "--quiet"]
-    assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
-    assert capsys.readouterr().err.splitlines() == [
-        "roadeval: error: x.model: the model's trees were grown on 6 features of a pixel, and this "
-        "version computes 3; train it again"
-    ]
-    assert [path.name for path in tmp_path.iterdir()] == ["x.model"]

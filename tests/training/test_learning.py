@@ -9,7 +9,7 @@ from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingError, TrainingSettings, learning, save_model
-from roadeval.training.learning import Schedule, fit, from_drives, from_file, from_log, spread
+from roadeval.training.learning import Schedule, fit, from_drives, from_file, from_log
 from tests.training.making import frame, pipelines
 
 PIPELINES = {
@@ -83,21 +83,9 @@ def test_the_gap_beside_spread_frames_is_a_quarter_of_their_distance(count, expe
     assert roles(frames, schedule) == expected.ljust(20, "e")
 
 
-def test_a_spread_frame_that_cannot_be_decoded_leaves_its_neighbours_to_evaluate():
-    frames = log(12, broken=(4,))
-    _, schedule = learn(frames, frames=3, placement="spread", gap=1)
-    assert roles([f for f in frames if not f.broken], schedule) == "tgeeeegtgee"
-
-
 def test_spread_frames_that_leave_nothing_to_evaluate_are_an_error():
     with pytest.raises(TrainingError, match=r"6 labelled frames, .* take 3 of them and 3 more"):
         learn(log(6), frames=3, placement="spread", gap=1)
-
-
-def test_without_truth_spread_frames_train_by_the_patch():
-    frames = log(12, unlabelled=tuple(range(12)))
-    model, schedule = learn(frames, frames=3, placement="spread")
-    assert (model.source, roles(frames, schedule)) == ("patch", "tgugtgugtguu")
 
 
 def test_frames_right_after_training_can_be_left_out():
@@ -146,12 +134,6 @@ def test_an_image_that_trained_is_recognised_wherever_it_lies():
     _, schedule = learn(frames, frames=2)
     elsewhere = replace(frames[1].frame, number=77, stamp_ns=5)
     assert schedule.role(elsewhere) is Role.TRAINING
-
-
-def test_training_frames_are_spread_over_a_drive():
-    frames = log(20, unlabelled=(0,))
-    chosen = [f.number for f in spread(lambda: frames, 4, labelled=True)]
-    assert chosen == [1, 5, 10, 15]
 
 
 LABELLED = [frame(n) for n in range(2)]
@@ -240,10 +222,3 @@ def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
         TrainingError, match=r"no stage of it can learn further \(similarity, svm\)"
     ):
         adapt(log(4), path, PIPELINES, frames=2)
-
-
-def test_where_no_image_can_be_decoded_the_first_reason_is_named():
-    frames = log(3, broken=(0, 1, 2))
-    said = "none of the 3 frames to train on can be decoded; the first: cannot be decoded"
-    with pytest.raises(TrainingError, match=said):
-        learn(frames)

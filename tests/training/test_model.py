@@ -5,7 +5,6 @@ import json
 import tracemalloc
 from dataclasses import dataclass
 from pathlib import Path
-from unittest.mock import Mock
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -81,11 +80,6 @@ def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage
 def test_a_variant_it_was_not_trained_for_is_refused(path):
     with pytest.raises(RoadevalError, match=r"no variant night .it has filtered, unfiltered"):
         load_model(path).require("night", pipelines()["filtered"], path)
-
-
-def test_a_missing_file_is_one_line(tmp_path):
-    with pytest.raises(RoadevalError, match="there is no such model file"):
-        load_model(tmp_path / "none.model")
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04 no archive", b"\x80\x04}."])
@@ -180,14 +174,6 @@ def test_whatever_ends_the_writing_leaves_no_file(model, tmp_path, monkeypatch, 
     with pytest.raises(end):
         save_model(model, tmp_path / "city.model")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_interrupted_writing_leaves_the_model_that_was_there(model, path, monkeypatch):
-    before = path.read_bytes()
-    monkeypatch.setattr(np, "savez_compressed", Mock(side_effect=KeyboardInterrupt))
-    with pytest.raises(KeyboardInterrupt):
-        save_model(model, path)
-    assert path.read_bytes() == before
 
 
 # --- What a stage has learnt as named arrays, and back --------------------------------------------

@@ -69,13 +69,6 @@ def test_where_nothing_is_scored_it_says_why(labelled, why):
     assert "%" not in shown
 
 
-def test_a_long_path_is_never_broken():
-    folder = Path("/results", "a-long-name" * 10)
-    shown = screen(summary(), folder)
-    assert f"results    {folder}/ (" in shown
-    assert re.search(rf"\nnext       \S*roadeval report {folder}\n", shown)
-
-
 @pytest.mark.parametrize(("display", "first"), [(":0", "rerun"), ("", "inspect")])
 def test_what_to_type_next_can_be_typed_here(display, first, monkeypatch, tmp_path):
     monkeypatch.setenv("DISPLAY", display)

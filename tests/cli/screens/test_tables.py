@@ -27,14 +27,6 @@ def test_columns_that_do_not_fit_stand_below_with_the_names_again():
     ]
 
 
-def test_no_column_of_numbers_is_left_alone_below_many():
-    out = Console(file=io.StringIO(), width=46)  # there is room for six beside the words
-    titles = ["drive", *(f"n{place}" for place in range(7))]
-    show_table(Table(titles, [["a", *["1.00"] * 7]]), out)
-    heads = [line.split() for line in out.file.getvalue().splitlines() if "drive" in line]
-    assert heads == [titles[:5], ["drive", *titles[5:]]]
-
-
 def test_numbers_are_ascii_alone():
     out = Console(file=io.StringIO(), width=80)
     rows = [["a", f"{MINUS}2.00 to {MINUS}1.00 *"], ["b", DASH]]

@@ -49,19 +49,6 @@ def test_five_clusters_have_a_mean_alone_and_the_reason_is_told():
     assert found.none_because == "5 drives are too few for an interval (6 are needed)"
 
 
-@pytest.mark.parametrize(
-    ("count", "groups", "said"),
-    [
-        (1, None, "1 drive is too few"),
-        (3, ["a", "a", "b"], "2 groups of drives are too few"),
-        (2, ["a", "a"], "1 group of drives is too few"),
-    ],
-)
-def test_what_is_too_few_is_told_in_english(count, groups, said):
-    found = over_drives(drives(normal(count), groups), 0.95)
-    assert found.none_because == f"{said} for an interval (6 are needed)"
-
-
 @pytest.mark.parametrize(("confidence", "needed"), [(0.9, 6), (0.95, 6), (0.99, 8), (0.999, 11)])
 def test_more_confidence_needs_more_clusters(confidence, needed):
     too_few = over_drives(drives(normal(needed - 1)), confidence)

@@ -153,11 +153,6 @@ def test_a_log_compressed_as_a_whole_is_called_by_its_name(tmp_path: Path) -> No
             open_log(path)
 
 
-def test_a_missing_file_is_called_by_its_name(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="No such file"):
-        open_log(tmp_path / "missing.mcap")
-
-
 def other_peoples(tmp_path: Path) -> dict[Path, int]:
     """Return logs with images, and their frames."""
     ours = {
@@ -214,15 +209,6 @@ def test_a_file_that_lacks_between_the_others_is_told(tmp_path: Path) -> None:
     middle.unlink()
     with open_log(folder) as log:
         assert log.losses[0] == f"{middle.name}: the file is missing (byte 0)"
-
-
-@pytest.mark.parametrize("names", [("a_1", "a_3"), ("a_0", "b_2"), ("a_0", "a_20240101"), ("a_0",)])
-def test_names_that_are_no_recorders_lack_nothing(tmp_path: Path, names: tuple[str, ...]) -> None:
-    log = LOGS["broken/ok.mcap"].data()
-    for name in names:
-        (tmp_path / f"{name}.mcap").write_bytes(log)
-    with open_log(tmp_path) as opened:
-        assert opened.losses == ()
 
 
 def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch) -> None:

@@ -99,12 +99,6 @@ def test_a_wrong_message_index_is_noted(chunked: Path) -> None:
         assert log.losses == ()
 
 
-@pytest.mark.parametrize("opcode", [0, 4, 5, 9, 0x0F, 0x87])
-def test_a_message_index_under_another_kind_costs_nothing(chunked: Path, opcode: int) -> None:
-    at = records(chunked.read_bytes(), INDEX)[3]
-    assert kept(changed(chunked, at, bytes([opcode]))) == [*range(FRAMES)]
-
-
 @pytest.mark.parametrize("offset", range(8))
 def test_a_wrong_byte_at_the_very_beginning_is_forgiven(chunked: Path, offset: int) -> None:
     changed(chunked, offset, b"?")

@@ -30,17 +30,6 @@ def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
     assert [r for r, _, _ in row(data, "32FC1", 5)] == [0, 128, 255, 255, 0]
 
 
-@pytest.mark.parametrize(
-    ("encoding", "pixel"), [("rgb8", 3), ("bgr8", 3), ("mono8", 1), ("rgb16", 6), ("bgra8", 4)]
-)
-@pytest.mark.parametrize("padding", [0, 2])
-def test_an_image_is_an_array_of_its_own(encoding: str, pixel: int, padding: int) -> None:
-    step = 2 * pixel + padding
-    image = to_rgb(picture(bytes(2 * step), encoding, 2, 2, step=step), LIMITS)
-    assert image.flags.c_contiguous
-    assert image.flags.writeable
-
-
 def test_padding_between_rows_is_skipped() -> None:
     padded = picture(b"\x01\x02xx\x03\x04xx", "mono8", 2, 2, step=4)
     assert to_rgb(padded, LIMITS)[..., 0].tolist() == [[1, 2], [3, 4]]

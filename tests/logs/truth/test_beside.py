@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.images import Limits
 from roadeval.logs import (
     LabelPlace,
     LabelSettings,
@@ -24,7 +23,6 @@ from roadeval.logs import (
 )
 from roadeval.logs.errors import FrameError
 from roadeval.logs.truth.beside import GREATEST, labels_in
-from roadeval.logs.truth.formats.coco import lengths_in
 from tests.e2e.commands import here
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 from tests.logs.truth.test_folder import opened
@@ -96,26 +94,12 @@ def test_numbers_from_one_are_refused_with_the_setting_that_shifts_them(drive, t
     assert select(drive, path, first=1)[1] == [*range(FRAMES)]
 
 
-def test_numbers_of_no_frame_are_refused_with_three_of_them(drive, tmp_path):
-    path = images(tmp_path / "truth", *(f"x{number}.png" for number in range(100, 200, 20)))
-    message = refusal(drive, path)
-    assert "by number: theirs are 100 to 180 (x100.png, x120.png, x140.png, ...)" in message
-    assert "the frames' 0 to 5: name the folder" in message
-    assert message.endswith("with `truth.images`")
-
-
 def test_names_of_no_image_are_refused_with_three_of_each(drive, tmp_path):
     named = images(tmp_path / "images", *(f"a{letter}.png" for letter in "uvwxyz"))
     path = images(tmp_path / "truth", *(f"b{letter}.png" for letter in "uvwx"))
     message = refusal(drive, path, images=str(named))
     assert "theirs are bu.png, bv.png, bw.png, ..., the images' au.png, av.png, aw.png" in message
     assert "without `truth.images`" in message
-
-
-def test_a_name_without_a_number_is_refused_with_the_setting_that_takes_names(drive, tmp_path):
-    message = refusal(drive, images(tmp_path / "truth", "road.png"))
-    assert "road.png: its name has no number" in message
-    assert message.endswith("with `truth.images`")
 
 
 def test_names_pair_labels_whatever_their_order(drive, tmp_path):
@@ -128,16 +112,6 @@ def test_names_pair_labels_whatever_their_order(drive, tmp_path):
     _, labelled, frames = select(drive, path, images=str(named))
     assert labelled == [*range(FRAMES)]
     assert [int(frame.decode().truth.max()) for frame in frames] == [0, 0, 0, 0, 1, 1]
-
-
-def test_two_labels_of_one_frame_are_refused_by_name(drive, tmp_path):
-    message = refusal(drive, images(tmp_path / "truth", "a_1.png", "b_1.png"))
-    assert message.endswith("a_1.png and b_1.png belong to the same frame, by number")
-    (tmp_path / "two").mkdir()
-    for part in ("a", "b"):
-        images(tmp_path / "two" / part, "1.png")
-    message = refusal(drive, tmp_path / "two")
-    assert all(str(tmp_path / "two" / part / "1.png") in message for part in ("a", "b"))
 
 
 # --- Sizes and damage -----------------------------------------------------------------------------
@@ -208,12 +182,6 @@ def coco(segmentation: Any, **image: Any) -> dict[str, Any]:
 
 
 SQUARE = [[10, 10, 20, 10, 20, 20, 10, 20]]
-
-
-def test_an_outline_beyond_the_image_is_cut(drive, tmp_path):
-    path = written(tmp_path / "truth", "a.json", coco([[-8, 16, 60, 16, 60, 90, -8, 90]]))
-    _, _, frames = select(drive, path, "road")
-    np.testing.assert_array_equal(frames[1].decode().truth, LOWER == 255)
 
 
 WRONG = {
@@ -384,32 +352,6 @@ def test_a_line_of_yolo_is_read_in_a_time_that_grows_with_its_length(tmp_path):
 def test_what_a_format_has_and_nobody_reads_is_said(tmp_path, name, content, reason):
     with pytest.raises(LogError, match=reason):
         labels_in(written(tmp_path / "truth", name, content), SIZE)
-
-
-def test_areas_of_a_brush_are_said_to_be_unread(tmp_path):
-    content = json.loads((LABELS / "label_studio" / "tasks.json").read_text())
-    # The value as label-studio-sdk's `brush.image2annotation` makes it.
-    content[0]["annotations"][0]["result"][0]["value"] = {
-        "rle": [0, 0, 24, 0, 57, 27, 255, 9, 55, 0],
-        "format": "rle",
-        "brushlabels": ["car"],
-    }
-    with pytest.raises(LogError, match=r"it holds brushlabels, .*; export masks as PNG"):
-        labels_in(written(tmp_path / "truth", "a.json", content), SIZE)
-
-
-def test_a_long_text_of_runs_is_read_in_a_time_that_grows_with_its_length():
-    began = time.perf_counter()
-    assert len(lengths_in("o" * 1_000_000)) > 1000
-    assert time.perf_counter() - began < 10
-
-
-def test_the_limit_on_pixels_holds_before_anything_is_drawn(tmp_path):
-    path = written(tmp_path / "truth", "a.json", coco(SQUARE, width=40_000, height=40_000))
-    found = opened(path)
-    with pytest.raises(FrameError, match="an image of 40000x40000, more than"):
-        found.picture(0)
-    assert Limits().max_pixels < 40_000**2
 
 
 # --- Another log ----------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -218,23 +217,6 @@ def test_outlines_are_those_of_scikit_image(points):
     ]
     filled = Outline("road", np.ravel(points).tolist()).fill(SIZE)
     assert (filled ^ inside(points)).sum() <= 1  # an edge through a centre
-
-
-@given(st.floats(-5, 55), st.floats(-5, 55))
-def test_outlines_side_by_side_share_no_pixel_and_leave_none(top, bottom):
-    left = Outline("a", [-1, -1, top, -1, bottom, 33, -1, 33]).fill(SIZE)
-    right = Outline("b", [top, -1, 60, -1, 60, 33, bottom, 33]).fill(SIZE)
-    assert (left ^ right).all()
-
-
-@given(arrays(np.uint8, (HEIGHT, WIDTH), elements=st.integers(0, 1)))
-def test_outlines_of_a_mask_at_twice_its_size_give_it_back(mask):
-    twice = cv2.resize(mask, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-    outlines, _ = cv2.findContours(twice, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    filled = np.zeros(mask.shape, bool)
-    for outline in outlines:
-        filled ^= Outline("road", ((outline + 0.5) / 2).ravel().tolist()).fill(SIZE)
-    np.testing.assert_array_equal(filled, mask == 1)
 
 
 @given(arrays(bool, (HEIGHT, WIDTH)))

@@ -99,12 +99,6 @@ def test_an_image_file_that_is_none_is_named(tmp_path: Path, content: bytes, mes
     assert not (tmp_path / "a.mcap").exists()
 
 
-def test_a_file_that_is_no_video_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.mp4").write_bytes(b"no video")
-    with pytest.raises(LogError, match="not a readable video"):
-        pack(tmp_path / "a.mp4", tmp_path / "a.mcap")
-
-
 ROAD, MARKING, OWN_CAR, VERGE = (64, 32, 32), (255, 0, 0), (204, 0, 255), (128, 128, 96)
 
 

@@ -7,7 +7,6 @@ from roadeval.pipeline.beyond import exposure
 from roadeval.pipeline.beyond.exposure import ExposureSettings
 from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import View
-from roadeval.pipeline.stages import STAGES
 
 
 def scene(road, elsewhere=(10, 200, 90), shape=(40, 60)):
@@ -60,13 +59,3 @@ def test_the_same_scene_under_another_exposure_gives_nearly_the_same_image():
     dim = run(np.rint(light).astype(np.uint8)).image.astype(int)
     bright = run(np.rint(light * [1.8, 1.5, 1.2]).astype(np.uint8)).image.astype(int)
     assert np.abs(dim - bright).max() <= 4
-
-
-def test_one_pixel_is_its_own_patch():
-    assert run(np.full((1, 1, 3), 48, np.uint8)).image.tolist() == [[[96, 96, 96]]]
-
-
-def test_it_prepares_the_image_in_every_variant_and_makes_no_mask():
-    stage = STAGES["exposure"]
-    assert not stage.yields_mask
-    assert not stage.is_filter

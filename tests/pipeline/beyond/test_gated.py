@@ -87,14 +87,6 @@ def test_the_sunlit_level_weighs_pixels_by_how_likely_they_are_road():
     assert look(image, np.full(GRID, 0.9), GatedSettings()).level == 750
 
 
-def test_a_bright_verge_that_is_seldom_road_does_not_set_the_level():
-    image = road()
-    image[40:, :40] = 240
-    place = np.repeat([[0.55] * 4 + [0.95] * 12], GRID[0], axis=0)
-    assert look(image, place, GatedSettings()).level == 360
-    assert look(image, np.full(GRID, 0.9), GatedSettings()).level == 720
-
-
 def test_the_level_of_a_road_mostly_in_the_shade_is_that_of_its_lit_part():
     image = road(ROAD * SHADE, np.s_[40:, :120])
     seen = look(image, BELOW, GatedSettings())

@@ -12,7 +12,6 @@ from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, 
 from roadeval.pipeline.beyond.trees import (
     Blend,
     TreesSettings,
-    balanced_back,
     grow,
     network_weight,
 )
@@ -46,12 +45,6 @@ def test_the_same_seed_trains_the_same_network(network):
     assert (train(*features_and_road(), None, 1, **SMALL).planes != network.planes).any()
 
 
-def test_what_is_beyond_all_that_was_seen_counts_as_the_outermost(network):
-    values = np.array([[50, 1e30], [0, 0], [0, 0], [0, 0]], np.float32)
-    first, second = network.sums(values)
-    assert first == second
-
-
 def test_ranks_are_even_and_codes_hold_the_range(network):
     assert (np.diff(network.ranks) >= 0).all()
     assert np.abs(network.ranks).max() <= 1
@@ -68,15 +61,6 @@ def test_a_feature_that_never_varies_does_no_harm():
     found = train(values, road, None, 0, **SMALL).sums(planes_of(values))
     assert np.isfinite(found).all()
     assert ((found > 0) == road).mean() > 0.9
-
-
-def test_rarer_road_is_less_probable():
-    values, road = features_and_road()
-    few, many = (
-        train(values, road, balanced_back(road, share), 0, **SMALL).sums(planes_of(values))
-        for share in (0.05, 0.95)
-    )
-    assert few.mean() < many.mean() - 1
 
 
 def test_a_blend_is_the_weighted_mean(network):

@@ -10,7 +10,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions, reach
-from roadeval.pipeline.beyond.scene import scene_of, stretched
+from roadeval.pipeline.beyond.scene import scene_of
 from roadeval.pipeline.beyond.trees import (
     ALL,
     NODES,
@@ -100,12 +100,6 @@ def test_the_mask_is_where_road_is_more_probable_than_the_threshold(learnt):
         output = trees.bind(replace(SMALL, threshold=threshold), learnt)(view)
         expected = output.probability > round(threshold * 65535)
         np.testing.assert_array_equal(output.mask.pixels(), expected)
-
-
-def test_classes_weigh_what_the_frames_have_of_them():
-    road = np.array([True, True, False, False])
-    weights = balanced_back(road, 0.25)
-    np.testing.assert_allclose(weights, [0.5, 0.5, 1.5, 1.5])
 
 
 def test_less_road_in_the_frames_makes_road_less_probable(sample):
@@ -212,13 +206,6 @@ def test_groups_must_be_known_and_named_once(names):
         TreesSettings(features=names)
 
 
-def test_the_layers_are_those_that_are_announced(learnt):
-    found = trees.bind(SMALL, learnt)(VIEW).layers
-    assert tuple(layer.spec for layer in found) == trees.layers(SMALL)
-    far = reach(scene_of(VIEW.image, SMALL.width, SMALL.patch))
-    np.testing.assert_allclose(found[0].array, stretched(far, VIEW.image.shape), rtol=1e-6)
-
-
 VIEW = View.of(picture(9)[0])
 WIDE = View.of(picture(9, height=36, width=48)[0])
 """Of another camera than `VIEW`, by its size."""
@@ -292,12 +279,6 @@ def test_adapted_trees_know_what_other_drives_taught():
         for each in (base, adapted)
     ]
     assert right[1] > right[0]
-
-
-def test_what_was_adapted_is_not_adapted_again(sample, learnt):
-    adapted = trees.adapt(learnt, sample, SMALL)
-    with pytest.raises(MisfitError, match="adapted to a drive already"):
-        trees.adapt(adapted, sample, SMALL)
 
 
 def test_parts_that_see_other_features_are_refused(sample, learnt):

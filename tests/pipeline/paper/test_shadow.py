@@ -430,13 +430,6 @@ def test_shadow_edge_and_lit_share_out_the_image(image):
     np.testing.assert_array_equal(layers["rings"], parts[0] + 2 * parts[1])
 
 
-def test_layers_are_the_ones_announced():
-    image = picture("..#", "...")
-    for chosen in (ShadowSettings(), PRINTED):
-        specs = [layer.spec for layer in run(image, chosen)[0].layers]
-        assert tuple(specs) == shadow.STAGE.specs(chosen)
-
-
 def test_an_image_without_shadow_is_handed_on_itself():
     image = np.full((6, 8, 3), 90, np.uint8)
     assert shadow.bind(ShadowSettings(), None)(View.of(image)).image is image

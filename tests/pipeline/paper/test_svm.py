@@ -237,14 +237,6 @@ def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
     assert accuracy["rbf"] > 0.9
 
 
-def test_decision_values_do_not_depend_on_the_block_size(monkeypatch):
-    settings = SvmSettings()
-    machine = svm.fit(sample(), settings)
-    whole = svm.decision(COLOURS[:100], machine, settings)
-    monkeypatch.setattr(svm, "_BLOCK", 1000)
-    np.testing.assert_array_equal(svm.decision(COLOURS[:100], machine, settings), whole)
-
-
 def test_the_mask_is_the_machine_at_every_pixel(case):
     settings, machine, stage, _ = case
     for image in IMAGES.values():

@@ -10,7 +10,7 @@ from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.sections import drive, drives, summary
 from roadeval.results.fleet import FleetFolder
-from tests.report.making import column, opened, plain_rows, reader, text, the
+from tests.report.making import opened, plain_rows, text, the
 from tests.results.fleet import making
 from tests.results.fleet.making import fleet_of
 
@@ -66,33 +66,6 @@ def test_what_failed_was_lost_and_trained_on_itself_is_warned_of(findings):
     assert "10 drives were scored by a model trained on the drive's own frames" in said
 
 
-def test_two_plots_and_the_worst_drives(findings):
-    told = blocks(drives.plots, findings)
-    assert len([block for block in told if isinstance(block, Figure)]) == 2
-    table = the(Table, told)
-    errors = [float(cell.text) for cell in column(table, "ERR")]
-    assert errors == sorted(errors, reverse=True)
-    highest = max(findings.first_scores.values(), key=lambda row: row["ERR"])
-    assert plain_rows(table)[0][0] == findings.names[highest["drive"]]
-    (effect,) = (
-        row["mean"]
-        for row in findings.effects["unfiltered", "filtered"]
-        if row["drive"] == highest["drive"]
-    )
-    assert float(
-        column(table, "against unfiltered")[0].replace("\N{MINUS SIGN}", "-")
-    ) == pytest.approx(100 * effect, abs=0.005)
-    assert column(table, "tags")[0].startswith("weather: ")
-
-
-def test_of_few_drives_there_are_parts_by_tag_alone(findings):
-    filters, blind = tables(drives.strata, findings)
-    assert [row[0] for row in plain_rows(filters) if row[0]] == ["place", "weather"]
-    assert len(filters.rows) == len(blind.rows) == 5
-    notes = [b.text for b in blocks(drives.strata, findings) if isinstance(b, Text)]
-    assert "No part has enough drives" in notes[0]
-
-
 def test_what_is_missing_has_its_reasons(findings):
     failed, unscored, lost = (plain_rows(table) for table in tables(drives.missing, findings))
     assert failed == [["1", "drive_0007", "no image topic; the log has: no topics at all"]]
@@ -105,13 +78,6 @@ def test_what_is_missing_has_its_reasons(findings):
         ("Drives without a score: 1", 2),
         ("Logs of which a part was lost: 1", 2),
     ]
-
-
-def test_reasons_of_many_drives_are_counted(tmp_path):
-    found = FleetFolder(fleet_of(tmp_path / "f", 130, frames=0))
-    failed, *_ = (plain_rows(table) for table in tables(drives.missing, found))
-    assert [row[0] for row in failed] == ["7", "6"]
-    assert failed[0][1] == "drive_0007, drive_0027, drive_0047, drive_0067 and 3 more"
 
 
 def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, findings, tmp_path):
@@ -134,12 +100,6 @@ def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):
     first = path.read_bytes()
     assert "What the filter changes" in text(first)
     assert write_report(folder).read_bytes() == first
-
-
-@pytest.mark.parametrize(("count", "most"), [(0, 1), (1, 3), (130, 6)])
-def test_a_report_of_any_number_of_drives_has_few_pages(tmp_path, count, most):
-    path = write_report(fleet_of(tmp_path / "f", count, frames=0), tmp_path / "r.pdf")
-    assert len(reader(path.read_bytes()).pages) <= most
 
 
 def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path, monkeypatch):

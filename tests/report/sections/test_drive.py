@@ -1,12 +1,9 @@
 """The parts of a drive's report: what each says where numbers lack or cannot be sure."""
 
-import math
-
 import pandas as pd
 import pytest
 
-from roadeval.data.words import DASH
-from roadeval.report.blocks import Figure, Table, Text
+from roadeval.report.blocks import Figure, Text
 from roadeval.report.sections.drive import filter_effect, regions, thresholds
 from tests.evaluation.making import rows_of
 from tests.report.making import (
@@ -14,8 +11,6 @@ from tests.report.making import (
     a_difference,
     by_rate,
     opened,
-    pairs,
-    plain_rows,
     some_findings,
     the,
 )
@@ -28,12 +23,6 @@ def texts(findings):
 def test_where_there_is_no_interval_the_reason_is_given():
     found = some_findings(difference={"post": by_rate(err=a_difference(-0.02))})
     assert any("No interval for ERR: 1200 frames are too few" in text for text in texts(found))
-
-
-def test_where_err_is_undefined_nothing_is_said_about_frames():
-    unknown = {"post": by_rate(err=a_difference(None))}
-    *_, text = texts(some_findings(difference=unknown, filtered=pairs([math.nan], [0])))
-    assert text.startswith("ERR is undefined on every frame")
 
 
 # --- Over thresholds ------------------------------------------------------------------------------
@@ -72,12 +61,6 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
     )
     # Half of the room at least.
     assert (recall.x_range, recall.y_range) == ((50, 101), (50, 101))
-
-
-def test_what_is_undefined_is_a_dash():
-    undefined = dict.fromkeys(("AP", "MaxF", "threshold"))
-    (table,) = (b for b in opened(thresholds(findings(**undefined))) if isinstance(b, Table))
-    assert plain_rows(table)[0].count(DASH) == 3
 
 
 # --- Regions --------------------------------------------------------------------------------------

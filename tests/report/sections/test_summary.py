@@ -29,14 +29,6 @@ def test_undefined_rates_are_told_and_how_often():
     ]
 
 
-def test_three_losses_are_named_and_the_others_counted():
-    findings = some_findings(totals=ALONE, losses=["a", "b", "c", "d", "e"])
-    assert list(warnings(findings)) == [
-        *("Lost: a", "Lost: b", "Lost: c"),
-        "2 more frames were lost; summary.json names them.",
-    ]
-
-
 def test_a_drive_that_trained_itself_says_so():
     own = some_findings(totals=ALONE, training=TrainingFacts("truth"))
     assert [text.partition(" (")[0] for text in warnings(own)] == [

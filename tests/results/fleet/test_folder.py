@@ -84,15 +84,6 @@ def test_a_damaged_table_of_frames_says_what_makes_it_anew(folder):
         FleetFolder(folder).frames(drive)
 
 
-def test_a_footer_that_arrow_does_not_understand_is_damage(folder, monkeypatch):
-    def fail(*_, **__):
-        raise pa.ArrowNotImplementedError("unknown encoding")
-
-    monkeypatch.setattr(parquet.ParquetFile, "read", fail)
-    with pytest.raises(ResultsError, match=r"damaged \(unknown encoding\); run the fleet"):
-        FleetFolder(folder).table("scores")
-
-
 @pytest.mark.parametrize("table", ["drives", "scores", "effects"])
 def test_a_flipped_bit_in_a_table_s_page_is_damage(folder, table):
     path = folder / f"{table}.parquet"
