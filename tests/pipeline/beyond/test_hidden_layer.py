@@ -118,7 +118,7 @@ def test_without_a_feature_that_tells_light_the_weight_is_that_in_the_light():
     ("changed", "why"),
     [
         ({"ranks": np.zeros((4, CODES - 1), np.float32)}, "ranks has the shape"),
-        ({"planes": np.full((32, 4), np.nan, np.float32)}, "not finite"),
+        ({"planes": np.full((32, 4), np.nan, np.float32)}, "holds a number outside"),
         ({"bias": np.zeros(31, np.float32)}, "bias has the shape"),
         ({"shift": np.zeros(2, np.float32)}, "shift has the shape"),
     ],

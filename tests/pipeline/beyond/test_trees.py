@@ -184,7 +184,7 @@ def test_trees_that_hear_nothing_say_so():
         ({"inputs": 90.0}, "inputs is no whole number"),
         ({"kept": np.zeros((20, NODES), np.uint32)}, "rules out a tree's last leaf"),
         ({"kept": np.full((19, NODES), ALL, np.uint32)}, "kept has the shape"),
-        ({"threshold": np.full((20, NODES), np.nan, np.float32)}, "not finite"),
+        ({"threshold": np.full((20, NODES), np.nan, np.float32)}, "holds a number outside"),
         ({"values": np.zeros((20, 31), np.float32)}, "values has the shape"),
         ({"feature": np.zeros((20, NODES), np.int64)}, "instead of int32"),
     ],
