@@ -62,7 +62,7 @@ def test_a_result_that_does_not_know_its_log_is_not_compared():
 
 def test_another_truth_is_told():
     base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
-    found = compare([base, altered(new, N=lambda pixels: pixels - 1)], SETTINGS)
+    found = compare([base, altered(new, TN=lambda pixels: pixels - 1)], SETTINGS)
     assert found.warnings == (
         "the truth differs on 2 frames between base and new (other labels or topics?): part of the "
         "change may be the truth's",
@@ -73,7 +73,7 @@ def test_settings_that_differ_are_named_with_both_values():
     asked = {"frames.scale": 1.0, "svm.c": 1, "labels.road": [], "topics.truth": "/a"}
     other = asked | {"frames.scale": 0.5, "labels.road": [3], "svm.c": 2}
     base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
-    found = compare([base, altered(new, N=lambda pixels: pixels - 1)], SETTINGS)
+    found = compare([base, altered(new, TN=lambda pixels: pixels - 1)], SETTINGS)
     of_the_log = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
     assert found.changed_settings == {"new": of_the_log | {"svm.c": (1, 2)}}
     assert found.warnings == (

@@ -10,6 +10,7 @@ from roadeval.evaluation.comparison import (
     disagreements,
     variants_as_sides,
 )
+from roadeval.evaluation.score import FrameCounts
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_table, compared_drive, rows_of
 
@@ -46,6 +47,12 @@ def pairs(rows):
             for name, column in zip(names, zip(*rows, strict=True), strict=True)
         }
     )
+
+
+def a_mask(frames, seconds):
+    """A mask with these frames, at these times."""
+    stamps = (np.array(seconds) * 1e9).astype(np.int64)
+    return FrameCounts("b", "post", np.array(frames), stamps, np.zeros((len(stamps), 4), int))
 
 
 def a_run(first, second, **more):
@@ -102,7 +109,7 @@ def test_a_region_of_other_pixels_is_left_out():
 
 def test_frames_of_most_disagreement_tell_who_is_right():
     table = pairs([(0, "a", "b", 1, 2, 100), (40, "a", "b", 30, 5, 100), (80, "a", "b", 0, 0, 100)])
-    stamps = Rows({"frame": np.array([0, 40, 80]), "stamp_ns": np.array([0, 4, 8]) * 10**9})
+    stamps = a_mask([0, 40, 80], [0, 4, 8])
     first, second = disagreements(table, stamps, "a", "b")
     assert (first.frame, first.stamp_ns) == (40, 4 * 10**9)
     assert (first.new_right, first.base_right) == (0.30, 0.05)
@@ -113,10 +120,9 @@ def test_frames_of_most_disagreement_tell_who_is_right():
 
 def test_neighbours_disagree_alike_and_only_one_is_named():
     rows = [(frame, "a", "b", 10 + frame, 0, 100) for frame in range(30)]
-    stamps = Rows({"frame": np.arange(30), "stamp_ns": np.arange(30) * 10**9})
+    stamps = a_mask(range(30), range(30))
     table = pairs([*rows, (30, "a", "b", 90, 0, 100)])
-    near = Rows({"frame": np.arange(31), "stamp_ns": np.array([*range(30), 29.5]) * 10**9})
-    near = Rows({name: near[name].astype(np.int64) for name in near.columns})
+    near = a_mask(range(31), [*range(30), 29.5])
     assert next(disagreements(pairs(rows), stamps, "a", "b")).frame == 29
     named = [each.frame for each in disagreements(table, near, "a", "b")]
     assert 30 in named

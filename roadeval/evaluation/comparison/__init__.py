@@ -28,4 +28,5 @@ from roadeval.evaluation.comparison.pairing import (
     matched,
     one_drive,
     region_counts,
+    truth_differs,
 )

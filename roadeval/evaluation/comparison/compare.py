@@ -10,15 +10,14 @@ Where one drive is compared, intervals are those of its frames; where several ar
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
-from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
+from roadeval.data import BASELINE, OUTCOMES, UNFILTERED, Counts
 from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics
@@ -36,10 +35,20 @@ from roadeval.evaluation.comparison.pairing import (
     match_drives,
     moved_frames,
     region_counts,
+    truth_differs,
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import TESTED, FourCounts, Name, counts_of, means, stages_of
+from roadeval.evaluation.score import (
+    TESTED,
+    FrameCounts,
+    Name,
+    Total,
+    final_stages,
+    means,
+    sum_up,
+    within,
+)
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
     CameraRates,
@@ -49,7 +58,6 @@ from roadeval.evaluation.stats import (
     group_means,
     holm,
     over_drives,
-    within_drive,
 )
 
 FALSE: Final = 0.05
@@ -218,28 +226,25 @@ def compare(
         if not side.scored:
             raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
     base, *others = sides
-    if across_variants:
-        matches: list[tuple[list[Pair], list[str]]] = [
-            ([(part, part) for part in base.scored], []) for _ in others
-        ]
-    else:
-        matches = [match_drives(base, new) for new in others]
-    for new, (pairs, _) in zip(others, matches, strict=True):
-        if not pairs:
+    found = []
+    for new in others:
+        own = base
+        if across_variants:
+            match: Match = [(part, part) for part in base.scored], []
+            own = replace(base, variants={base.label: new.label})
+        else:
+            match = match_drives(base, new)
+        if not match[0]:
             raise ComparisonError(_apart(base, new))
-    found = [
-        _Against(base, new, *match, settings, across=across_variants)
-        for new, match in zip(others, matches, strict=True)
-    ]
-    frames = [found[0].base_frames, *(each.new_frames for each in found)]
-    changes = [change for each in found for change in each.changes()]
+        found.append(_Against(own, new, match, settings, across=across_variants))
+    frames = [found[0].frames[0], *(each.frames[1] for each in found)]
     regions = [row for each in found for row in each.regions()]
     corrected = holm([row.difference for row in regions])
     return Comparison(
         results=tuple(_result(*each) for each in zip(sides, frames, strict=True)),
         changed_settings={each.label: each.changed for each in found if each.changed},
-        changes=tuple(_corrected(changes)),
-        levels=tuple(row for each in found for row in _changes(each.label, each.levels)),
+        changes=tuple(_corrected([row for each in found for row in each.changes(each.masks)])),
+        levels=tuple(row for each in found for row in each.changes(each.levels)),
         drives=tuple(row for each in found for row in each.drives()),
         regions=tuple(replace(r, difference=d) for r, d in zip(regions, corrected, strict=True)),
         moved=tuple(frame for each in found for frame in each.moved),
@@ -285,129 +290,69 @@ def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Sum:
-    """A mask's frames on one drive, summed up."""
-
-    means: Mapping[str, float]
-    counts: FourCounts
-    """``(4,)``."""
-
-    @classmethod
-    def of(cls, counts: FourCounts) -> _Sum:
-        return cls(means(metrics.table(counts)), counts.sum(axis=0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _OnDrive:
     """A mask, or a region of it, on one drive."""
 
     part: Part
     group: str
-    frames: int
-    new: _Sum
-    base: _Sum | None = None
+    final: bool
+    new: Total
+    base: Total | None = None
     """None where nothing is subtracted, and there are no differences."""
-    means: Mapping[str, float] = field(default_factory=dict)
-    """Of the frames' differences, by rate."""
-    series: CameraRates | None = None
+    change: Mapping[str, float] = field(default_factory=dict)
+    """The means of the frames' differences, by rate."""
+    rates: CameraRates | None = None
     """Of the one drive: the frames' rates, ``(n, m)`` each."""
     within: Difference | None = None
     """Of a final mask on one of several drives: what changed in `TESTED`."""
-    final: bool = True
-
-    def mean(self, means: Mapping[str, float], rate: str) -> DriveMean:
-        """Return one of its means as a drive of its group."""
-        return DriveMean(self.part.drive, self.group, means[rate])
-
-
-def _within(own: Sequence[_OnDrive], rate: str, settings: EvaluationSettings) -> Difference:
-    """Return the difference of a rate within a drive, by its cameras."""
-    place = [*METRICS].index(rate)
-    columns = [
-        CameraRates(each.series.stamps, each.series.rates[:, place], each.series.base[:, place])
-        for each in own
-        if each.series
-    ]
-    return within_drive(columns, settings, higher_is_better=METRICS[rate].higher_is_better)
 
 
 _Masks = defaultdict[Name, list[_OnDrive]]
 """Drives by variant and stage, or region."""
+Match = tuple[list[Pair], list[str]]
+"""As of `match_drives`."""
 
 
-def _add_levels(masks: _Masks, part: Part, group: str, rows: Rows) -> int:
-    """Add a result's own rates on a drive; return how many frames it has."""
-    last = stages_of(rows)
-    for variant, stage, places in rows.masks():
-        own, final = counts_of(rows.take(places)), stage == last[variant]
-        drive = _OnDrive(part, group, len(own), _Sum.of(own), final=final)
-        masks[variant, stage].append(drive)
-    return len(np.unique(rows["frame"]))
+def _drive_means(
+    own: Sequence[_OnDrive], means: Iterable[Mapping[str, Any]], rate: str
+) -> list[DriveMean]:
+    pairs = zip(own, means, strict=True)
+    return [DriveMean(each.part.drive, each.group, known[rate]) for each, known in pairs]
 
 
-def _mean(own: Sequence[_OnDrive], sums: Sequence[_Sum], rate: str) -> float:
+def _mean(own: Sequence[_OnDrive], totals: Sequence[Total], rate: str) -> float:
     """Average drives as their differences are, so that these lie between two rates."""
-    drives = [each.mean(known.means, rate) for each, known in zip(own, sums, strict=True)]
-    known = group_means(drives)
+    known = group_means(_drive_means(own, totals, rate))
     return float(known.mean()) if len(known) else np.nan
 
 
-def _rates(own: Sequence[_OnDrive], sums: Sequence[_Sum]) -> dict[str, float]:
+def _over(own: Sequence[_OnDrive], totals: Sequence[Total]) -> dict[str, float]:
     """Return the means over drives, and the rates of all their pixels together."""
-    if not sums:
+    if not totals:
         return {}
-    total = Counts(*np.sum([each.counts for each in sums], axis=0).tolist())
-    pooled = {f"pooled_{name}": value for name, value in metrics.of(total).items()}
-    return {name: _mean(own, sums, name) for name in METRICS} | pooled | metrics.overlap(total)
-
-
-def _changes(
-    label: str,
-    masks: _Masks,
-    differences: Callable[[list[_OnDrive]], Mapping[str, Difference]] = lambda _: {},
-) -> Iterator[Change]:
-    """Yield a row a mask."""
-    for mask, own in masks.items():
-        yield Change(
-            result=label,
-            variant=mask[0],
-            stage=mask[1],
-            final=all(each.final for each in own),
-            drives=len(own),
-            frames=sum(each.frames for each in own),
-            base=_rates(own, [each.base for each in own if each.base]),
-            new=_rates(own, [each.new for each in own]),
-            difference=differences(own),
-        )
+    counts = np.array([sum(each[name] for each in totals) for name in OUTCOMES])
+    rates = {name: _mean(own, totals, name) for name in METRICS}
+    return rates | metrics.pooled(counts) | metrics.overlap(Counts(*counts.tolist()))
 
 
 class _Against:
     """A new result against the base, on the frames that both evaluated."""
 
     def __init__(
-        self,
-        base: Side,
-        new: Side,
-        pairs: Sequence[Pair],
-        left_out: Sequence[str],
-        settings: EvaluationSettings,
-        *,
-        across: bool,
+        self, base: Side, new: Side, match: Match, settings: EvaluationSettings, *, across: bool
     ) -> None:
+        pairs, self._left_out = match
         self.label: Final = new.label
         self._base, self._new, self._settings, self._across = base, new, settings, across
         self._several: Final = len({new.drive for _, new in pairs}) > 1
         self._alone: Final = len(pairs) == 1
         """Whether it is one camera of one drive, whose frames have numbers of their own."""
-        self._left_out: Final = left_out
         self.changed: Final = _changed_settings(pairs)
-        self.base_frames = self.new_frames = 0
-        self._lost = [0, 0]
+        self.frames, self._lost = [0, 0], [0, 0]
+        """Of the base and of the new result: evaluated frames, and those that the other lacks."""
         self._relabelled = 0
         self._apart: Final[list[str]] = []
-        self.levels: Final = _Masks(list)
-        self._masks: Final = _Masks(list)
-        self._regions: Final = _Masks(list)
+        self.levels, self.masks, self._regions = _Masks(list), _Masks(list), _Masks(list)
         self._known: Final[dict[str, None]] = {}  # the regions of all drives
         self.moved: list[MovedFrame] = []
         self.disagreements: list[Disagreement] = []
@@ -416,116 +361,119 @@ class _Against:
             firsts.setdefault(part.digest, part.drive)
         before = {id(own): other for other, own in pairs}
         for part in new.scored:
-            rows = new.rows(part, "frames")
-            other = before.get(id(part))
+            masks, other = new.masks(part), before.get(id(part))
             # Copies of a log count as one drive.
             group = part.group or (other and other.group) or firsts[part.digest]
-            self.new_frames += _add_levels(self.levels, part, group, rows)
+            last = final_stages(mask.name for mask in masks)
+            for mask in masks:
+                final = mask.stage == last[mask.variant]
+                self.levels[mask.name].append(_OnDrive(part, group, final, sum_up(mask.counts)))
+            self.frames[1] += _frames(masks)
             if other is not None:
-                self._add(other, part, group, base.rows(other, "frames"), rows)
-        if not self._masks:
+                self._add(other, part, group, masks)
+        if not self.masks:
             raise ComparisonError(
                 f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
                 "nothing can be compared; replay the same range into both"
             )
 
-    def _add(self, base: Part, new: Part, group: str, before: Rows, after: Rows) -> None:
+    def _add(self, base: Part, new: Part, group: str, after: Sequence[FrameCounts]) -> None:
         """Add a drive that both have."""
-        masks = common_masks(before, after, self.label if self._across else None)
-        self.base_frames += len(np.unique(before["frame"]))
-        if not masks:
+        before = self._base.masks(base)
+        self.frames[0] += _frames(before)
+        pairs = common_masks(before, after)
+        if not pairs:
             self._apart.append(new.name)
             return
-        common = [mask.before["frame"] for mask in masks], [mask.after["frame"] for mask in masks]
-        for place, (rows, own) in enumerate(zip((before, after), common, strict=True)):
-            self._lost[place] += len(np.unique(rows["frame"])) - len(np.unique(np.concatenate(own)))
-        differing = [mask.before["frame"][mask.truth_differs] for mask in masks]
-        self._relabelled += len(np.unique(np.concatenate(differing)))
-        for mask in masks:
-            chosen = mask.final and mask.variant != BASELINE
-            stamps = mask.after["stamp_ns"]
-            made = self._on_drive(new, group, mask.counts, stamps, tested=chosen)
-            self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
-            if chosen:
-                regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
-                self._add_regions(new, group, mask, *regions)
+        self._lost[0] += _frames(before) - _frames([pair.base for pair in pairs])
+        self._lost[1] += _frames(after) - _frames([pair.new for pair in pairs])
+        relabelled = [
+            pair.base.frames[truth_differs(pair.base.counts, pair.new.counts)] for pair in pairs
+        ]
+        self._relabelled += len(np.unique(np.concatenate(relabelled)))
+        for pair in pairs:
+            tested = pair.final and pair.new.variant != BASELINE
+            self.masks[pair.new.name].append(self._on_drive(new, group, pair, tested=tested))
+            if tested:
+                self._add_regions(base, new, group, pair)
         if self._alone:
-            first = next((mask for mask in masks if mask.final), masks[-1])
-            self.moved = list(moved_frames(self.label, first))
+            first = next((pair for pair in pairs if pair.final), pairs[-1])
+            self.moved = [*moved_frames(self.label, first)]
             if self._across:
-                table, names = new.rows("disagreements"), (self._base.label, self.label)
-                self.disagreements = list(disagreements(table, masks[0].after, *names))
+                names = self._base.label, self.label
+                table = new.rows("disagreements")
+                self.disagreements = [*disagreements(table, pairs[0].new, *names)]
 
-    def _on_drive(
-        self,
-        part: Part,
-        group: str,
-        counts: tuple[FourCounts, ...],
-        stamps: npt.NDArray[np.int64],
-        *,
-        tested: bool,
-    ) -> _OnDrive:
-        before, after = (metrics.table(each) for each in counts)
-        base, new = map(_Sum.of, counts)
-        made = _OnDrive(part, group, len(before), new, base, means(after - before))
-        whole = replace(made, series=CameraRates(stamps, after, before))
+    def _on_drive(self, part: Part, group: str, pair: MaskPair, *, tested: bool) -> _OnDrive:
+        rates, sums = pair.rates, (sum_up(pair.new.counts), sum_up(pair.base.counts))
+        made = _OnDrive(part, group, pair.final, *sums, means(rates.rates - rates.base))
         if not self._several:
-            return whole
-        return replace(made, within=_within([whole], TESTED, self._settings) if tested else None)
+            return replace(made, rates=rates)
+        return replace(made, within=within([rates], TESTED, self._settings) if tested else None)
 
-    def _add_regions(self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows) -> None:
+    def _add_regions(self, base: Part, new: Part, group: str, pair: MaskPair) -> None:
         """Add what changed by region in a final mask that looks at the image."""
-        called = self._base.label if self._across else mask.variant
-        before = region_counts(base, called, mask.base_stage, mask.before)
-        after = region_counts(new, mask.variant, mask.stage, mask.after)
+        before = region_counts(self._base.rows(base, "regions"), pair.base)
+        after = region_counts(self._new.rows(new, "regions"), pair.new)
         self._known.update(dict.fromkeys(before))
         for region, known in common_regions(before, after):
-            counts, stamps = (own[region][known] for own in (before, after)), mask.after["stamp_ns"]
-            made = self._on_drive(part, group, tuple(counts), stamps[known], tested=True)
-            self._regions[mask.variant, region].append(made)
+            own, other = (
+                mask._replace(counts=counts[region]).take(np.flatnonzero(known))
+                for mask, counts in ((pair.base, before), (pair.new, after))
+            )
+            made = self._on_drive(new, group, MaskPair(own, other, True), tested=True)
+            self._regions[pair.new.variant, region].append(made)
 
     def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
         """Return the difference within the one drive, or over several."""
         if not self._several:
-            return _within(own, rate, self._settings)
-        drives = [each.mean(each.means, rate) for each in own]
+            return within([each.rates for each in own if each.rates], rate, self._settings)
+        drives = _drive_means(own, (each.change for each in own), rate)
         better = METRICS[rate].higher_is_better
         return over_drives(drives, self._settings.confidence, higher_is_better=better)
 
-    def changes(self) -> Iterator[Change]:
-        """Yield a row for each mask that both have."""
-        return _changes(
-            self.label,
-            self._masks,
-            lambda own: {rate: self._difference(own, rate) for rate in COMPARED},
-        )
+    def changes(self, masks: _Masks) -> Iterator[Change]:
+        """Yield a row for each mask; where the base has none of it, its rates alone."""
+        for (variant, stage), own in masks.items():
+            base = [each.base for each in own if each.base]
+            yield Change(
+                result=self.label,
+                variant=variant,
+                stage=stage,
+                final=all(each.final for each in own),
+                drives=len(own),
+                frames=sum(each.new["frames"] for each in own),
+                base=_over(own, base),
+                new=_over(own, [each.new for each in own]),
+                difference={rate: self._difference(own, rate) for rate in COMPARED if base},
+            )
 
     def regions(self) -> Iterator[RegionChange]:
         """Yield what changed by region."""
-        named, variants = titles([*self._known]), dict.fromkeys(each for each, _ in self._regions)
+        named = titles([*self._known])
+        variants = dict.fromkeys(variant for variant, _ in self._regions)
         for variant, (region, title) in product(variants, named.items()):
-            if not (own := self._regions.get((variant, region))):
-                continue
-            yield RegionChange(
-                result=self.label,
-                variant=variant,
-                region=region,
-                title=title,
-                frames=sum(each.frames for each in own),
-                base=_mean(own, [each.base for each in own if each.base], TESTED),
-                new=_mean(own, [each.new for each in own], TESTED),
-                difference=self._difference(own, TESTED),
-            )
+            if own := self._regions.get((variant, region)):
+                yield RegionChange(
+                    result=self.label,
+                    variant=variant,
+                    region=region,
+                    title=title,
+                    frames=sum(each.new["frames"] for each in own),
+                    base=_mean(own, [each.base for each in own if each.base], TESTED),
+                    new=_mean(own, [each.new for each in own], TESTED),
+                    difference=self._difference(own, TESTED),
+                )
 
     def drives(self) -> Iterator[DriveChange]:
         """Yield each of several drives' changes of final masks, the surest first."""
-        for (variant, stage), tested in self._masks.items() if self._several else ():
+        for (variant, stage), tested in self.masks.items() if self._several else ():
             own = [(e, e.base, e.within) for e in tested if e.base and e.within]
             values = benjamini_hochberg([within.p for _, _, within in own])
             rows = [
                 DriveChange(
-                    *(self.label, variant, stage, each.part.name, each.frames),
-                    *(base.means[TESTED], each.new.means[TESTED], within, q),
+                    *(self.label, variant, stage, each.part.name, each.new["frames"]),
+                    *(base[TESTED], each.new[TESTED], within, q),
                 )
                 for (each, base, within), q in zip(own, values, strict=True)
             ]
@@ -565,6 +513,11 @@ class _Against:
                 f"the truth differs on {self._relabelled} frames between {base} and {new}{guess}: "
                 "part of the change may be the truth's"
             )
+
+
+def _frames(masks: Sequence[FrameCounts]) -> int:
+    """Return on how many frames there is any of some masks."""
+    return len({frame for mask in masks for frame in mask.frames.tolist()})
 
 
 def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:

@@ -5,20 +5,28 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rows
 from roadeval.data.words import first_of
-from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import TESTED, FourCounts, counts_of, most_changed, stages_of
+from roadeval.evaluation.score import (
+    TESTED,
+    Camera,
+    FourCounts,
+    FrameCounts,
+    camera_masks,
+    counts_of,
+    final_stages,
+    most_changed,
+)
+from roadeval.evaluation.stats import CameraRates
 
 Places = npt.NDArray[np.intp]
-Rates = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +78,10 @@ class Side:
         own = rows.take(np.isin(rows["variant"], [*self.variants]))
         names = [self.variants[name] for name in own["variant"].tolist()]
         return own.replace(variant=np.array(names, str))
+
+    def masks(self, part: Part) -> Camera:
+        """Return the counts of a part's masks, under the names of the comparison."""
+        return camera_masks(self.rows(part, "frames"))
 
     def own_name(self, variant: str) -> str:
         """Return what the result itself calls a variant."""
@@ -146,60 +158,46 @@ def _why_not(base: Part, new: Part | None, label: str) -> str:
     return "" if base.digest == new.digest else f"of another log in {label}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MaskPair:
-    """A mask's rows in two results of a drive: frames that both have, in the base's order."""
+class MaskPair(NamedTuple):
+    """A mask in two results of a drive: the frames that both have, in the base's order."""
 
-    variant: str
-    stage: str
-    """What the new result calls the mask."""
-    base_stage: str
+    base: FrameCounts
+    new: FrameCounts
     final: bool
-    """Whether both are the variant's final masks."""
-    before: Rows
-    after: Rows
+    """Whether both are their variants' final masks."""
 
     @property
-    def counts(self) -> tuple[FourCounts, FourCounts]:
-        """``(n, 4)`` each: TP, TN, FP, FN of the base and of the new result."""
-        return counts_of(self.before), counts_of(self.after)
-
-    @property
-    def rates(self) -> tuple[Rates, Rates]:
+    def rates(self) -> CameraRates:
         """``(n, m)`` each, in the order of `roadeval.evaluation.metrics.METRICS`."""
-        before, after = self.counts
-        return metrics.table(before), metrics.table(after)
-
-    @property
-    def truth_differs(self) -> npt.NDArray[np.bool_]:
-        """Where the truth's road or labelled pixels differ, ``(n,)``."""
-        before, after = self.before, self.after
-        road = before["TP"] + before["FN"] != after["TP"] + after["FN"]
-        return np.asarray(road | (before["N"] != after["N"]))
+        return CameraRates(self.new.stamps, self.new.rates, self.base.rates)
 
 
-def common_masks(base: Rows, new: Rows, variant: str | None = None) -> list[MaskPair]:
+def common_masks(base: Camera, new: Camera) -> list[MaskPair]:
     """Match the masks of two results of a drive, and their frames by stamp; in the base's order.
 
     Final masks are matched with final masks, under any stage's name, others by their stage.
-    With ``variant`` the base's masks are taken for this variant's.
     """
-    last, last_new = stages_of(base), stages_of(new)
-    others = {(name, stage): places for name, stage, places in new.masks()}
-    found = []
-    for name, stage, places in base.masks():
-        called, final = variant or name, stage == last[name]
-        theirs = last_new.get(called) if final else stage
-        if theirs is None or (called, theirs) not in others:
+    last, last_new = (final_stages(mask.name for mask in each) for each in (base, new))
+    others, found = {mask.name: mask for mask in new}, []
+    for own in base:
+        final = own.stage == last[own.variant]
+        stage = last_new.get(own.variant, "") if final else own.stage
+        other = others.get((own.variant, stage))
+        if other is None or (not final and stage == last_new[own.variant]):
             continue
-        if not final and theirs == last_new[called]:
-            continue
-        own, new_own = base.take(places), new.take(others[called, theirs])
-        mine, matching = matched(own["stamp_ns"], new_own["stamp_ns"])
+        mine, theirs = matched(own.stamps, other.stamps)
         if len(mine):
-            rows = own.take(mine), new_own.take(matching)
-            found.append(MaskPair(called, theirs, stage, final, *rows))
+            found.append(MaskPair(own.take(mine), other.take(theirs), final))
     return found
+
+
+_LABELS: Final = np.array([[1, 1], [1, 0], [1, 0], [1, 1]])
+"""Makes labelled pixels and road of TP, TN, FP and FN."""
+
+
+def truth_differs(base: FourCounts, new: FourCounts) -> npt.NDArray[np.bool_]:
+    """Return on which frames the truth's road or labelled pixels differ, ``(n,)``."""
+    return np.asarray((base @ _LABELS != new @ _LABELS).any(axis=1))
 
 
 def matched(base: npt.NDArray[np.int64], new: npt.NDArray[np.int64]) -> tuple[Places, Places]:
@@ -246,26 +244,26 @@ class Disagreement:
 
 def moved_frames(result: str, mask: MaskPair) -> Iterator[MovedFrame]:
     """Yield the frames whose ERR changed most."""
-    place = list(METRICS).index(TESTED)
-    before, after = (rates[:, place] for rates in mask.rates)
-    stamps, changes = mask.after["stamp_ns"], after - before
+    place, own = [*METRICS].index(TESTED), mask.new
+    before = mask.base.rates[:, place]
+    changes = own.rates[:, place] - before
     for harmed in (True, False):
-        for frame in most_changed(stamps, changes, NAMED, harmed=harmed).tolist():
+        for frame in most_changed(own.stamps, changes, NAMED, harmed=harmed).tolist():
             was, change = float(before[frame]), float(changes[frame])
-            number, stamp = int(mask.after["frame"][frame]), int(stamps[frame])
-            yield MovedFrame(result, mask.variant, number, stamp, was, was + change, change)
+            number, stamp = int(own.frames[frame]), int(own.stamps[frame])
+            yield MovedFrame(result, own.variant, number, stamp, was, was + change, change)
 
 
-def disagreements(table: Rows, frames: Rows, base: str, new: str) -> Iterator[Disagreement]:
+def disagreements(table: Rows, mask: FrameCounts, base: str, new: str) -> Iterator[Disagreement]:
     """Yield the frames on which two variants of a run disagree most; of neighbours only one.
 
-    ``table`` has the rows of ``disagreements``, ``frames`` rows with the frames' stamps.
+    ``table`` has the rows of ``disagreements``; only the frames of ``mask`` are looked at.
     """
     pairs = ((base, new, "repaired", "spoiled"), (new, base, "spoiled", "repaired"))
-    stamps = dict(zip(frames["frame"].tolist(), frames["stamp_ns"].tolist(), strict=True))
+    stamps = dict(zip(mask.frames.tolist(), mask.stamps.tolist(), strict=True))
     for one, other, new_right, base_right in pairs:
         own = table.take((table["from_variant"] == one) & (table["to_variant"] == other))
-        own = own.take(np.isin(own["frame"], [*stamps]) & (own["N"] > 0))
+        own = own.take(np.isin(own["frame"], mask.frames) & (own["N"] > 0))
         mine, theirs = own[new_right] / own["N"], own[base_right] / own["N"]
         times = np.array([stamps[number] for number in own["frame"].tolist()], np.int64)
         for place in most_changed(times, mine + theirs, NAMED, harmed=True).tolist():
@@ -273,20 +271,19 @@ def disagreements(table: Rows, frames: Rows, base: str, new: str) -> Iterator[Di
             yield Disagreement(new, new, frame, int(times[place]), *right)
 
 
-def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict[str, FourCounts]:
+def region_counts(regions: Rows, mask: FrameCounts) -> dict[str, FourCounts]:
     """Return a mask's counts by region, ``(n, 4)`` each; 0 on a frame that the table lacks.
 
-    ``regions`` has the rows of ``regions``, ``frames`` the mask's rows of ``frames``, in any order.
+    ``regions`` has the rows of ``regions``; the frames are those of the mask, in any order.
     """
-    numbers = frames["frame"]
-    own = regions.take((regions["variant"] == variant) & (regions["stage"] == stage))
-    own = own.take(np.isin(own["frame"], numbers))
-    order = np.argsort(numbers)
-    found = {}
+    own = regions.take((regions["variant"] == mask.variant) & (regions["stage"] == mask.stage))
+    own = own.take(np.isin(own["frame"], mask.frames))
+    order, found = np.argsort(mask.frames), {}
     for name in own.distinct("region"):
         rows = own.take(own["region"] == name)
-        found[name] = np.zeros((len(numbers), 4), np.int64)
-        found[name][order[np.searchsorted(numbers[order], rows["frame"])]] = counts_of(rows)
+        places = order[np.searchsorted(mask.frames, rows["frame"], sorter=order)]
+        found[name] = np.zeros((len(order), 4), np.int64)
+        found[name][places] = counts_of(rows)
     return found
 
 
@@ -296,15 +293,9 @@ def common_regions(
     """Yield the regions that are the same pixels in both, with the frames that label any, ``(n,)``.
 
     Any other, as the shadow that another filter found, is left out: its ERR would describe other
-    places.
+    places. They may be the same where each frame has as many, and as much road.
     """
     for name in titles([*base]):
         known = np.asarray(base[name].any(axis=1))
-        if name in new and known.any() and _same_pixels(base[name], new[name]):
+        if name in new and known.any() and not truth_differs(base[name], new[name]).any():
             yield name, known
-
-
-def _same_pixels(base: FourCounts, new: FourCounts) -> bool:
-    """Whether two regions may be the same pixels: of each frame as many, and as much road."""
-    same = np.array_equal(base.sum(axis=1), new.sum(axis=1))
-    return same and np.array_equal(base[:, [0, 3]].sum(axis=1), new[:, [0, 3]].sum(axis=1))

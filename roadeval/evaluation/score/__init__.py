@@ -7,6 +7,7 @@ from roadeval.evaluation.score.counts import (
     FrameCounts,
     GrowingCounts,
     Name,
+    Total,
     boundary_f,
     count,
     edge_of,

@@ -95,6 +95,11 @@ class FrameCounts(NamedTuple):
         """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
         return metrics.table(self.counts)
 
+    def take(self, places: npt.NDArray[np.intp]) -> FrameCounts:
+        """Return it on the frames at some places."""
+        arrays = (each[places] for each in (self.frames, self.stamps, self.counts))
+        return FrameCounts(self.variant, self.stage, *arrays)
+
     def paired(self, base: FrameCounts) -> CameraRates:
         """Return the rates of this mask and of the base on the frames that both have."""
         _, mine, theirs = np.intersect1d(self.frames, base.frames, return_indices=True)
