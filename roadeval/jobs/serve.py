@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from datetime import datetime
-from functools import cached_property
+from functools import cached_property, partial
 from http import HTTPStatus
 from pathlib import Path
 from threading import Lock
@@ -16,7 +16,7 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs.results.frames import FramePicker, browsed
 from roadeval.jobs.results.inspect import WorstFrame, recording_of, worst_frames
 from roadeval.jobs.results.report import PICTURED_OF_FLEET, findings_of
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import Result
 from roadeval.recording.viewer import WindowViewer
 from roadeval.report.blocks import Cell, Document, Heading, Table
 from roadeval.report.document import page_document
@@ -46,54 +46,57 @@ def serving(results: Paths) -> Iterator[LocalServer]:
         stack.callback(viewer.close)
         whole = [Result(path) for path in listed(results)]
         opened = [own for each in whole for own in (each, *each.cameras.values())]
-        server = LocalServer(_Site([_served(each, viewer) for each in opened]).answer)
+        server = LocalServer(partial(_answer, [_Served(each, viewer) for each in opened]))
         stack.callback(server.server_close)
         yield server
 
 
-class _Site:
-    """Finds what answers a request: the list of results, or one of them."""
+def _answer(served: Sequence[_Served], request: Request) -> Response:
+    """Return the list of results, or what lies below one; a problem of a result as its sentence."""
+    try:
+        match request.parts:
+            case () if not request.acts:
+                return _home(served)
+            case (place, *rest) if place.isdecimal() and int(place) < len(served):
+                return _below(served[int(place)], request, rest)
+        return NOT_FOUND
+    except RoadevalError as error:
+        # The viewer cannot show it: that is no fault of the server.
+        failed = HTTPStatus.CONFLICT if request.acts else HTTPStatus.INTERNAL_SERVER_ERROR
+        return told(failed, str(error))
 
-    def __init__(self, served: list[_Served]) -> None:
-        self._served: Final = served
 
-    def answer(self, request: Request) -> Response:
-        """Return what is asked for; a problem of a result as its sentence."""
-        try:
-            match request.parts:
-                case () if not request.acts:
-                    return self._home()
-                case (place, *rest) if place.isdecimal() and int(place) < len(self._served):
-                    return _below(self._served[int(place)], request, rest)
-            return NOT_FOUND
-        except RoadevalError as error:
-            # The viewer cannot show it: that is no fault of the server.
-            failed = HTTPStatus.CONFLICT if request.acts else HTTPStatus.INTERNAL_SERVER_ERROR
-            return told(failed, str(error))
-
-    def _home(self) -> Response:
-        if len(self._served) == 1:
-            return _moved("0/")
-        rows: list[list[Cell | str]] = [
-            [Cell(each.title, leads=f"{place}/"), each.headline, each.written, str(each.path)]
-            for place, each in enumerate(self._served)
-        ]
-        table = Table(["result", "what it says first", "written", "file"], rows, range(4))
-        made = Document(
-            "roadeval", "Results", f"{len(rows)} results", "", [Heading("Results"), table]
-        )
-        return _page(made, Place(frames=""))
+def _home(served: Sequence[_Served]) -> Response:
+    if len(served) == 1:
+        return _moved("0/")
+    rows: list[list[Cell | str]] = [
+        [Cell(each.title, leads=f"{place}/"), each.headline, each.written, str(each.path)]
+        for place, each in enumerate(served)
+    ]
+    table = Table(["result", "what it says first", "written", "file"], rows, range(4))
+    made = Document("roadeval", "Results", f"{len(rows)} results", "", [Heading("Results"), table])
+    return _page(made, Place(frames=""))
 
 
 class _Served:
-    """The page of a result: of a rig, or what that of a drive and of a fleet begin with."""
+    """The page of a result, and what lies below it: frames of a drive, drives of a fleet.
 
-    def __init__(self, result: Result, place: Place) -> None:
+    ``above`` is the address and the title of the page above.
+    """
+
+    def __init__(
+        self, result: Result, viewer: WindowViewer, above: tuple[str, str] = ("../", "All results")
+    ) -> None:
         (self.path,) = result.paths
-        self.title: Final = result.drive.title if result.drive else result.name
+        drive, fleet = result.drive, result.fleet
+        self.title: Final = drive.title if drive else result.name
         self._result: Final = result
+        self._viewer: Final = viewer
         self._lock: Final = Lock()
-        self._place: Final = place
+        self._place: Final = Place(None if result.rig else "frame/{}", *above)
+        self._frames: Final = {str(number): number for number in (drive.pictured if drive else ())}
+        self._drives: Final = {str(n): name for n, name in enumerate(fleet.drives if fleet else ())}
+        self._opened: Final[dict[Path, _Served]] = {}
 
     @property
     def headline(self) -> str:
@@ -106,8 +109,35 @@ class _Served:
         return f"{datetime.fromtimestamp(self.path.stat().st_mtime):%Y-%m-%d %H:%M}"
 
     def answer(self, request: Request) -> Response:
-        """Return what is asked for below its address."""
-        return NOT_FOUND if request.parts or request.acts else self._own_page
+        """Return its page, a frame's pictures, a drive's page, or that the viewer shows a frame."""
+        fleet = self._result.fleet
+        match request.parts, request.acts:
+            case (), False:
+                return self._own_page
+            case ("frame", number, *rest), acts if number in self._frames:
+                return self._frame(self._frames[number], rest, acts=acts)
+            case ("worst", rank, "view"), True if fleet and rank in self._worst:
+                frame = self._worst[rank]
+                return self._shown(recording_of(fleet, frame.drive), frame.frame)
+            case ("drive", place, *rest), _ if fleet and place in self._drives:
+                return _below(self._of(fleet, self._drives[place]), request, rest)
+        return NOT_FOUND
+
+    def _frame(self, frame: int, rest: list[str], *, acts: bool) -> Response:
+        match rest, acts:
+            case ["part"], False:
+                with self._lock:
+                    strip = self._picker.strip(frame, LARGE)
+                return Response(part(strip, self._place), PAGE)
+            case [], False:
+                return _moved(f"../#frame-{frame}")
+            case ["view"], True:
+                return self._shown(self.path, frame)
+        return NOT_FOUND
+
+    def _shown(self, recording: Path, frame: int) -> Response:
+        self._viewer.show(recording, frame)
+        return Response(b"")
 
     @cached_property
     def _own_page(self) -> Response:
@@ -117,97 +147,30 @@ class _Served:
             made = page_document(findings_of(self._result), frames, PICTURED_OF_FLEET)
         return _page(made, self._place)
 
-
-class _ServedDrive(_Served):
-    """A drive, and every frame that has pictures.
-
-    ``above`` is the address and the title of the page above.
-    """
-
-    def __init__(
-        self,
-        result: Result,
-        drive: DriveResult,
-        viewer: WindowViewer,
-        above: tuple[str, str] = ("../", "All results"),
-    ) -> None:
-        super().__init__(result, Place("frame/{}", *above))
-        self._viewer: Final = viewer
-        self._picker: Final = FramePicker(drive, None, None)
-        self._frames: Final = frozenset(drive.pictured)
-
-    def answer(self, request: Request) -> Response:
-        """Return its page, the pictures of a frame, or that the viewer shows one."""
-        match request.parts:
-            case ("frame", number, *rest) if number.isdecimal() and int(number) in self._frames:
-                return self._frame(int(number), rest, request)
-        return super().answer(request)
-
-    def _frame(self, frame: int, rest: list[str], request: Request) -> Response:
-        match rest, request.acts:
-            case ["part"], False:
-                with self._lock:
-                    strip = self._picker.strip(frame, LARGE)
-                return Response(part(strip, self._place), PAGE)
-            case [], False:
-                return _moved(f"../#frame-{frame}")
-            case ["view"], True:
-                self._viewer.show(self.path, frame)
-                return Response(b"")
-        return NOT_FOUND
-
-
-class _ServedFleet(_Served):
-    """A fleet, the pages of its drives, and its worst frames in the viewer."""
-
-    def __init__(self, result: Result, fleet: FleetFolder, viewer: WindowViewer) -> None:
-        super().__init__(result, Place("frame/{}", "../"))
-        self._viewer: Final = viewer
-        self._fleet: Final = fleet
-        self._drives: Final[dict[Path, _ServedDrive]] = {}
-
-    def answer(self, request: Request) -> Response:
-        """Return its page, that of a drive, or that the viewer shows one of the worst frames."""
-        match request.parts:
-            case ("worst", rank, "view") if request.acts and rank.isdecimal():
-                if (frame := self._worst.get(int(rank))) is None:
-                    return NOT_FOUND
-                self._viewer.show(recording_of(self._fleet, frame.drive), frame.frame)
-                return Response(b"")
-            case ("drive", place, *rest) if place.isdecimal():
-                drives = [*self._fleet.drives]
-                if int(place) < len(drives):
-                    return _below(self._of(drives[int(place)]), request, rest)
-        return super().answer(request)
+    @cached_property
+    def _picker(self) -> FramePicker:
+        assert self._result.drive is not None
+        return FramePicker(self._result.drive, None, None)
 
     @cached_property
-    def _worst(self) -> Mapping[int, WorstFrame]:
-        if not self._fleet.worst:
+    def _worst(self) -> Mapping[str, WorstFrame]:
+        """The worst frames of a fleet by their ranks; none where nothing was scored."""
+        fleet = self._result.fleet
+        if fleet is None or not fleet.worst:
             return {}
-        return {each.rank: each for each in worst_frames(self._result, PICTURED_OF_FLEET)}
+        return {str(each.rank): each for each in worst_frames(self._result, PICTURED_OF_FLEET)}
 
-    def _of(self, drive: str) -> _ServedDrive:
+    def _of(self, fleet: FleetFolder, drive: str) -> _Served:
         """Return a drive as it lies in the folder now: its recording, or else its tables."""
-        recording = self._fleet.recording(drive)
-        path = recording if recording.exists() else self._fleet.results(drive)
+        recording = fleet.recording(drive)
+        path = recording if recording.exists() else fleet.results(drive)
         with self._lock:
-            if path not in self._drives:
-                opened = Result(path)
-                assert opened.drive is not None
-                above = "../../", self.title
-                self._drives[path] = _ServedDrive(opened, opened.drive, self._viewer, above)
-            return self._drives[path]
+            if path not in self._opened:
+                self._opened[path] = _Served(Result(path), self._viewer, ("../../", self.title))
+            return self._opened[path]
 
 
-def _served(result: Result, viewer: WindowViewer) -> _Served:
-    if result.fleet:
-        return _ServedFleet(result, result.fleet, viewer)
-    if result.drive is None:
-        return _Served(result, Place(home="../"))
-    return _ServedDrive(result, result.drive, viewer)
-
-
-def _below(served: _Served, request: Request, rest: list[str]) -> Response:
+def _below(served: _Served, request: Request, rest: Sequence[str]) -> Response:
     """Return what is asked for below a page, whose own address ends with a slash."""
     if not rest and not request.folder:
         return _moved(f"{request.parts[-1]}/")

@@ -73,7 +73,7 @@ def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = F
     posed = _is_posed(rows)
     first = UNFILTERED if UNFILTERED in variants else variants[0]
     lines: list[list[Cell | str]] = []
-    breaks = []
+    breaks, marked = [], False
     for variant in variants:
         breaks.append(len(lines))
         own = [found[variant, "ERR", place] for place in places]
@@ -83,6 +83,7 @@ def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = F
             UNSURE if variant != first and posed and _sway(row) > effect else ""
             for row, effect in zip(own, effects, strict=True)
         ]
+        marked |= any(marks)
         cells = [f"{m}{percent(row['value'], 1)}" for m, row in zip(marks, own, strict=True)]
         for most, plain in () if brief else KITTI:
             row = found.get((variant, most, ABOVE)) or found.get((variant, plain, ABOVE), {})
@@ -93,21 +94,19 @@ def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = F
             lines.append(["as the camera stands", *ranges, *[""] * (0 if brief else len(KITTI))])
     heads = [charts.in_metres(each) for each in places if each != ABOVE]
     caption = (
-        "Errors by distance, and on the ground seen from above, where each square metre counts "
+        "Errors by distance, and on the ground seen from above, where each square metre counts once"
     )
     if not brief:
-        caption += "once; MaxF of a mask without probabilities is its F1."
-    elif posed:
-        caption += f"once. {UNSURE}: a camera that stands a little otherwise could explain the "
-        caption += f"difference from {first}."
-    else:
-        caption += "once."
+        caption += "; MaxF of a mask without probabilities is its F1"
+    elif marked:
+        caption += f". {UNSURE}: a camera that stands a little otherwise could explain the "
+        caption += f"difference from {first}"
     return Table(
         ["ERR, %", *heads, "by area", *([] if brief else ["MaxF", "AP", "prec.", "rec."])],
         lines,
         breaks=breaks[1:],
         groups=[("", 1), ("ahead", len(heads)), ("seen from above, %", 1 if brief else 5)],
-        caption=caption,
+        caption=f"{caption}.",
         small=True,
     )
 
