@@ -136,7 +136,7 @@ def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
     words = "--config", "rig.toml", "--save", "rig.rrd", "-o", "rig", "-q"
     run = here("replay", "rig.mcap", *words, cwd=tmp_path)
     assert run.returncode == 0, run.stderr
-    facts = roadeval.Result(tmp_path / "rig").rig.facts
+    facts = roadeval.Result(tmp_path / "rig").facts
     heights = {name: each.drive.ground.pose[0] for name, each in facts.cameras.items()}
     assert heights == pytest.approx({"front": 1.42, "rear": 2.5})
     assert {*pd.read_csv(tmp_path / "rig" / "metres.csv")["camera"]} == {"front", "rear"}

@@ -211,6 +211,8 @@ def test_a_camera_whose_topic_cannot_be_shown_is_read_back(tmp_path: Path):
         result = roadeval.Result(tmp_path / path)
         assert list(result.cameras) == [shown, f"/rear{IMAGE}"]
         assert set(result.frames["camera"]) == set(result.cameras)
+        for camera, own in result.cameras.items():
+            assert set(own.frames["camera"]) == {camera}
 
 
 def test_a_command_that_looks_at_one_camera_takes_no_second(rig: Path):

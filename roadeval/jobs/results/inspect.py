@@ -65,7 +65,7 @@ def worst_frames(
         if not fleet.worst:
             raise _nothing_scored(fleet.path)
         return [_of_fleet(fleet, row) for row in fleet.worst[:count]]
-    cameras = result.rig.cameras if result.rig else [each for each in [result.drive] if each]
+    cameras = result.rig or [each for each in [result.drive] if each]
     found = [frame for each in cameras for frame in _ranked(each, count or LISTED, variant)]
     found = sorted(found, key=lambda each: -(each.rates[each.by] or 0.0))[: count or LISTED]
     found = [replace(each, rank=rank) for rank, each in enumerate(found, 1)]
@@ -129,7 +129,7 @@ def drive_of(result: Result, frame: WorstFrame) -> tuple[DriveResult, str]:
     if result.fleet:
         return DriveResult(recording_of(result.fleet, frame.drive)), f"{frame.drive}, "
     if result.rig:
-        return next(c for c in result.rig.cameras if c.camera == frame.camera), f"{frame.camera}, "
+        return next(each for each in result.rig if each.camera == frame.camera), f"{frame.camera}, "
     assert result.drive is not None
     return result.drive, ""
 

@@ -12,12 +12,13 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import BYTES, FramePicker, browsed, evenly, strips_of
-from roadeval.jobs.results.result import DriveResult, Result, RigResult
+from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Document
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings
 from roadeval.report.page.render import page, write_page
 from roadeval.report.pdf.typeset import pdf, write_file
+from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import leads_outside
 
@@ -67,7 +68,7 @@ def findings_of(result: Result) -> Findings | FleetFolder:
     if result.fleet:
         return result.fleet
     if result.rig:
-        return collect_rig(result.rig)
+        return collect_rig(result)
     assert result.drive is not None
     return collect(result.drive)
 
@@ -114,15 +115,16 @@ def collect(result: DriveResult) -> Findings:
     )
 
 
-def collect_rig(rig: RigResult) -> Findings:
+def collect_rig(result: Result) -> Findings:
     """Collect everything that the report of several cameras shows."""
-    own = {each.camera: collect(each) for each in rig.cameras}
-    names = short_names([*own])
+    own = {each.camera: collect(each) for each in result.rig}
+    first, names, facts = next(iter(own.values())), short_names([*own]), result.facts
+    assert isinstance(facts, Facts)
     return Findings(
-        path=str(rig.path),
-        facts=rig.facts,
+        path=first.path,
+        facts=facts,
         complete=all(each.complete for each in own.values()),
-        again=rig.cameras[0].again,
+        again=first.again,
         pictured=sum(each.pictured for each in own.values()),
         thumbnails=[
             replace(image, title=f"{names[camera]}, {image.title}")

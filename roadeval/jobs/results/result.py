@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from copy import copy
 from functools import cached_property, partial
@@ -218,48 +218,19 @@ class DriveResult:
         return both
 
 
-class RigResult:
-    """The result of a replay of several cameras, each of which is a `DriveResult`.
-
-    A `RoadevalError` as of one of these.
-    """
-
-    def __init__(self, path: Path, cameras: Sequence[str]) -> None:
-        self.path: Final = path
-        self.cameras: Final = [DriveResult(path, name) for name in cameras]
-
-    @property
-    def name(self) -> str:
-        """The drive's name."""
-        return self.cameras[0].name
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """The warnings that a reader should see first."""
-        return self.cameras[0].warnings
-
-    @cached_property
-    def facts(self) -> Facts:
-        """The facts of all cameras together; of an incomplete run, those of the first."""
-        if self.path.is_dir():
-            return Facts.read(self.path / SUMMARY)
-        from roadeval.recording import rig_facts
-
-        return rig_facts(self.path) or self.cameras[0].facts
+Opened = DriveResult | FleetFolder
 
 
-Opened = DriveResult | RigResult | FleetFolder
-
-
-def _open(path: Path) -> Opened:
+def _open(path: Path) -> list[Opened]:
+    """Open a result; of a replay of several cameras that of each."""
     if is_fleet(path):
-        return FleetFolder(path)
+        return [FleetFolder(path)]
     try:
         drive = DriveResult(path)
     except SeveralCamerasError as error:
-        return RigResult(path, error.cameras)
+        return [DriveResult(path, name) for name in error.cameras]
     cameras = drive.facts.cameras if drive.recording is None else ()
-    return RigResult(path, [*cameras]) if cameras else drive
+    return [DriveResult(path, name) for name in cameras] or [drive]
 
 
 class Result:
@@ -285,36 +256,27 @@ class Result:
 
     def __init__(self, *paths: str | Path) -> None:
         self.paths: Final = tuple(map(Path, paths))
-        self._opened: list[Opened] = [*map(_open, self.paths)]
+        self._opened: list[Opened] = [each for path in self.paths for each in _open(path)]
 
     @cached_property
     def cameras(self) -> dict[str, Result]:
         """The result of each camera of a rig that was opened alone, by its name; else none."""
         found = {}
-        for each in self.rig.cameras if self.rig else ():
-            own = copy(self)
-            own._opened = [each]
-            found[each.camera] = own
+        for each in self.rig:
+            own = found[each.camera] = copy(self)
+            own.__dict__ = {"paths": self.paths, "_opened": [each]}  # and nothing that was cached
         return found
 
     @property
-    def rig(self) -> RigResult | None:
-        """The result of several cameras of a drive, where that was opened alone."""
-        (first, *more) = self._opened
-        return first if isinstance(first, RigResult) and not more else None
-
-    @property
-    def _drives(self) -> list[DriveResult | FleetFolder]:
-        """The drives and fleets that were opened; of a rig each camera."""
-        found: list[DriveResult | FleetFolder] = []
-        for each in self._opened:
-            found += each.cameras if isinstance(each, RigResult) else [each]
-        return found
+    def rig(self) -> list[DriveResult]:
+        """The cameras of a drive, where the result of several was opened alone; else none."""
+        cameras = [each for each in self._opened if isinstance(each, DriveResult)]
+        return cameras if len(self.paths) == 1 < len(cameras) else []
 
     @property
     def name(self) -> str:
         """The drive's or the fleet's name; of several results all of them."""
-        return ", ".join(each.name for each in self._opened)
+        return ", ".join(each.name for each in self.rig[:1] or self._opened)
 
     @property
     def fleet(self) -> FleetFolder | None:
@@ -328,10 +290,17 @@ class Result:
         (first, *more) = self._opened
         return first if isinstance(first, DriveResult) and not more else None
 
-    @property
+    @cached_property
     def facts(self) -> Facts | FleetFacts:
-        """The facts of the first result."""
-        return self._opened[0].facts
+        """The facts of the first result; of several cameras of a drive those of all together."""
+        (path, *_), first = self.paths, self._opened[0].facts
+        if not self.rig:
+            return first
+        if path.is_dir():
+            return Facts.read(path / SUMMARY)
+        from roadeval.recording import rig_facts
+
+        return rig_facts(path) or first
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -346,21 +315,22 @@ class Result:
     @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings that a reader should see first."""
-        own = (each.warnings for each in self._opened if not isinstance(each, FleetFolder))
-        return tuple(chain.from_iterable(own))
+        own = (each.warnings for each in self._opened if isinstance(each, DriveResult))
+        return tuple(dict.fromkeys(chain.from_iterable(own)))
 
     @property
     def recording(self) -> Path | None:
         """The recording, where that was opened alone."""
-        own = self.rig.cameras[0] if self.rig else self.drive
-        return own.path if own and own.recording else None
+        (path, *more), (first, *_) = self.paths, self._opened
+        alone = isinstance(first, DriveResult) and first.recording and not more
+        return path if alone else None
 
     @cached_property
     def variants(self) -> list[str]:
         """The variants that were scored, in order."""
         found = (
             each.facts.finals if isinstance(each, FleetFolder) else each.rows.distinct("variant")
-            for each in self._drives
+            for each in self._opened
         )
         return [*dict.fromkeys(chain(*found))]
 
@@ -369,7 +339,7 @@ class Result:
         """The drives."""
         return tuple(
             part
-            for each in self._drives
+            for each in self._opened
             for part in (_members(each) if isinstance(each, FleetFolder) else [_alone(each)])
         )
 
@@ -398,14 +368,14 @@ class Result:
         """A row per evaluated frame, variant and stage of every drive."""
         return _together(
             table
-            for each in self._drives
+            for each in self._opened
             for table in ([each.frames] if isinstance(each, DriveResult) else each.all_frames())
         )
 
     def _table(self, name: str) -> pd.DataFrame:
         return _together(
             each.table(name).to_pandas() if isinstance(each, FleetFolder) else _own(each, name)
-            for each in self._drives
+            for each in self._opened
         )
 
 
