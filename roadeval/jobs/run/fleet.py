@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from roadeval.config import FleetSettings, RunConfig, run_toml
+from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry, FleetError, deal, groups_of, shuffled
@@ -148,19 +148,7 @@ class FleetRun:
         self.on_progress(progress)
 
     def _task(self, entry: DriveEntry, own: RunConfig, model: str, fold: int | None) -> DriveTask:
-        return DriveTask(
-            self.folder,
-            entry,
-            own,
-            software(own),
-            model,
-            fold,
-            recorded=self.config.fleet.keep != "none",
-        )
-
-    def _of(self, entry: DriveEntry) -> RunConfig:
-        """Return the configuration of a drive."""
-        return replace(entry.config(self.config), fleet=FleetSettings())
+        return DriveTask(self.folder, entry, own, software(own), model, fold)
 
     def _by_model(self) -> Iterator[DriveTask]:
         """Yield the tasks of drives that one model scores, or that train their own."""
@@ -171,7 +159,7 @@ class FleetRun:
             except OSError as error:
                 raise FleetError(f"{model}: cannot read the model: {error.strerror}") from error
         for entry in self.entries:
-            yield self._task(entry, self._of(entry), digest, None)
+            yield self._task(entry, entry.config(self.config), digest, None)
 
     def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
@@ -223,7 +211,7 @@ class FleetRun:
     def _by_fold(self, count: int) -> list[DriveTask]:
         """Train the folds' models, and return the tasks of the drives with them."""
         settings, engine = self.config, self._engine()
-        configs = {entry.id: self._of(entry) for entry in self.entries}
+        configs = {entry.id: entry.config(settings) for entry in self.entries}
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
         asked = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]

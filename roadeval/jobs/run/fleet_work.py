@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval import logs
-from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
+from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig
 from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.regions import ALL
@@ -74,7 +74,6 @@ class DriveTask:
     """SHA-256 of the model file; empty where the drive trains its own."""
     fold: int | None = None
     """Whose model that is; None without folds."""
-    recorded: bool = False
     required: bool = False
     """Whether a drive without a recording is not done."""
 
@@ -210,30 +209,31 @@ def _made(task: DriveTask) -> Record:
 def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
     started = time.perf_counter()
     drive, folder = task.entry.id, task.folder
-    record = task.config.output.record if task.recorded else "none"
+    record = task.config.output.record if task.config.fleet.keep != "none" else "none"
     output = OutputSettings(
         save=str(recording_path(folder, drive)) if record != "none" else None,
         reports=str(results_path(folder, drive)),
         record=record,
         figures=False,
     )
-    own_config = replace(task.config, output=output, run=ExecutionSettings(jobs=1))
-    with FrameGatherer(folder, drive) as gatherer:
+    own_config = replace(
+        task.config, output=output, run=ExecutionSettings(jobs=1), fleet=FleetSettings()
+    )
+    with TableFile(frames_path(folder, drive), "frames") as table:
+        gatherer = FrameGatherer(folder, drive, table)
         outcome = replay(task.entry.source, own_config, on_frame=gatherer.add)
-        _remove(task, PICTURES, *(() if task.recorded else (RECORDINGS,)))
-        gatherer.finish()
+        _remove(task, PICTURES, *([RECORDINGS] if record == "none" else []))
+        times, worst = gatherer.finish()
     if not outcome.facts.frames.evaluated:
         _remove(task, FRAMES)
-    row = (
-        drive_row(outcome.facts, task.entry.name, task.entry.shown)
-        | gatherer.facts()
-        | {
-            "fold": task.fold,
-            "model": task.model or None,
-            "seconds": time.perf_counter() - started,
-        }
-    )
-    own = {"drives": [row], **outcome.rows, "worst": gatherer.worst}
+    row = {
+        **drive_row(outcome.facts, task.entry.name, task.entry.shown),
+        **times,
+        "fold": task.fold,
+        "model": task.model or None,
+        "seconds": time.perf_counter() - started,
+    }
+    own = {"drives": [row], **outcome.rows, "worst": worst}
     key = Key(drive, outcome.facts.drive.camera)
     rows = {table: cells(table, key, each) for table, each in own.items()}
     return Record(drive, task.asked, before, rows)
@@ -404,26 +404,16 @@ WIDTH: Final = 320
 
 
 class FrameGatherer:
-    """Takes a drive's frames in order, and writes their rows; to be used as a context.
+    """Takes a drive's frames in order: their rows into a table, and keeps the worst of them."""
 
-    Without `finish` the rows of an earlier replay stay.
-    """
-
-    def __init__(self, folder: Path, drive: str) -> None:
+    def __init__(self, folder: Path, drive: str, table: TableFile) -> None:
         self._folder: Final = folder
         self._drive: Final = drive
-        self._rows: Final = TableFile(frames_path(folder, drive), "frames")
+        self._table: Final = table
         self._stamps: list[int] = []
         """Of the first and the last evaluated frame."""
         self._worst: list[tuple[dict[str, Any], bytes]] = []
         """Rows of the table ``worst`` without their ranks, and the pictures."""
-
-    def __enter__(self) -> FrameGatherer:
-        self._rows.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._rows.__exit__(*error)
 
     def add(self, result: FrameResult) -> None:
         """Add a frame; one that was not evaluated is ignored."""
@@ -432,7 +422,7 @@ class FrameGatherer:
         self._stamps = [*self._stamps[:1], result.frame.stamp_ns]
         key = self._drive, result.frame.camera
         stages = final_stages((tally.variant, tally.stage) for tally in result.tallies)
-        self._rows.add(
+        self._table.add(
             (*key, *row, stages[tally.variant] == tally.stage)
             for tally, row in zip(result.tallies, frame_rows(result)["frames"], strict=True)
         )
@@ -464,20 +454,17 @@ class FrameGatherer:
         ranked = sorted([*rest, (row, picture)], key=lambda w: (-w[0]["ERR"], w[0]["frame"]))
         self._worst = ranked[:WORST]
 
-    def facts(self) -> dict[str, Any]:
-        """Return what a drive's row says of when its evaluated frames are."""
-        if not self._stamps:
-            return {}
-        return {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
+    def finish(self) -> tuple[dict[str, int], list[dict[str, Any]]]:
+        """Finish the table, write the worst frames' pictures; return when frames are, and which.
 
-    def finish(self) -> None:
-        """Write the rows and the worst frames' pictures; an OSError if they cannot be written."""
+        The cells of a drive's row on its first and last evaluated frame, and the rows of ``worst``,
+        whose ranks are given over all drives later. An OSError if a file cannot be written.
+        """
+        times = {}
         if self._stamps:
-            self._rows.finish()
+            self._table.finish()
+            times = {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
         for row, picture in self._worst:
             put(self._folder / row["picture"], picture)
-
-    @property
-    def worst(self) -> list[dict[str, Any]]:
-        """The rows of ``worst``; ranks are given over all drives."""
-        return [{"rank": rank, **row} for rank, (row, _) in enumerate(self._worst, 1)]
+        rows = [{"rank": rank, **row} for rank, (row, _) in enumerate(self._worst, 1)]
+        return times, rows
