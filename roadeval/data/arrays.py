@@ -33,11 +33,14 @@ Indices = npt.NDArray[np.int32]
 """``(n, m)``: indices into a list."""
 Masks = npt.NDArray[np.uint32]
 """``(n, m)``: 32 bits each."""
+Places = npt.NDArray[np.intp]
+"""``(n,)``: rows, columns, or places in a list."""
 Flags = npt.NDArray[np.bool_]
 """``(n,)``: one flag each."""
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
-Values = npt.NDArray[np.float32]
+Values = npt.NDArray[np.floating]
+"""float32 of any shape. The type is wider: NumPy's stubs do not know that Python floats keep it."""
 Floats = npt.NDArray[np.float64]
 """Of any shape."""
 Vector = npt.NDArray[np.float64]
@@ -57,8 +60,7 @@ further away."""
 
 def sigmoid(values: Values) -> Values:
     """Compute ``1 / (1 + exp(-x))`` of float32, in a form that cannot overflow."""
-    result: Values = np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * values)
-    return result
+    return 0.5 + 0.5 * np.tanh(0.5 * values)
 
 
 TN: Final = 0

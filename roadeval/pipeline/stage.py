@@ -44,7 +44,7 @@ from roadeval.data import (
     Rgb,
     Truth,
 )
-from roadeval.data.arrays import Planes
+from roadeval.data.arrays import Flags, Places, Planes
 from roadeval.errors import RoadevalError
 
 __all__ = [
@@ -247,11 +247,11 @@ class TrainingSet:
 
     images: tuple[Rgb, ...]
     """The training frames, each ``(H, W, 3)`` uint8 RGB."""
-    frame: npt.NDArray[np.intp]
-    row: npt.NDArray[np.intp]
-    column: npt.NDArray[np.intp]
+    frame: Places
+    row: Places
+    column: Places
     """``(n,)`` integers: where each sampled pixel lies."""
-    road: npt.NDArray[np.bool_]
+    road: Flags
     """``(n,)`` bool: its label."""
     seed: int = 0
     """For whatever a fit draws at random."""

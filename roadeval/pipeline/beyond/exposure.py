@@ -14,10 +14,10 @@ from typing import Annotated, Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
+from roadeval.data.arrays import Floats
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
@@ -36,7 +36,7 @@ class ExposureSettings:
     """The reference patch."""
 
 
-def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
+def gains(image: Rgb, settings: ExposureSettings) -> Floats:
     """Return the gains ``(3,)`` that bring the patch of an ``(H, W, 3)`` image to the level.
 
     Each channel has its own, so that the road turns grey under any light and camera.
@@ -46,7 +46,7 @@ def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
     counts = [cv2.calcHist([around], [each], patch, [256], [0, 256]).cumsum() for each in range(3)]
     medians = np.array([float(np.searchsorted(own, own[-1] / 2)) for own in counts])  # the lower
     gain = settings.level / np.maximum(medians, 1.0)
-    return np.asarray(np.clip(gain, *GAINS))
+    return np.clip(gain, *GAINS)
 
 
 @lru_cache(maxsize=16)
@@ -58,7 +58,7 @@ def _box(height: int, width: int, patch: ReferencePatch) -> tuple[slice, slice, 
     return *here, mask[here]
 
 
-def expose(image: Rgb, gain: npt.NDArray[np.float64], level: float) -> Rgb:
+def expose(image: Rgb, gain: Floats, level: float) -> Rgb:
     """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains, and compress them.
 
     A product x up to the level l, a grey level below 255, stays. Above it x becomes
@@ -69,8 +69,7 @@ def expose(image: Rgb, gain: npt.NDArray[np.float64], level: float) -> Rgb:
     excess, room = np.maximum(product - level, 0), 255 - level
     compressed = np.minimum(product, level) + room * excess / (excess + room)
     table = np.rint(compressed).astype(np.uint8)
-    exposed: Rgb = cv2.LUT(image, table[None])
-    return exposed
+    return cv2.LUT(image, table[None])
 
 
 @per_view

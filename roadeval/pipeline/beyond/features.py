@@ -6,22 +6,20 @@ float32 or what NumPy spreads to that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
+import math
+from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from roadeval.data import CERTAIN, Mask, Rgb
-from roadeval.data.arrays import Values
-from roadeval.kernels import KERNELS
-from roadeval.pipeline.beyond.scene import Scene, mean, slopes_of, steepness, tones_of
+from roadeval.data import CERTAIN, Rgb
+from roadeval.data.arrays import Places, Values
+from roadeval.pipeline.beyond.scene import BARRIERS, Scene, distance, mean
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import Opinion, TrainingSet
 
-Places = npt.NDArray[np.intp]
 Named = Mapping[str, Values]
 """Features by name."""
 
@@ -52,16 +50,17 @@ def colour(scene: Scene) -> Named:
     skylight leaves alone. Which direction that is depends on the camera (Alvarez and Lopez 2011),
     so there are three.
     """
-    _, red, blue = scene.tones
-    _, own_red, own_blue = scene.middle
+    red, blue = (scene.tones[i] - scene.middle[i] for i in (1, 2))
     channels = np.moveaxis(scene.image.astype(np.float32), 2, 0)
-    found = dict(zip(("red", "green", "blue"), channels, strict=True))
-    found |= zip(TONES, scene.tones, strict=True)
-    for angle in ANGLES:
-        first, second = (np.float32(each(np.radians(angle))) for each in (np.cos, np.sin))
-        found[f"projection_{angle}"] = (red - own_red) * first + (blue - own_blue) * second
+    projections = {
+        f"projection_{angle}": red * math.cos(turn) + blue * math.sin(turn)
+        for angle in ANGLES
+        for turn in [math.radians(angle)]
+    }
     return {
-        **found,
+        **dict(zip(("red", "green", "blue"), channels, strict=True)),
+        **dict(zip(TONES, scene.tones, strict=True)),
+        **projections,
         "colour_distance": scene.colour,
         "hue_distance": scene.hue,
         "colour_distance_around": mean(scene.colour, SMOOTH),
@@ -86,17 +85,15 @@ def light_over(scene: Scene, *percentiles: int) -> Named:
     """Return log brightness less each percentile of the lower half's, ``(h, w)`` float32."""
     light = scene.tones[0]
     levels = np.percentile(light[scene.shape[0] // 2 :], percentiles)
-    return {
-        f"light_over_{each}th_percentile": light - np.float32(level)
-        for each, level in zip(percentiles, levels, strict=True)
-    }
+    names = [f"light_over_{each}th_percentile" for each in percentiles]
+    return {name: light - float(level) for name, level in zip(names, levels, strict=True)}
 
 
 def place(scene: Scene) -> Named:
     """Return column (-1 to 1), its magnitude, and row (0 to 1) of each pixel's centre."""
     height, width = scene.shape
-    across = (np.arange(width, dtype=np.float32) + np.float32(0.5)) * np.float32(2 / width) - 1
-    down = (np.arange(height, dtype=np.float32) + np.float32(0.5)) / np.float32(height)
+    across = (np.arange(width, dtype=np.float32) + 0.5) * (2 / width) - 1
+    down = (np.arange(height, dtype=np.float32) + 0.5) / height
     return {"across": across[None], "from_middle": np.abs(across)[None], "down": down[:, None]}
 
 
@@ -137,13 +134,12 @@ def scans(scene: Scene) -> Named:
     up the column to the pixel meets no kerb and no shadow under a car as long as there is road.
     """
     steep = cv2.blur(np.abs(scene.slopes[0]), (3, 5))
-    columns = {
-        f"{name}_{way}": plane
-        for way, step in (("below", -1), ("above", 1))
-        for name, plane in _column(scene, step).items()
+    return {
+        **{f"{name}_below": plane for name, plane in _column(scene, -1).items()},
+        **{f"{name}_above": plane for name, plane in _column(scene, 1).items()},
+        "edge_inside": outwards(np.sqrt(steep)),
+        "hue_inside": outwards(mean(scene.hue, 3)),
     }
-    inside = {"edge_inside": np.sqrt(steep), "hue_inside": mean(scene.hue, 3)}
-    return columns | {name: outwards(plane) for name, plane in inside.items()}
 
 
 def _column(scene: Scene, step: int) -> Named:
@@ -176,18 +172,6 @@ def outwards(plane: Values) -> Values:
     return found
 
 
-ROUNDS: Final = 3
-"""Sweeps up and down. More would shorten the path to about one pixel in a hundred by 1 %."""
-SCALE: Final = 10_000
-"""Of costs as whole numbers: the least has two digits."""
-LENGTH: Final = 10 * SCALE
-"""Of a straight step of cost 1, see `roadeval.kernels.plain`."""
-FLOOR: Final = 0.005
-"""Cost of a step on the smoothest ground, so that a longer path costs more."""
-GREATEST: Final = 6.5
-"""Cost of a step over the hardest, which fits in 16 bit."""
-
-
 def paths(scene: Scene) -> Named:
     """Return the geodesic distances over edges, over edges and hues, and over colours.
 
@@ -198,84 +182,28 @@ def paths(scene: Scene) -> Named:
     colours to the patch in its deviations, the costs of a pixel are ``g``,
     ``g / 2 + min(h, 10) / 20`` and ``0.03 min(d, 15)``.
     """
-    hue: Values = np.float32(1 / 20) * np.minimum(scene.hue, np.float32(10))
-    far: Values = np.float32(0.03) * np.minimum(scene.colour, np.float32(15))
-    edge: Values = np.float32(1 / 2) * scene.edge
-    costs = {"over_edges": scene.edge, "over_edges_and_hues": edge + hue, "over_colours": far}
-    return {name: distance(cost, scene.patch) for name, cost in costs.items()}
-
-
-def distance(cost: Values, patch: Mask) -> Values:
-    """Return the geodesic distance of each pixel from a patch, in pixels.
-
-    It is ``min over paths of the integral of 0.005 + c`` (Toivanen 1996, see
-    `roadeval.kernels.plain`) for a cost c of each pixel, ``(h, w)`` float32, of which
-    what is beyond `GREATEST` does not count.
-    """
-    whole = np.minimum(cost + np.float32(FLOOR), np.float32(GREATEST)) * np.float32(SCALE)
-    found = KERNELS.geodesics(np.rint(whole).astype(np.uint16), patch, ROUNDS).astype(np.float32)
-    lengths: Values = found / np.float32(LENGTH)
-    return lengths
-
-
-THIN, WIDE = 3, 15
-"""Sides of the squares whose means differ where there is a thin line."""
-SURROUNDINGS: Final = 31
-"""Side of the square that an edge is held against: on a smooth pavement a low kerb is steep."""
-FAINT: Final = 0.02
-"""Added to that square's mean edge: noise is no edge."""
-WEIGHTS: Final = {"edge": 1.0, "relative_edge": 0.05, "hue_edge": 1.0, "yellow": 1.0, "dark": 1.0}
-"""What each adds to the cost of a path."""
-SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}
-"""Weights of squared barriers in the costs of further paths. These go a long way through what is
-faint before they cross anything steep: around the end of a kerb, not over it."""
+    hue = 1 / 20 * np.minimum(scene.hue, 10)
+    return {
+        "over_edges": scene.over_edges,
+        "over_edges_and_hues": distance(1 / 2 * scene.edge + hue, scene.patch),
+        "over_colours": distance(0.03 * np.minimum(scene.colour, 15), scene.patch),
+    }
 
 
 def barriers(scene: Scene) -> Named:
     """Return each barrier at a pixel, on its path from the patch, and from the middle outwards.
 
-    Kerbs, seams, yellow and dark lines; the greatest of each four pixels is kept, so that a line of
-    one pixel is not averaged away. The distances over the squares of `SQUARED` come last. Each is
-    ``(h, w)`` float32; distances are those of `distance`, in pixels.
+    Kerbs, seams, yellow and dark lines: `Scene.barriers`. The distances over the squares of
+    `SQUARED` come last. Each is ``(h, w)`` float32; distances are those of `distance`, in pixels.
     """
-    fine = zip(WEIGHTS, barriers_of(tones_of(scene.fine)), strict=True)
-    found = {name: greatest_of_four(plane) for name, plane in fine}
-    far = partial(distance, patch=scene.patch)
+    found = scene.barriers
     return {
         **found,
-        **{f"over_{name}": far(found[name] * np.float32(w)) for name, w in WEIGHTS.items()},
+        **{f"over_{name}": distance(found[name] * w, scene.patch) for name, w in BARRIERS.items()},
         **{f"{name}_inside": outwards(plane) for name, plane in found.items()},
-        **{
-            f"around_{name}": far(np.square(found[name]) * np.float32(w))
-            for name, w in SQUARED.items()
-        },
+        "around_edge": scene.around_edge,
+        "around_relative_edge": scene.around("relative_edge"),
     }
-
-
-def barriers_of(tones: tuple[Values, Values, Values]) -> list[Values]:
-    """Return the barriers of tones at twice the size, in the order of `WEIGHTS`.
-
-    The gradient of the log brightness; the same held against its surroundings; the sum of the
-    chromaticities' gradients; and how much a thin line is yellower, ``(ln R + ln G) / 2 - ln B``,
-    or darker than what surrounds it.
-    """
-    bright, red, blue = tones
-    edge = steepness(slopes_of(bright))
-    hues: Values = steepness(slopes_of(red)) + steepness(slopes_of(blue))
-    yellow: Values = np.float32(1 / 2) * red - blue
-    return [
-        edge,
-        edge / (mean(edge, SURROUNDINGS) + np.float32(FAINT)),
-        hues,
-        np.maximum(mean(yellow, THIN) - mean(yellow, WIDE), 0),
-        np.maximum(mean(bright, WIDE) - mean(bright, THIN), 0),
-    ]
-
-
-def greatest_of_four(plane: Values) -> Values:
-    """Return the greatest of each four pixels of a ``(2 h, 2 w)`` image, ``(h, w)``."""
-    rows = np.maximum(plane[::2], plane[1::2])
-    return np.maximum(rows[:, ::2], rows[:, 1::2])
 
 
 GROUPS: Final[Mapping[str, Callable[[Scene], Named]]] = {
@@ -294,14 +222,14 @@ def names_of(groups: tuple[str, ...]) -> tuple[str, ...]:
 
 def features(scene: Scene, groups: tuple[str, ...]) -> Values:
     """Compute the features of some groups, ``(F, h, w)`` float32 in the order of `names_of`."""
-    found: Values = np.empty((len(names_of(groups)), *scene.shape), np.float32)
+    found = np.empty((len(names_of(groups)), *scene.shape), np.float32)
     planes = (plane for name in groups for plane in GROUPS[name](scene).values())
     for place_, plane in zip(found, planes, strict=True):
         place_[...] = plane
     return found
 
 
-SURE: Final = np.float32(1 / CERTAIN)
+SURE: Final = 1 / CERTAIN
 """The probability nearest to 0 or 1 that a log-odds is computed of."""
 
 
@@ -318,12 +246,10 @@ def opinions(opinion: Opinion, shape: tuple[int, int]) -> Values:
             cv2.distanceTransform(side, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
             for side in (mask, 1 - mask)
         )
-        signed: Values = np.clip(inside - outside, -max(size), max(size))[None]
-        return signed
+        return np.clip(inside - outside, -max(size), max(size))[None]
     planes = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in opinion.planes]
     share = np.stack(planes).astype(np.float32) * SURE
-    odds: Values = np.log((share + SURE) / (np.float32(1) - share + SURE))
-    return odds
+    return np.log((share + SURE) / (1 - share + SURE))
 
 
 def at_samples(
@@ -335,26 +261,23 @@ def at_samples(
     from. Both are ``(n, F)`` float32, in the sample's order; ``see`` returns the scene of an image
     and what is said of it, and the features, ``(F, h, w)``.
     """
-    order, straight, mirrored = [], [], []
+
+    def at(image: Rgb, opinion: Opinion | None, row: Places, column: Places) -> Values:
+        _, planes = see(image, opinion)
+        _, height, width = planes.shape
+        return planes[:, row * height // image.shape[0], column * width // image.shape[1]].T
+
+    found = []
     heard = sample.opinions or (None,) * len(sample.images)
     for index, (image, opinion) in enumerate(zip(sample.images, heard, strict=True)):
         here = np.flatnonzero(sample.frame == index)
         row, column = sample.row[here], sample.column[here]
-        flipped = np.ascontiguousarray(image[:, ::-1])
-        order.append(here)
-        straight.append(_at(see(image, opinion)[1], image, row, column))
-        opposite = None if opinion is None else opinion.mirrored()
-        mirrored.append(_at(see(flipped, opposite)[1], image, row, image.shape[1] - 1 - column))
-    back = np.argsort(np.concatenate(order))
-    return np.concatenate(straight)[back], np.concatenate(mirrored)[back]
-
-
-def _at(planes: Values, image: Rgb, row: Places, column: Places) -> Values:
-    """Return the features ``(n, F)`` of some of the image's pixels."""
-    _, height, width = planes.shape
-    rows, columns = row * height // image.shape[0], column * width // image.shape[1]
-    found: Values = planes[:, rows, columns].T
-    return found
+        flipped = np.ascontiguousarray(image[:, ::-1]), opinion and opinion.mirrored()
+        opposite = at(*flipped, row, image.shape[1] - 1 - column)
+        found.append((here, at(image, opinion, row, column), opposite))
+    order, straight, mirrored = map(np.concatenate, zip(*found, strict=True))
+    back = np.argsort(order)
+    return straight[back], mirrored[back]
 
 
 OVER_EDGES: Final = 1.0
@@ -371,57 +294,33 @@ SUNLIT: Final = 80
 SHADE, SUN = -0.8, -0.3
 """Of the natural logarithm of brightness over that percentile: at or below `SHADE` a pixel counts
 as shade, at or above `SUN` as lit."""
-REACH: Final = (
-    "paths.over_edges",
-    "barriers.around_edge",
-    f"light.light_over_{SUNLIT}th_percentile",
-)
-"""The features that are the two distances and the light of a pixel."""
+LIGHT: Final = f"light.light_over_{SUNLIT}th_percentile"
+"""The feature that is the light of a pixel."""
 
 
 def reach(scene: Scene) -> Values:
     """Return how far each pixel lies from the patch, ``(h, w)`` float32; roads end at about 1.
 
-    Edges of brightness are what makes a way long. It needs no training, and most roads end at about
+    It is ``(over / OVER_EDGES + around / AROUND_EDGES) / 2`` of the distances over edges and over
+    squared edges. They are what makes a way long. It needs no training, and most roads end at about
     the same value, whatever the camera. Hue does not count: a verge as bright as the road is
     reached.
     """
-    return combined(*reach_inputs(scene)[:2])
-
-
-def reach_inputs(scene: Scene) -> Sequence[Values]:
-    """Compute the planes of `REACH`, ``(h, w)`` float32 each."""
-    edge, *_ = barriers_of(tones_of(scene.fine))
-    steep = np.square(greatest_of_four(edge)) * np.float32(SQUARED["edge"])
-    over = (distance(cost, scene.patch) for cost in (scene.edge, steep))
-    return *over, *light_over(scene, SUNLIT).values()
-
-
-def combined(over: Values, around: Values) -> Values:
-    """Compute ``d = (over / OVER_EDGES + around / AROUND_EDGES) / 2``, ``(h, w)`` float32, no unit.
-
-    Both are ``(h, w)`` float32: the distances of `REACH`, in that order.
-    """
-    middle: Values = np.float32(1 / 2) * (
-        over / np.float32(OVER_EDGES) + around / np.float32(AROUND_EDGES)
-    )
-    return middle
+    return 1 / 2 * (scene.over_edges / OVER_EDGES + scene.around_edge / AROUND_EDGES)
 
 
 def lit(bright: Values) -> Values:
     """Return the share s of light, which grows from 0 at `SHADE` to 1 at `SUN`.
 
-    ``bright`` is the last of `REACH`, float32 of any shape.
+    ``bright`` is the feature `LIGHT`, float32 of any shape.
     """
-    share: Values = np.clip((bright - np.float32(SHADE)) / np.float32(SUN - SHADE), 0, 1)
-    return share
+    return np.clip((bright - SHADE) / (SUN - SHADE), 0, 1)
 
 
 def beyond(far: Values, bright: Values) -> Values:
     """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, times its light.
 
     A shadow's edge lengthens the way into it, so that in the shade the distance says little. All
-    are ``(h, w)`` float32; d is `combined`, s `lit`, ``bright`` the last of `REACH`.
+    are ``(h, w)`` float32; d is `reach`, s `lit`, ``bright`` the feature `LIGHT`.
     """
-    past: Values = lit(bright) * np.maximum(far - np.float32(1), 0)
-    return past
+    return lit(bright) * np.maximum(far - 1, 0)

@@ -23,16 +23,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Annotated, Final
+from dataclasses import dataclass
+from typing import Annotated, Any, Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Packed, Rgb, Truth, colours
-from roadeval.data.arrays import Floats, Values
+from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
@@ -61,7 +60,7 @@ LEVEL: Final = 0.85
 """The frame's sunlit level is this quantile of the brightness of where road is likely."""
 LIT: Final = 0.7
 """Lit road is brighter than this share of the sunlit level."""
-OFFSET: Final = np.float32(8)
+OFFSET: Final = 8.0
 """Added to a channel before ratios are taken, as in `LOGS`."""
 LEAST: Final = 30
 """Candidates of either kind, of those sampled, that there must be to learn from."""
@@ -85,22 +84,14 @@ def _mask(name: str, title: str, inside: str) -> LayerSpec:
     return LayerSpec(name, LayerKind.MASK, title, classes)
 
 
+def _map(name: str, title: str, span: tuple[float, float]) -> LayerSpec:
+    return LayerSpec(name, LayerKind.SCALAR, title, value_range=span, exact=False)
+
+
 CANDIDATES: Final = _mask("candidates", "Dark, where road may be", "candidate")
-SHADED: Final = LayerSpec(
-    "shaded",
-    LayerKind.SCALAR,
-    "How likely it is road in the shade",
-    value_range=(0.0, 1.0),
-    exact=False,
-)
+SHADED: Final = _map("shaded", "How likely it is road in the shade", (0.0, 1.0))
 SHADOW: Final = _mask("shadow", "More likely road in the shade than not", "shadow")
-GAIN: Final = LayerSpec(
-    "gain",
-    LayerKind.SCALAR,
-    "Greatest gain of a channel",
-    value_range=(1.0, GREATEST_GAIN),
-    exact=False,
-)
+GAIN: Final = _map("gain", "Greatest gain of a channel", (1.0, GREATEST_GAIN))
 COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
 
 
@@ -124,7 +115,7 @@ class GatedSettings:
     """Below this probability nothing is brightened."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Look:
     """A working image as the filter sees it."""
 
@@ -136,9 +127,7 @@ class Look:
     """``(3,)``: mean colour of lit road."""
     place: Values
     """``(h, w)`` float32: the road's share by place."""
-    likely: npt.NDArray[np.bool_]
-    """``(h, w)``: whether that is more than half."""
-    candidates: npt.NDArray[np.bool_]
+    candidates: Flags
     """``(h, w)`` bool."""
 
 
@@ -149,18 +138,14 @@ def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
     within a tenth of the true one, where the colour of road finds a third.
     """
     height, width = image.shape[:2]
-    red, green, blue = cv2.split(image)
-    total: npt.NDArray[np.uint16] = cv2.add(
-        cv2.add(red, green, dtype=cv2.CV_16U), blue, dtype=cv2.CV_16U
-    )
-    share: Values = cv2.resize(place.astype(np.float32), (width, height))
+    total = sum(cv2.split(image.astype(np.uint16)))
+    share = cv2.resize(place.astype(np.float32), (width, height))
     likely = share > 0.5
     counted = np.cumsum(np.bincount(total[likely], share[likely], minlength=1))
     level = float(np.searchsorted(counted, LEVEL * counted[-1])) if counted[-1] > 0 else 0.0
-    shining = likely & (total >= LIT * level)
-    lit = np.asarray(cv2.mean(image, shining.view(np.uint8))[:3])
+    lit = np.array(cv2.mean(image, (likely & (total >= LIT * level)).view(np.uint8))[:3])
     candidates = (total < settings.darkness * level) & (share > settings.place)
-    return Look(image, level, lit, share, likely, candidates)
+    return Look(image, level, lit, share, candidates)
 
 
 def features_of(seen: Look) -> Values:
@@ -176,29 +161,28 @@ def features_of(seen: Look) -> Values:
     light, red, blue = scene.tones
     top = np.float32(np.log(seen.level / 3 + OFFSET))
     lit = np.log(seen.lit + OFFSET).astype(np.float32)
-    down, across = np.mgrid[: scene.shape[0], : scene.shape[1]].astype(np.float32) + np.float32(0.5)
+    down, across = np.mgrid[: scene.shape[0], : scene.shape[1]].astype(np.float32) + 0.5
     slopes = [np.abs(slope) for slope in scene.slopes]
-    met = np.sqrt(cv2.blur(slopes[1], (5, 3))), mean(light, 5) - top
-    found: Values = np.stack(
+    edge, dark = np.sqrt(cv2.blur(slopes[1], (5, 3))), mean(light, 5) - top
+    return np.stack(
         [
             light - top,
             red - (lit[0] - lit[1]),
             blue - (lit[2] - lit[1]),
             red,
             blue,
-            np.abs(across * np.float32(2 / scene.shape[1]) - 1),
-            down / np.float32(scene.shape[0]),
-            np.maximum.accumulate(met[0][::-1])[::-1],
-            np.minimum.accumulate(met[1][::-1])[::-1],
+            np.abs(across * (2 / scene.shape[1]) - 1),
+            down / scene.shape[0],
+            np.maximum.accumulate(edge[::-1])[::-1],
+            np.minimum.accumulate(dark[::-1])[::-1],
             *(np.sqrt(mean(slope, side)) for side in WINDOWS for slope in slopes),
-            *(np.log(far + np.float32(STEPS)) for far in paths(scene).values()),
+            *(np.log(far + STEPS) for far in paths(scene).values()),
             seen.place,
         ]
     )
-    return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ShadedRoad:
     """Learnt parameters of the gated filter: where road is, and the odds of road in the shade."""
 
@@ -223,12 +207,22 @@ class ShadedRoad:
 def fit(sample: TrainingSet, settings: GatedSettings) -> ShadedRoad:
     """Learn where road is, and the odds that a dark pixel is road."""
     place = learn_place(sample)
-    values, road = at_candidates(sample, place, settings)
+    values, labels = [], []
+    for index, image in enumerate(sample.images):
+        here = sample.frame == index
+        seen = look(reduced(image, settings.width), place, settings)
+        rows, columns = seen.candidates.shape
+        row = sample.row[here] * rows // image.shape[0]
+        column = sample.column[here] * columns // image.shape[1]
+        dark = seen.candidates[row, column]
+        values.append(features_of(seen)[:, row[dark], column[dark]].T)
+        labels.append(sample.road[here][dark])
+    features, road = np.concatenate(values), np.concatenate(labels)
     if min(road.sum(), (~road).sum()) < LEAST:
         none = np.zeros((1, FEATURES), np.float32)
         return ShadedRoad(place, none, none[:, 0], none[:, 0], NOTHING)
-    planes, bias = draw_planes(values, PLANES, sample.seed)
-    mapped = np.maximum(values @ planes.T + bias, 0).astype(np.float64)
+    planes, bias = draw_planes(features, PLANES, sample.seed)
+    mapped = np.maximum(features @ planes.T + bias, 0).astype(np.float64)
     weights, offset = logistic(mapped, road, PENALTY)
     return ShadedRoad(place, planes, bias, weights.astype(np.float32), offset)
 
@@ -244,25 +238,7 @@ def learn_place(sample: TrainingSet) -> Floats:
     counts = np.ones((2, *GRID))
     for across in (column, GRID[1] - 1 - column):
         np.add.at(counts, (sample.road.astype(np.intp), row, across), 1)
-    share: Floats = counts[1] / counts.sum(axis=0)
-    return share
-
-
-def at_candidates(
-    sample: TrainingSet, place: Floats, settings: GatedSettings
-) -> tuple[Values, npt.NDArray[np.bool_]]:
-    """Return the features ``(n, F)`` and labels ``(n,)`` of the sampled pixels that are dark."""
-    values, road = [], []
-    for index, image in enumerate(sample.images):
-        here = sample.frame == index
-        seen = look(reduced(image, settings.width), place, settings)
-        rows, columns = seen.candidates.shape
-        row = sample.row[here] * rows // image.shape[0]
-        column = sample.column[here] * columns // image.shape[1]
-        dark = seen.candidates[row, column]
-        values.append(features_of(seen)[:, row[dark], column[dark]].T)
-        road.append(sample.road[here][dark])
-    return np.concatenate(values), np.concatenate(road)
+    return counts[1] / counts.sum(axis=0)
 
 
 def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
@@ -280,7 +256,7 @@ def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
     return (planes / largest[:, None]).astype(np.float32), (bias / largest).astype(np.float32)
 
 
-def logistic(mapped: Floats, road: npt.NDArray[np.bool_], penalty: float) -> tuple[Floats, float]:
+def logistic(mapped: Floats, road: Flags, penalty: float) -> tuple[Floats, float]:
     """Fit a logistic regression with an L2 penalty, by Newton's method.
 
     scikit-learn's gives the same weights, and its import alone takes a second.
@@ -320,9 +296,8 @@ def probability(seen: Look, model: ShadedRoad, odds: float) -> Values:
     return result
 
 
-def _sigmoid(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-    share: npt.NDArray[np.floating] = 1 / (1 + np.exp(-np.clip(values, -30, 30)))
-    return share
+def _sigmoid(values: Any) -> Any:
+    return 1 / (1 + np.exp(-np.clip(values, -30, 30)))
 
 
 def gains(seen: Look, shaded: Values) -> Values:
@@ -333,19 +308,11 @@ def gains(seen: Look, shaded: Values) -> Values:
     illumination if it is. No gain is less than 1 or more than `GREATEST_GAIN`. In the end they are
     averaged over a square.
     """
-    own = seen.image.astype(np.float32)
-    ratio = np.log((seen.lit + OFFSET).astype(np.float32)) - np.log(own + OFFSET)
-    np.clip(ratio, 0, np.log(GREATEST_GAIN), out=ratio)
-    soft: Values = cv2.blur(np.exp(ratio * shaded[..., None]), (SOFTNESS, SOFTNESS))
-    return soft
-
-
-def shade_of(seen: Look, model: ShadedRoad, settings: GatedSettings) -> Values:
-    """Return how far each pixel is brightened, 0 to 1, ``(h, w)`` float32."""
-    found = probability(seen, model, settings.odds)
-    found -= np.float32(settings.least)
-    found /= np.float32(1 - settings.least)
-    return np.maximum(found, 0, out=found)
+    own = np.log(seen.image.astype(np.float32) + OFFSET)
+    ratio = np.clip(
+        np.log((seen.lit + OFFSET).astype(np.float32)) - own, 0, math.log(GREATEST_GAIN)
+    )
+    return cv2.blur(np.exp(ratio * shaded[..., None]), (SOFTNESS, SOFTNESS))
 
 
 def brighten(image: Rgb, gain: Values) -> Rgb:
@@ -355,16 +322,15 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
     does not grow by all of them.
     """
     bright = image.copy()
-    touched = np.flatnonzero((gain > 1).any(axis=(1, 2)))
-    if len(touched):
+    if len(touched := np.flatnonzero((gain > 1).any(axis=(1, 2)))):
         scale = len(image) / len(gain)
         # Interpolation reaches no further than to the next row.
         first, end = int((touched[0] - 1) * scale), math.ceil((touched[-1] + 2) * scale)
         rows = slice(max(first, 0), end)
         here = stretched(gain, image.shape)[rows]
         result = cv2.multiply(image[rows], here, dtype=cv2.CV_32F)
-        cv2.scaleAdd(here, float(OFFSET), result, dst=result)
-        cv2.convertScaleAbs(result, dst=bright[rows], beta=-float(OFFSET))
+        cv2.scaleAdd(here, OFFSET, result, dst=result)
+        cv2.convertScaleAbs(result, dst=bright[rows], beta=-OFFSET)
     return bright
 
 
@@ -373,27 +339,24 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     """Filter what is seen."""
     shape = view.image.shape
     seen = look(reduced(view.image, settings.width), model.place, settings)
-    shaded = shade_of(seen, model, settings)
+    likely = probability(seen, model, settings.odds)
+    shaded = np.maximum((likely - settings.least) / (1 - settings.least), 0)
     gain = gains(seen, shaded)
-    image = brighten(view.image, gain) if (shaded > 0).any() else view.image
-    greatest = np.maximum.reduce(cv2.split(gain))
+    image = brighten(view.image, gain) if shaded.any() else view.image
     small = (shaded > 0.5).view(np.uint8)
     edge = cv2.dilate(small, np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) - small
-    candidates, shadow, shadow_edge, lit = (
-        enlarged(mask, shape)
-        for mask in (seen.candidates.view(np.uint8), small, edge, 1 - (small | edge))
-    )
-    regions = {"shadow": shadow, "shadow_edge": shadow_edge, "lit": lit}
+    masks = {"shadow": small, "shadow_edge": edge, "lit": 1 - (small | edge)}
+    regions = {name: Packed.of(enlarged(mask, shape)) for name, mask in masks.items()}
     return Output(
         layers=(
-            Layer(CANDIDATES, candidates),
+            Layer(CANDIDATES, enlarged(seen.candidates.view(np.uint8), shape)),
             Layer(SHADED, stretched(shaded, shape)),
-            Layer(SHADOW, shadow),
-            Layer(GAIN, stretched(greatest, shape)),
+            Layer(SHADOW, regions["shadow"]),
+            Layer(GAIN, stretched(np.maximum.reduce(cv2.split(gain)), shape)),
             Layer(COMPENSATED, image),
         ),
         image=image,
-        regions={name: Packed.of(mask) for name, mask in regions.items()},
+        regions=regions,
     )
 
 
@@ -403,10 +366,8 @@ def oracle(settings: GatedSettings, model: ShadedRoad) -> Callable[[View, Truth]
     def run(view: View, truth: Truth) -> Output:
         small = reduced(view.image, settings.width)
         shadow = enlarged((truth == 1).view(np.uint8), small.shape)
-        if not shadow.any():
-            return Output(image=view.image)
-        seen = replace(look(small, model.place, settings), candidates=shadow > 0)
-        return Output(image=brighten(view.image, gains(seen, shadow.astype(np.float32))))
+        gain = gains(look(small, model.place, settings), shadow.astype(np.float32))
+        return Output(image=brighten(view.image, gain) if shadow.any() else view.image)
 
     return run
 

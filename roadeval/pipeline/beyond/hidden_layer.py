@@ -38,7 +38,7 @@ STEP: Final = 0.002
 Codes = npt.NDArray[np.uint8]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class HiddenLayer:
     """Rectified planes through ranks, and their weighted sum."""
 
@@ -58,17 +58,9 @@ class HiddenLayer:
     """Where the sum begins."""
 
     def __post_init__(self) -> None:
-        check_arrays(
-            self,
-            np.float32,
-            lowest=("F",),
-            scale=("F",),
-            ranks=("F", CODES),
-            planes=("K", "F"),
-            bias=("K",),
-            weights=("K",),
-            shift=(),
-        )
+        check_arrays(self, np.float32, lowest=("F",), scale=("F",), ranks=("F", CODES), shift=())
+        planes = ("K", self.inputs)
+        check_arrays(self, np.float32, planes=planes, bias=("K",), weights=("K",))
 
     @property
     def inputs(self) -> int:
@@ -77,12 +69,10 @@ class HiddenLayer:
 
     def sums(self, values: Values) -> Values:
         """Return the log-odds of each pixel of ``(F, n)`` features, ``(n,)`` float32."""
-        seen = ranked(values, self.lowest, self.scale, self.ranks)
-        inner: Values = self.planes @ seen
+        inner = self.planes @ ranked(values, self.lowest, self.scale, self.ranks)
         inner += self.bias[:, None]
         np.maximum(inner, 0, out=inner)
-        total: Values = self.weights @ inner
-        return total + np.float32(self.shift)
+        return self.weights @ inner + self.shift
 
 
 def train(
@@ -105,7 +95,7 @@ def train(
     from threadpoolctl import threadpool_limits
 
     lowest, highest = np.percentile(values, [OUTER, 100 - OUTER], axis=0).astype(np.float32)
-    scale = np.float32(CODES - 1) / np.maximum(highest - lowest, np.float32(LEAST))
+    scale = (CODES - 1) / np.maximum(highest - lowest, LEAST)
     features = np.ascontiguousarray(values.T)
     ranks = np.stack([_ranks(each) for each in codes_of(features, lowest, scale)])
     seen = np.ascontiguousarray(ranked(features, lowest, scale, ranks).T)
@@ -122,11 +112,10 @@ def train(
         for number in range(passes):
             drawn = rng.choice(count, count, p=chances)
             noisy = rng.standard_normal((count, seen.shape[1]), dtype=np.float32)
-            noisy *= np.float32(noise)
+            noisy *= noise
             noisy += seen[drawn]
             if number:
-                left = 1 - number / passes
-                network._optimizer.learning_rate_init = STEP * left
+                network._optimizer.learning_rate_init = STEP * (1 - number / passes)
             network.partial_fit(noisy, road[drawn], classes=[False, True])
     (inner, out), (bias, shift) = network.coefs_, network.intercepts_
     return HiddenLayer(
@@ -142,18 +131,16 @@ def train(
 
 def codes_of(values: Values, lowest: Values, scale: Values) -> Codes:
     """Return the codes of ``(F, n)`` features, see `HiddenLayer`."""
-    found: Codes = np.empty(values.shape, np.uint8)
+    found = np.empty(values.shape, np.uint8)
     for place, feature, least, step in zip(found, values, lowest, scale, strict=True):
-        steps = (feature - least) * step
-        steps += np.float32(0.5)
-        place[...] = np.clip(steps, 0, CODES - 1, out=steps)
+        place[...] = np.clip((feature - least) * step + 0.5, 0, CODES - 1)
     return found
 
 
 def ranked(values: Values, lowest: Values, scale: Values, ranks: Values) -> Values:
     """Return the ranks of ``(F, n)`` features, ``(F, n)`` float32."""
     codes = codes_of(values, lowest, scale)
-    found: Values = np.empty(values.shape, np.float32)
+    found = np.empty(values.shape, np.float32)
     for place, code, rank in zip(found, codes, ranks, strict=True):
         place[...] = cv2.LUT(code[None], rank[None])[0]
     return found
@@ -163,5 +150,4 @@ def _ranks(codes: Codes) -> Values:
     """Return for each code the share of pixels below it less that above it, ``(CODES,)``."""
     counts = np.bincount(codes, minlength=CODES)
     below = np.cumsum(counts) - counts
-    ranks: Values = ((2 * below + counts) / len(codes) - 1).astype(np.float32)
-    return ranks
+    return ((2 * below + counts) / len(codes) - 1).astype(np.float32)

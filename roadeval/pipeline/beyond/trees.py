@@ -30,15 +30,16 @@ from roadeval.kernels import KERNELS
 from roadeval.kernels.plain import LEAVES
 from roadeval.pipeline.beyond.features import (
     GROUPS,
-    REACH,
+    LIGHT,
+    SUNLIT,
     at_samples,
     beyond,
-    combined,
     features,
+    light_over,
     lit,
     names_of,
     opinions,
-    reach_inputs,
+    reach,
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.beyond.scene import Scene, scene_of, stretched
@@ -74,7 +75,7 @@ SHARE: Final = 0.33
 """Of the features, drawn anew for each node, among which it chooses."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Forest:
     """The sum of T trees, see `roadeval.kernels.plain.tree_sum`."""
 
@@ -95,37 +96,26 @@ class Forest:
         check_arrays(self, np.int32, feature=("T", NODES))
         check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
         check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
-        check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=())
-        if not isinstance(self.inputs, int):
-            raise ValueError("inputs is no whole number")
-        check_range("inputs", self.inputs, 1, GREATEST)
+        check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=(), inputs=())
         check_range("feature", self.feature, 0, self.inputs - 1)
         if not (self.kept >> np.uint32(LEAVES - 1)).all():
             raise ValueError("kept rules out a tree's last leaf, and so may leave none")
 
     def sums(self, values: Values) -> Values:
         """Return the sum for each pixel of ``(inputs, n)`` features, ``(n,)`` float32."""
-        total: Values = KERNELS.tree_sum(
-            values, self.feature, self.threshold, self.kept, self.values
-        )
-        return total + np.float32(self.offset)
+        arrays = self.feature, self.threshold, self.kept, self.values
+        return KERNELS.tree_sum(values, *arrays) + self.offset
 
 
 def grow(
-    values: Values,
-    road: Flags,
-    weights: Floats | None,
-    settings: TreesSettings,
-    seed: int,
-    *,
-    share: float = SHARE,
+    values: Values, road: Flags, weights: Floats | None, settings: TreesSettings, seed: int
 ) -> Forest:
     """Grow trees with scikit-learn's gradient boosting on histograms.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
     ``values`` are ``(n, F)`` finite features, ``road`` ``(n,)`` labels, of which both occur;
-    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. Each node chooses among
-    a ``share`` of the features, which ``seed`` draws.
+    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. ``seed`` draws the
+    features among which a node chooses.
     """
     from threadpoolctl import threadpool_limits
 
@@ -133,22 +123,22 @@ def grow(
     parts = np.arange(1, BINS) / BINS
     quantiles = np.quantile(values, parts, axis=0, weights=weights, method="inverted_cdf")
     edges = [np.unique(feature) for feature in quantiles.T]
-    bins = np.stack([np.searchsorted(*each) for each in zip(edges, values.T, strict=True)], axis=1)
+    bins = [np.searchsorted(*each).astype(np.uint8) for each in zip(edges, values.T, strict=True)]
     # Only here: the import takes a second, and a model from a file does not need it.
     boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
         learning_rate=RATE,
         max_iter=settings.trees,
         max_leaf_nodes=settings.leaves,
         min_samples_leaf=settings.least,
-        max_features=share,
+        max_features=SHARE,
         early_stopping=False,
         random_state=seed,
     )
     with threadpool_limits(1, "openmp"):
-        boosting.fit(bins.astype(np.uint8), road, sample_weight=weights)
+        boosting.fit(np.stack(bins, axis=1), road, sample_weight=weights)
     grown = [_arrays(tree.nodes, edges) for (tree,) in boosting._predictors]
-    feature, threshold, kept, leaves = (np.stack(each) for each in zip(*grown, strict=True))
-    offset = float(boosting._baseline_prediction.item())
+    feature, threshold, kept, leaves = map(np.stack, zip(*grown, strict=True))
+    offset = boosting._baseline_prediction.item()
     return Forest(feature, threshold, kept, leaves, offset, values.shape[1])
 
 
@@ -244,7 +234,7 @@ class TreesSettings:
         return names
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Blend:
     """A forest and a network that learnt from the same pixels, maybe on top of another blend."""
 
@@ -258,15 +248,11 @@ class Blend:
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, sizes=("n", 2))
         check_range("sizes", self.sizes, 1, GREATEST)
-        own = self.network.inputs
-        if self.forest.inputs != own:
+        own, below = self.network.inputs, self.base.inputs + 1 if self.base else None
+        if self.forest.inputs != own or below not in (None, own):
             raise ValueError(
-                f"the forest sees {self.forest.inputs} features of a pixel, and the network {own}"
-            )
-        if self.base is not None and own != self.base.inputs + 1:
-            raise ValueError(
-                f"what stands on top sees {own} features of a pixel, and the base "
-                f"{self.base.inputs}"
+                f"the forest takes {self.forest.inputs} features of a pixel, and the network {own}"
+                + ("" if below is None else f"; with that of the base there are {below}")
             )
 
     @property
@@ -276,8 +262,8 @@ class Blend:
 
     def knows(self, image: Rgb) -> bool:
         """Return whether images of the size of one taught it, or what it stands on."""
-        own = bool((self.sizes == image.shape[:2]).all(axis=1).any())
-        return own or (self.base is not None and self.base.knows(image))
+        own = (self.sizes == image.shape[:2]).all(axis=1).any()
+        return bool(own or (self.base and self.base.knows(image)))
 
     def log_odds(self, values: Values, weight: Values | float) -> Values:
         """Return the weighted mean of both for each pixel of ``(inputs, n)`` features, ``(n,)``.
@@ -286,9 +272,8 @@ class Blend:
         """
         if self.base is not None:
             values = np.concatenate([values, self.base.log_odds(values, weight)[None]])
-        trees, network = self.forest.sums(values), self.network.sums(values)
-        mean: Values = trees + np.asarray(weight, np.float32) * (network - trees)
-        return mean
+        trees = self.forest.sums(values)
+        return trees + weight * (self.network.sums(values) - trees)
 
 
 def see(
@@ -307,42 +292,38 @@ def see(
     return scene, np.concatenate([own, opinions(opinion, scene.shape)])
 
 
-def fit(sample: TrainingSet, settings: TreesSettings) -> Blend:
+def fit(sample: TrainingSet, settings: TreesSettings, base: Blend | None = None) -> Blend:
     """Grow the trees, and train the network, on the sampled pixels and their mirror images.
 
     The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
-    the classes weigh as much as they have there.
+    the classes weigh as much as they have there. What ``base`` says of a pixel is one more feature.
     """
-    values = at_samples(sample, partial(see, settings))
-    return _grown(np.concatenate(values), sample, settings)
-
-
-def adapt(known: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
-    """Learn from a drive's own pixels, for which what is known already is one more feature."""
-    if known.base is not None:
-        raise MisfitError("the model was adapted to a drive already; train it again")
-    check_fit(known, settings)
     values = np.concatenate(at_samples(sample, partial(see, settings)))
-    by_feature = np.ascontiguousarray(values.T)
-    given = known.log_odds(by_feature, network_weight(by_feature, settings))
-    return replace(_grown(np.column_stack([values, given]), sample, settings), base=known)
-
-
-def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blend:
+    if base is not None:
+        by_feature = np.ascontiguousarray(values.T)
+        known = base.log_odds(by_feature, network_weight(by_feature, settings))
+        values = np.column_stack([values, known])
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
     s, seed = settings, sample.seed
     forest = grow(values, road, weights, s, seed)
     network = train(values, road, weights, seed, planes=s.hidden, passes=s.passes, noise=s.noise)
     sizes = np.unique(np.array([each.shape[:2] for each in sample.images], np.int32), axis=0)
-    return Blend(forest, network, sizes)
+    return Blend(forest, network, sizes, base)
+
+
+def adapt(known: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
+    """Learn from a drive's own pixels, on top of what is known already."""
+    if known.base is not None:
+        raise MisfitError("the model was adapted to a drive already; train it again")
+    check_fit(known, settings)
+    return fit(sample, settings, known)
 
 
 def balanced_back(road: Flags, share: float) -> Floats:
     """Return weights ``(n,)`` with mean 1, by which a share of the ``(n,)`` pixels is road."""
     own = road.mean()
-    weights: Floats = np.where(road, share / own, (1 - share) / (1 - own))
-    return weights
+    return np.where(road, share / own, (1 - share) / (1 - own))
 
 
 def check_fit(learnt: Blend, settings: TreesSettings) -> None:
@@ -363,18 +344,14 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     one third in the shade, where it misses more road.
     """
     names = names_of(settings.features)
-    if REACH[-1] not in names:
+    if LIGHT not in names:
         return IN_LIGHT
-    share = lit(values[names.index(REACH[-1])])
-    weight: Values = np.float32(IN_SHADE) + np.float32(IN_LIGHT - IN_SHADE) * share
-    return weight
+    return IN_SHADE + (IN_LIGHT - IN_SHADE) * lit(values[names.index(LIGHT)])
 
 
 def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(learnt, settings)
-    names = names_of(settings.features)
-    known = [names.index(name) for name in REACH if name in names]
     _, share_spec, _ = layers(settings)
 
     def run(view: View) -> Output:
@@ -385,16 +362,14 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
                 f"trees: {len(planes)} features of a pixel, and it has learnt from {learnt.inputs}:"
                 " the stage before says how probable other classes of road are"
             )
-        over, around, light = planes[known] if len(known) == len(REACH) else reach_inputs(scene)
-        far = combined(over, around)
-        values = planes.reshape(len(planes), -1)
-        learnt_odds = learnt.log_odds(values, network_weight(values, settings))
+        far, (light,) = reach(scene), light_over(scene, SUNLIT).values()
         weight = settings.reach_weight
         if weight is None:
             weight = OWN_CAMERA if learnt.knows(view.original) else OTHERS
-        odds = learnt_odds.reshape(scene.shape) - np.float32(weight) * beyond(far, light)
-        share = stretched(sigmoid(odds), shape)
-        codes = np.rint(share * np.float32(CERTAIN)).astype(np.uint16)
+        values = planes.reshape(len(planes), -1)
+        odds = learnt.log_odds(values, network_weight(values, settings)).reshape(scene.shape)
+        share = stretched(sigmoid(odds - weight * beyond(far, light)), shape)
+        codes = np.rint(share * CERTAIN).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * CERTAIN))
         shown = (
             Layer(GEODESIC, stretched(far, shape)),
