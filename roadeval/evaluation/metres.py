@@ -224,7 +224,7 @@ class Survey:
         return by_stance[:, :, :-1]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Line:
     """A line on the ground: the pixels that it crosses, and where it enters and leaves them."""
 

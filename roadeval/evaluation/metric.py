@@ -21,7 +21,7 @@ class Shown(IntEnum):
     """Short tables and lists, graphs and charts, too."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Metric:
     """A number that is computed from the counts of one mask."""
 

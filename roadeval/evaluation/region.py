@@ -16,7 +16,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.kernels import KERNELS
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LabelledFrame:
     """The input of a region: a frame, its packed truth, and what the variants made of it."""
 
@@ -28,7 +28,7 @@ class LabelledFrame:
     """The places of its pixels on the ground; None where the camera is not known."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Region:
     """A region, or several that are found together."""
 

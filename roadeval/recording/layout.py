@@ -96,7 +96,7 @@ class DamagedError(RecordingError):
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Layout:
     """What is known about a recording before its first frame."""
 
@@ -258,7 +258,7 @@ class RuleKind(StrEnum):
 _RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RecordRule:
     """The setting ``output.record``. Numbers, notes and tables of all frames are always recorded.
 

@@ -11,15 +11,13 @@ import json
 import math
 import os
 import shutil
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
-import numpy as np
-import numpy.typing as npt
 import rerun as rr
 
 from roadeval.data import (
@@ -45,21 +43,19 @@ from roadeval.recording.rrd_file import indexed_messages
 from roadeval.runtime.files import NewFile, writing
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class EncodedFrame:
+class EncodedFrame(NamedTuple):
     """A frame ready to be written. Mappings are by entity path."""
 
     when: When
-    payloads: Mapping[str, bytes]
-    camera: str = ""
+    camera: str
     """Below which path all its entities lie, see `roadeval.recording.layout.prefixes`."""
-    scalars: Mapping[str, float] = field(default_factory=dict)
-    counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    states: Mapping[str, str] = field(default_factory=dict)
+    payloads: Mapping[str, bytes]
+    numbers: Mapping[str, tuple[float, ...]]
+    states: Mapping[str, str]
     """Every state, empty if undefined."""
-    notes: tuple[tuple[str, str], ...] = ()
+    notes: tuple[tuple[str, str], ...]
     """Sentences, each with its level."""
-    worst_error: float = -1.0
+    error: float
     """By what frames are ranked, see `worst_error`."""
 
     @property
@@ -68,8 +64,7 @@ class EncodedFrame:
         return sum(map(len, self.payloads.values()))
 
 
-@dataclass(frozen=True, slots=True)
-class _Camera:
+class _Camera(NamedTuple):
     """A camera of the recording, perhaps its only one."""
 
     prefix: str
@@ -81,82 +76,56 @@ class _Camera:
     """The ground as it is shown from above, where it is known."""
 
 
-def encode_frame(
-    result: FrameResult, camera: _Camera, kinds: Collection[LayerKind]
-) -> EncodedFrame:
-    """Encode a frame.
-
-    Of its images only layers of some ``kinds`` are encoded, and without any kind no image at all.
-    """
-    layout, below, frame = camera.layout, camera.prefix, result.frame
-    level = "WARN" if set(result.health.values()) - {Health.OK} else "INFO"
-    lanes = {at.state_path(v.name): result.health.get(v.name, "") for v in layout.variants}
-    lanes = {at.ROLE: result.role.value, **lanes}
-    counts = {
-        at.scalar_path("counts", tally.variant, tally.stage): tally.counts
-        for tally in result.tallies
-    }
-    payloads = _payloads(result, camera.codecs, camera.plan, kinds) if kinds else ()
-    return EncodedFrame(
-        (frame.number, frame.stamp_ns, frame.log_time_ns),
-        {below + path: payload for path, payload in payloads},
-        below,
-        scalars={below + path: number for path, number in _scalars(result, layout.rates)},
-        counts={below + path: (c.tp, c.tn, c.fp, c.fn, c.n) for path, c in counts.items()},
-        states={below + path: lane for path, lane in lanes.items()},
-        notes=tuple((note, level) for note in result.notes),
-        worst_error=worst_error(result, layout),
-    )
-
-
 def _payloads(
-    result: FrameResult,
-    codecs: Mapping[str, Codec],
-    plan: Plan | None,
-    kinds: Collection[LayerKind],
+    result: FrameResult, camera: _Camera, kinds: Collection[LayerKind]
 ) -> Iterator[tuple[str, bytes]]:
-    frame = result.frame
+    """Yield the images of a frame by entity path; of its layers those of some kinds."""
+    frame, codecs = result.frame, camera.codecs
     if frame.media_type in ("image/jpeg", "image/png"):
         yield at.CAMERA, bytes(frame.payload)
     else:
         yield at.CAMERA, codecs[at.CAMERA].encode(frame.image)
-    for path, mask in ((at.TRUTH_PATH, frame.truth), (at.TRUE_SHADOW, frame.shadow_truth)):
-        if mask is not None:
-            yield path, codecs[path].encode(mask)
-    for variant in result.variants:
-        for layer in variant.layers():
-            if layer.spec.kind in kinds:
-                path = at.layer_path(variant.variant, layer.spec.name)
-                yield path, codecs[path].encode(layer.content)
-    for name, layer in result.errors.items():
-        path = at.layer_path(name, ERRORS.name)
-        yield path, codecs[path].encode(layer.array)
-    if plan is not None and frame.image.shape[:2] == (plan.ground.height, plan.ground.width):
-        for path, picture in _from_above(result, plan):
+    for path, picture in _pictures(result, camera.plan, kinds):
+        if picture is not None:
             yield path, codecs[path].encode(picture)
 
 
-def _from_above(result: FrameResult, plan: Plan) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
-    """Yield the image, the truth and the errors as they look from above, by entity path."""
-    frame = result.frame
-    yield at.GROUND, plan.picture(frame.image)
-    if frame.truth is not None:
-        yield at.ground_path(TRUTH.name), plan.picture(frame.truth, IGNORE)
-    for name, layer in result.errors.items():
-        yield at.ground_path(name), plan.picture(layer.array, IGNORED)
+def _pictures(
+    result: FrameResult, plan: Plan | None, kinds: Collection[LayerKind]
+) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays beside the camera's image, as they are and as they look from above."""
+    frame, errors = result.frame, {n: layer.array for n, layer in result.errors.items()}
+    yield from ((at.TRUTH_PATH, frame.truth), (at.TRUE_SHADOW, frame.shadow_truth))
+    for variant in result.variants:
+        for layer in variant.layers():
+            if layer.spec.kind in kinds:
+                yield at.layer_path(variant.variant, layer.spec.name), layer.content
+    for name, array in errors.items():
+        yield at.layer_path(name, ERRORS.name), array
+    if plan is not None and frame.image.shape[:2] == (plan.ground.height, plan.ground.width):
+        yield at.GROUND, plan.picture(frame.image)
+        if frame.truth is not None:
+            yield at.ground_path(TRUTH.name), plan.picture(frame.truth, IGNORE)
+        for name, array in errors.items():
+            yield at.ground_path(name), plan.picture(array, IGNORED)
 
 
-def _scalars(result: FrameResult, rates: Collection[str]) -> Iterator[tuple[str, float]]:
+def _numbers(
+    result: FrameResult, rates: Collection[str]
+) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield rates that are defined, counts, milliseconds and facts by entity path."""
     for tally in result.tallies:
+        mask = tally.variant, tally.stage
         for rate, value in tally.rates.items():
             if rate in rates and not math.isnan(value):
-                yield at.scalar_path("metrics", tally.variant, tally.stage, rate), value
+                yield at.scalar_path("metrics", *mask, rate), (value,)
+        yield at.scalar_path("counts", *mask), (*tally.counts, tally.counts.n)
     for variant in result.variants:
         for stage in variant.stages:
-            where = variant.variant, stage.stage
-            yield at.scalar_path("timing", *where), stage.seconds * 1e3
+            mask = variant.variant, stage.stage
+            yield at.scalar_path("timing", *mask), (stage.seconds * 1e3,)
             for name, value in stage.output.facts.items():
-                yield at.scalar_path("facts", *where, name), value
+                yield at.scalar_path("facts", *mask, name), (value,)
 
 
 def worst_error(result: FrameResult, layout: Layout) -> float:
@@ -188,9 +157,8 @@ class WorstFrames:
 
     def offer(self, encoded: EncodedFrame) -> None:
         """Keep a frame's images if they are among the worst; of equals the earlier ones."""
-        number, camera = encoded.when[0], encoded.camera
-        bare = EncodedFrame(encoded.when, encoded.payloads, camera)
-        heapq.heappush(self._heap, (encoded.worst_error, -number, camera, bare))
+        bare = encoded._replace(numbers={}, states={}, notes=())
+        heapq.heappush(self._heap, (encoded.error, -encoded.when[0], encoded.camera, bare))
         self._bytes += bare.size
         while len(self._heap) > self._most or self._bytes > HELD:
             self._bytes -= heapq.heappop(self._heap)[-1].size
@@ -258,12 +226,11 @@ class Recorder:
             for path, codec in each.codecs.items()
         }
         self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
-        self._begun: set[str] = set()
         self._finished = self._failed = self._foretold = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._shown: dict[str, set[str]] = {}
-        self._pictured: dict[str, list[tuple[int, int]]] = {}
+        self._pictured = defaultdict[str, list[tuple[int, ...]]](list)
         self._blank: dict[str, EncodedFrame] = {}
         self._stream: rr.RecordingStream | None = None
         self._worst = WorstFrames(rule.number)
@@ -278,13 +245,12 @@ class Recorder:
             layouts = self._layouts
             texts = "".join(prefix + layout.to_json() for prefix, layout in layouts.items())
             identity = hashlib.blake2b(texts.encode(), digest_size=16).hexdigest()
-            stream = rr.RecordingStream(
+            self._stream = stream = rr.RecordingStream(
                 at.APPLICATION, recording_id=identity, send_properties=False
             )
             stream.save(self.partial, default_blueprint=views.arrange(layouts))
             first, *_ = layouts.values()
             stream.send_recording_name(first.drive)
-            self._stream = stream
             if "" not in layouts:
                 self._log_static(views.of_a_rig(at.prefixes(self._cameras), first))
             names = short_names([*self._cameras])
@@ -317,15 +283,28 @@ class Recorder:
         ``position`` counts the frames read, from 0.
         """
         own = self._cameras.get(result.frame.camera) or self._cameras[""]
+        frame, health, error = result.frame, result.health, worst_error(result, own.layout)
         kinds: Collection[LayerKind] = tuple(LayerKind)
         match self._rule.kind:
             case RuleKind.MASKS:
                 kinds = (LayerKind.MASK, LayerKind.LABELS)
             case RuleKind.EVERY if position % self._rule.number:
                 kinds = ()
-            case RuleKind.WORST if worst_error(result, own.layout) < self._worst.least:
+            case RuleKind.WORST if error < self._worst.least:
                 kinds = ()
-        return encode_frame(result, own, kinds)
+        states = {at.ROLE: result.role.value}
+        states |= {at.state_path(v.name): health.get(v.name, "") for v in own.layout.variants}
+        level = "WARN" if set(health.values()) - {Health.OK} else "INFO"
+        payloads, numbers = _payloads(result, own, kinds), _numbers(result, own.layout.rates)
+        return EncodedFrame(
+            (frame.number, frame.stamp_ns, frame.log_time_ns),
+            own.prefix,
+            {own.prefix + path: each for path, each in payloads} if kinds else {},
+            {own.prefix + path: each for path, each in numbers},
+            {own.prefix + path: each for path, each in states.items()},
+            tuple((note, level) for note in result.notes),
+            error,
+        )
 
     def write(self, encoded: EncodedFrame, lines: Mapping[str, str] = NO_LINES) -> None:
         """Append a frame, with its lines of the tables in `Layout.tables`, by name.
@@ -334,21 +313,22 @@ class Recorder:
 
         A `RecordingError` if the disk is full.
         """
-        below = encoded.camera
-        if below not in self._begun:
-            self._begun.add(below)
-            paths = (path.removeprefix(below) for path in encoded.scalars)
+        when, below = encoded.when, encoded.camera
+        if below not in self._shown:
+            paths = (path.removeprefix(below) for path in encoded.numbers)
             self._log_static(views.timing_lines(paths), below)
         put_aside = encoded.payloads and self._rule.kind is RuleKind.WORST
-        self._add_images(replace(encoded, payloads={}) if put_aside else encoded)
-        self._add_texts(encoded)
+        self._add_images(encoded._replace(payloads={}) if put_aside else encoded)
+        for path, state in encoded.states.items():
+            if self._states.get(path, "") != state:
+                self._rows.add(path, columns.states, when, state)
+                self._states[path] = state
+        for note in encoded.notes:
+            self._rows.add(below + at.NOTES, columns.notes, when, note)
         for name, text in lines.items():
-            where = encoded.camera + at.result_path(name)
-            self._rows.add(where, columns.texts, encoded.when, text)
-        for path, number in encoded.scalars.items():
-            self._numbers.add(path, columns.scalars, encoded.when, number)
-        for path, numbers in encoded.counts.items():
-            self._numbers.add(path, columns.counts, encoded.when, numbers)
+            self._rows.add(below + at.result_path(name), columns.texts, when, text)
+        for path, numbers in encoded.numbers.items():
+            self._numbers.add(path, columns.numbers, when, numbers)
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
         if put_aside:
@@ -366,15 +346,16 @@ class Recorder:
             RuleKind.WORST: min(self._rule.number, frames),
             RuleKind.EVERY: math.ceil(frames / max(self._rule.number, 1)),
         }.get(self._rule.kind, frames)
-        size, disk = shown * encoded.size, self._disk()
+        size, room = shown * encoded.size, self._room()
         if self._rule.kind is RuleKind.WORST and size > HELD:
             kept = f"{HELD >> 20} MiB of memory, about {HELD // encoded.size}"
             return f"`output.record` worst:{self._rule.number} keeps those that fit in {kept}"
         said = f"the recording will take about {size / 1e6:.0f} MB"
-        if disk.total and size > disk.free - LEAST_FREE:
+        if size > room:
+            free = f"{(room + LEAST_FREE) / 1e6:.0f} MB are free"
             return (
-                f"{said}, and only {disk.free / 1e6:.0f} MB are free: `output.record` masks or "
-                "worst:50 takes less, or `output.save` names a place on another disk"
+                f"{said}, and only {free}: `output.record` masks or worst:50 takes less, or "
+                "`output.save` names a place on another disk"
             )
         return said if size > WORTH_SAYING else ""
 
@@ -391,7 +372,7 @@ class Recorder:
             self._add_images(encoded)
             number, stamp_ns, log_time_ns = encoded.when
             after = number + 1, stamp_ns + 1, log_time_ns + 1
-            self._blank[encoded.camera] = replace(encoded, when=after, payloads={})
+            self._blank[encoded.camera] = encoded._replace(when=after, payloads={})
             self._end_frame(self._rows)
         while self._blank:
             self._add_images(self._blank.popitem()[1])
@@ -424,7 +405,7 @@ class Recorder:
             self._log_static(views.after_a_rig(results))
         self.flush()
         for each in self._cameras.values():
-            pictured = json.dumps(self._pictured.get(each.prefix, []))
+            pictured = json.dumps(self._pictured[each.prefix])
             self._log_static([(at.SHOWN, [rr.TextDocument(pictured)])], each.prefix)
         self._close()
         if indexed_messages(self.partial) < self._chunks:
@@ -440,32 +421,22 @@ class Recorder:
             ) from _failure(errno.ENOSPC)
 
     def _is_disk_full(self) -> bool:
-        disk = self._disk()
-        # A place that is no disk, as /proc, has no size.
-        return bool(disk.total) and disk.free < LEAST_FREE + self._rows.size
+        return self._room() < self._rows.size
 
-    def _disk(self) -> Any:
-        return shutil.disk_usage(self.partial.parent)
+    def _room(self) -> float:
+        """Return the bytes beside `LEAST_FREE`; a place that is no disk, as /proc, has no end."""
+        disk = shutil.disk_usage(self.partial.parent)
+        return disk.free - LEAST_FREE if disk.total else math.inf
 
     def _add_images(self, encoded: EncodedFrame) -> None:
         when, below = encoded.when, encoded.camera
         if below + at.CAMERA in encoded.payloads:
-            self._pictured.setdefault(below, []).append(when[:2])
-        for path, payload in encoded.payloads.items():
-            self._rows.add(path, self._columns[path], when, payload)
+            self._pictured[below].append(when[:2])
         # The viewer goes on showing an image until another comes, so a missing one is cleared.
-        for path in sorted(self._shown.get(below, set()) - encoded.payloads.keys()):
-            self._rows.add(path, self._columns[path], when, NOTHING)
+        missing = sorted(self._shown.get(below, set()) - encoded.payloads.keys())
+        for path, payload in {**encoded.payloads, **dict.fromkeys(missing, NOTHING)}.items():
+            self._rows.add(path, self._columns[path], when, payload)
         self._shown[below] = set(encoded.payloads)
-
-    def _add_texts(self, encoded: EncodedFrame) -> None:
-        when, below = encoded.when, encoded.camera
-        for path, state in encoded.states.items():
-            if self._states.get(path, "") != state:
-                self._rows.add(path, columns.states, when, state)
-                self._states[path] = state
-        for note in encoded.notes:
-            self._rows.add(below + at.NOTES, columns.notes, when, note)
 
     def _log_static(self, data: Iterable[tuple[str, list[Any]]], below: str = "") -> None:
         stream = self._open_stream()

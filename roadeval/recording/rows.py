@@ -18,7 +18,7 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
 
-from roadeval.recording.layout import COUNTS, FRAME, LOADER, MOST_WAITING, STAMP
+from roadeval.recording.layout import FRAME, LOADER, MOST_WAITING, STAMP
 
 When = tuple[int, int, int]
 """A frame's number, header stamp and log time, the times in nanoseconds."""
@@ -41,7 +41,7 @@ SHARE: Final = 8
 """One frame in this many may wait, within `WaitLimits`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WaitLimits:
     """For how many frames rows wait: a share of the frames so far, from ``least`` to ``most``.
 
@@ -138,15 +138,10 @@ def _size(value: Any) -> int:
     return len(value) if isinstance(value, bytes | str) else 0
 
 
-def scalars(values: list[float]) -> Any:
-    """Return columns of one number a row."""
-    return rr.Scalars.columns(scalars=values)
-
-
-def counts(values: list[tuple[int, ...]]) -> Any:
-    """Return columns of the numbers of `layout.COUNTS` a row."""
-    flat = np.array(values, np.float64).ravel()
-    return rr.Scalars.columns(scalars=flat).partition([len(COUNTS)] * len(values))
+def numbers(values: list[tuple[float, ...]]) -> Any:
+    """Return columns of one number a row, or of several, as those of `layout.COUNTS`."""
+    flat = np.array(values, np.float64)
+    return rr.Scalars.columns(scalars=flat.ravel()).partition([flat.shape[1]] * len(flat))
 
 
 def states(values: list[str]) -> Any:

@@ -37,7 +37,7 @@ Differences = dict[str, dict[str, Difference]]
 """Differences by stage or variant, then by rate."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DriveFacts:
     """The drive: its log's name, its camera, and the topics that were read."""
 
@@ -54,7 +54,7 @@ class DriveFacts:
     """The ground before it, too."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameAccount:
     """What became of every frame of the image topic; None is unknown, as of a run that ended early.
 
@@ -70,7 +70,7 @@ class FrameAccount:
     skipped: dict[str, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrainingFacts:
     """What the variants learnt from."""
 
@@ -82,7 +82,7 @@ class TrainingFacts:
     adapted: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class UnlabelledFacts:
     """The frames without truth: which to look at, and how far masks differ; no error rate."""
 
@@ -96,7 +96,7 @@ class UnlabelledFacts:
     """The mean share of pixels on which two variants differ, by both names."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class EstimateFacts:
     """Rates of a whole drive from frames that were drawn at random, picked by `roadeval pick`."""
 
@@ -116,7 +116,7 @@ class EstimateFacts:
     """Why there are no rates."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LogFacts:
     """The log's file, and what tells it from another (`roadeval.logs.Log.digest`)."""
 
@@ -327,7 +327,7 @@ def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
     return parts
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Member:
     """A drive of a fleet, as its command names it."""
 
@@ -340,7 +340,7 @@ class Member:
     """As the columns of the table ``drives``."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class StratumFacts:
     """A difference of ERR between two final masks, over the drives that have a value of a tag."""
 

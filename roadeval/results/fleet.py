@@ -29,7 +29,7 @@ from roadeval.results.facts import (
     check_format,
     is_fleet,
 )
-from roadeval.results.over_drives import final_rows, summarise
+from roadeval.results.over_drives import summarise
 from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
 from roadeval.results.tables import (
     AGAIN,
@@ -80,6 +80,11 @@ def results_path(folder: Path, drive: str) -> Path:
 def recording_path(folder: Path, drive: str) -> Path:
     """Return the recording of a drive, which may not have been kept."""
     return folder / RECORDINGS / f"{drive}.rrd"
+
+
+def is_final(row: Mapping[str, Any]) -> bool:
+    """Return whether a row is of a final mask, on all pixels where the table has regions."""
+    return bool(row["final"]) and row.get("region", ALL) == ALL
 
 
 class FleetFolder:
@@ -150,8 +155,19 @@ class FleetFolder:
     def first_scores(self) -> dict[str, dict[str, Any]]:
         """By drive the row of ``scores`` of the first variant's final mask, on all pixels."""
         first = next(iter(self.finals), None)
-        rows = final_rows(self.table("scores")) if first else []
+        rows = self._final("scores") if first else []
         return {row["drive"]: row for row in rows if row["variant"] == first}
+
+    def _final(self, name: str) -> list[dict[str, Any]]:
+        """Return the rows of the final masks, on all pixels where the table has regions."""
+        table = self.table(name)
+        table = table.filter(table["final"])
+        if "region" in table.column_names:  # in Arrow, for there are many
+            from pyarrow import compute
+
+            table = table.filter(compute.equal(table["region"], ALL))
+        rows: list[dict[str, Any]] = table.to_pylist()
+        return rows
 
     @cached_property
     def regions(self) -> dict[tuple[str, str], dict[str, float]]:
@@ -163,7 +179,7 @@ class FleetFolder:
     def effects(self) -> dict[tuple[str, str], list[dict[str, Any]]]:
         """Rows of ``effects`` of the final masks' ERR, where it is known, by base and variant."""
         found: defaultdict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
-        for row in final_rows(self.table("effects")):
+        for row in self._final("effects"):
             if row["metric"] == TESTED and row["mean"] is not None:
                 found[row["base"], row["variant"]].append(row)
         return dict(found)
@@ -236,10 +252,14 @@ class Record(Document):
     AGAIN = AGAIN
     RESULTS = ("drive", "asked", "stamp", "rows")
 
+    def table(self, name: str) -> list[dict[str, Any]]:
+        """Return its rows of a table."""
+        names = TABLES[name].names
+        return [dict(zip(names, row, strict=True)) for row in self.rows[name]]
+
     def value(self, column: str) -> Any:
         """Return a value of the drive's own row in ``drives``."""
-        ((*cells,),) = self.rows["drives"]
-        return cells[TABLES["drives"].names.index(column)]
+        return self.table("drives")[0][column]
 
     @property
     def failed(self) -> bool:
@@ -281,27 +301,6 @@ def read_record(folder: Path, drive: str) -> Record | None:
     except OSError as error:
         raise ResultsError(f"{path}: {error.strerror}") from error
     return record if record.drive == drive and record.fits else None
-
-
-class _Records:
-    """The records of a folder, read as they are needed: all together would fill the memory."""
-
-    def __init__(self, folder: Path, asked: Mapping[str, str]) -> None:
-        self._folder: Final = folder
-        self._asked: Final = asked
-
-    def __getitem__(self, drive: str) -> Record:
-        record = read_record(self._folder, drive)
-        if record is None:
-            raise ResultsError(
-                f"{self._folder}: the record of {drive} has gone; run the same command again"
-            )
-        if self._asked.get(drive, record.asked) != record.asked:
-            raise ResultsError(
-                f"{self._folder}: another command has replayed {drive} with other settings "
-                "meanwhile; run the same command again, or give each a folder of its own"
-            )
-        return record
 
 
 class FleetWriter:
@@ -356,40 +355,58 @@ class FleetWriter:
         """
         # Two commands may replay drives of one folder together.
         with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
-            write_tables(self.folder, members, _Records(self.folder, asked or {}))
-            drives = read_parquet(self.folder / "drives.parquet", "drives").to_pylist()
-            facts = summarise(self.folder, drives, members, settings, dict(run))
+            tables = self._write_tables(members, asked or {})
+            facts = summarise(tables, members, settings, dict(run))
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts
 
+    def _write_tables(
+        self, members: Sequence[Member], asked: Mapping[str, str]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """Write every table but that of frames; all are whole before one takes its name.
 
-def write_tables(
-    folder: Path, members: Sequence[Member], records: Mapping[str, Record] | _Records
-) -> None:
-    """Write every table but that of frames; all are whole before one takes its name.
+        Records are looked up one at a time: all together would fill the memory. Returned are the
+        rows of which the facts are made, see `summarise`.
+        """
+        tags = sorted({key for member in members for key in member.tags})
+        kept: dict[str, list[dict[str, Any]]] = {"drives": [], "scores": [], "effects": []}
+        worst: list[dict[str, Any]] = []
+        with ExitStack() as stack:
+            files = {
+                name: stack.enter_context(
+                    TableFile(
+                        self.folder / f"{name}.parquet", name, tags if name == "drives" else ()
+                    )
+                )
+                for name in OF_DRIVES
+            }
+            for member in members:
+                record = self._record(member.drive, asked)
+                (own,) = record.table("drives")
+                own |= {"name": member.name, "source": member.source, "group": member.group}
+                kept["drives"].append(own)
+                files["drives"].add([[*own.values(), *(member.tags.get(tag) for tag in tags)]])
+                for name in ("scores", "effects"):
+                    files[name].add(record.rows[name])
+                    kept[name] += filter(is_final, record.table(name))
+                worst += record.table("worst")
+                worst.sort(key=lambda row: (-row["ERR"], row["drive"], row["frame"]))
+                del worst[WORST:]
+            files["worst"].add((row | {"rank": n}).values() for n, row in enumerate(worst, 1))
+            for file in files.values():
+                file.finish()
+        return kept
 
-    Records are looked up one at a time. An OSError if a table cannot be written.
-    """
-    tags = sorted({key for member in members for key in member.tags})
-    with ExitStack() as stack:
-        files = {
-            name: stack.enter_context(
-                TableFile(folder / f"{name}.parquet", name, tags if name == "drives" else ())
+    def _record(self, drive: str, asked: Mapping[str, str]) -> Record:
+        record = read_record(self.folder, drive)
+        if record is None:
+            raise ResultsError(
+                f"{self.folder}: the record of {drive} has gone; run the same command again"
             )
-            for name in OF_DRIVES
-        }
-        worst: list[list[Any]] = []
-        err, drive, frame = map(TABLES["worst"].names.index, ("ERR", "drive", "frame"))
-        for member in members:
-            record = records[member.drive]
-            own = dict(zip(TABLES["drives"].names, record.rows["drives"][0], strict=True))
-            own |= {"name": member.name, "source": member.source, "group": member.group}
-            files["drives"].add([[*own.values(), *(member.tags.get(tag) for tag in tags)]])
-            for name in ("scores", "effects"):
-                files[name].add(record.rows[name])
-            worst = [*worst, *map(list, record.rows["worst"])]
-            worst = sorted(worst, key=lambda row: (-row[err], row[drive], row[frame]))[:WORST]
-        files["worst"].add([rank, *row[1:]] for rank, row in enumerate(worst, 1))
-        for file in files.values():
-            file.finish()
+        if asked.get(drive, record.asked) != record.asked:
+            raise ResultsError(
+                f"{self.folder}: another command has replayed {drive} with other settings "
+                "meanwhile; run the same command again, or give each a folder of its own"
+            )
+        return record

@@ -1,4 +1,4 @@
-"""The facts of many drives, made of their tables."""
+"""The facts of many drives, made of their tables' rows."""
 
 from __future__ import annotations
 
@@ -6,62 +6,91 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from roadeval.data import OUTCOMES, Counts
+import numpy as np
+
+from roadeval.data import OUTCOMES
 from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import TESTED, Effect, corrected
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference, DriveMean, over_drives, strata
-from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
+from roadeval.results.facts import FleetFacts, Member, StratumFacts
 from roadeval.results.schema import FAILED
 from roadeval.results.sentences import verdict
-from roadeval.results.tables import read_parquet
 from roadeval.version import VERSION
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 WARNINGS: Final = 5
 """Kinds of warnings of single drives that are listed."""
-Rows = list[dict[str, Any]]
+Rows = Sequence[Mapping[str, Any]]
 
 
 def summarise(
-    folder: Path,
-    drives: Rows,
+    tables: Mapping[str, Rows],
     members: Sequence[Member],
     settings: EvaluationSettings,
     run: dict[str, Any],
 ) -> FleetFacts:
-    """Make the facts of a fleet of the tables in its folder, and the rows of ``drives``."""
-    rows: defaultdict[Key, Rows] = defaultdict(list)
-    for row in final_rows(read_parquet(folder / "effects.parquet", "effects")):
-        rows[row["base"], row["variant"], row["metric"]].append(row)
+    """Make the facts of a fleet.
+
+    ``tables`` has the rows of ``drives``, and of ``scores`` and ``effects`` those of final masks,
+    on all pixels.
+    """
+    drives = tables["drives"]
     # Drives whose log has the digest of another one's, and the first of these.
     firsts = {row["log_digest"]: row["drive"] for row in reversed(drives) if row["log_digest"]}
     known = {row["drive"]: firsts[row["log_digest"]] for row in drives if row["log_digest"]}
     copies = {drive: first for drive, first in known.items() if drive != first}
     cameras = {row["drive"]: row["camera"] for row in drives}
     groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
-    effects, totals = _effects(rows, groups, settings), _totals(folder)
+    several = len({row["drive"] for row in tables["effects"]}) > 1
+    tags_of = {member.drive: member.tags for member in members}
+    keys = sorted({key for tags in tags_of.values() for key in tags})
+    effects: defaultdict[str, list[Effect]] = defaultdict(list)
+    parts: list[StratumFacts] = []
+    for (base, variant), rows in _by(tables["effects"], "base", "variant").items():
+        rates = {}
+        for (rate,), own in _by(rows, "metric").items():
+            means = [DriveMean(e["drive"], groups[e["drive"]], _number(e["mean"])) for e in own]
+            rates[rate] = _within(own[0], settings)
+            if several:
+                better = METRICS[rate].higher_is_better
+                rates[rate] = over_drives(means, settings.confidence, higher_is_better=better)
+            if rate == TESTED:
+                tags = {key: [tags_of[each.drive].get(key) for each in means] for key in keys}
+                found = strata(means, tags, settings.confidence)
+                parts += (StratumFacts(base, variant, *each) for each in found)
+        effects[base].append(Effect(base, variant, rows[0]["stage"], final=True, rates=rates))
+    differences = [each for own in effects.values() for each in corrected(own)]
+    totals: dict[str, dict[str, dict[str, Any]]] = {}
+    for (variant, stage), rows in _by(tables["scores"], "variant", "stage").items():
+        totals.setdefault(variant, {})[stage] = _over_all(rows)
     return FleetFacts(
-        verdict=verdict(totals, effects),
+        verdict=verdict(totals, differences),
         version=VERSION,
         drives=[*members],
         counts=dict(Counter(drive["status"] for drive in drives)),
         frames=sum(drive["evaluated"] or 0 for drive in drives),
         failed={d["drive"]: d["reason"] for d in drives if d["status"] == FAILED},
         totals=totals,
-        effects=effects,
-        strata=[*_strata(rows, members, groups, settings.confidence)],
+        effects=differences,
+        strata=parts,
         warnings=[*_of_copies(copies, cameras), *_of_drives(drives)],
         run=run,
     )
+
+
+def _by(rows: Rows, *names: str) -> dict[tuple[str, ...], list[Mapping[str, Any]]]:
+    """Return rows by the values of some columns, as they first occur."""
+    found: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(tuple(row[name] for name in names), []).append(row)
+    return found
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def _of_copies(same: Mapping[str, str], cameras: Mapping[str, str | None]) -> Iterator[str]:
@@ -94,93 +123,27 @@ def _of_drives(drives: Rows) -> Iterator[str]:
         yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"
 
 
-Key = tuple[str, str, str]
-"""Base, variant and metric of a difference of final masks."""
-
-
-def _effects(
-    effects: Mapping[Key, Rows], groups: Mapping[str, str], settings: EvaluationSettings
-) -> list[Effect]:
-    """Return the differences of final masks by their base: within the drive, or over drives."""
-    found: defaultdict[str, dict[str, Effect]] = defaultdict(dict)
-    several = len({row["drive"] for rows in effects.values() for row in rows}) > 1
-    for (base, variant, metric), rows in effects.items():
-        first = rows[0]
-        made = Effect(base, variant, first["stage"], True, {})
-        each = found[base].setdefault(variant, made)
-        difference = _within(first, settings)
-        if several:
-            means, better = [_mean(row, groups) for row in rows], METRICS[metric].higher_is_better
-            difference = over_drives(means, settings.confidence, higher_is_better=better)
-        found[base][variant] = replace(each, rates={**each.rates, metric: difference})
-    return [each for own in found.values() for each in corrected([*own.values()])]
-
-
 def _within(row: Mapping[str, Any], settings: EvaluationSettings) -> Difference:
     """Return the difference of a fleet's only drive, which is the fleet's."""
     return Difference(
-        mean=math.nan if row["mean"] is None else row["mean"],
-        **{name: row[name] for name in ("low", "high", "p", "standard_error")},
+        mean=_number(row["mean"]),
+        **{name: row[name] for name in ("low", "high", "p", "standard_error", "worse", "better")},
         confidence=settings.confidence,
         unit="frames",
         units=row["frames"],
-        worse=row["worse"],
-        better=row["better"],
         equal=None if row["worse"] is None else row["frames"] - row["worse"] - row["better"],
         effective=row["effective_frames"],
         needed=settings.least_frames if row["low"] is None else None,
     )
 
 
-def _mean(row: Mapping[str, Any], groups: Mapping[str, str]) -> DriveMean:
-    mean = math.nan if row["mean"] is None else row["mean"]
-    return DriveMean(row["drive"], groups[row["drive"]], mean)
-
-
-def _strata(
-    effects: Mapping[Key, Rows],
-    members: Sequence[Member],
-    groups: Mapping[str, str],
-    confidence: float,
-) -> Iterator[StratumFacts]:
-    """Divide the drives by each tag, for each difference of ERR."""
-    tags_of = {member.drive: member.tags for member in members}
-    keys = sorted({key for tags in tags_of.values() for key in tags})
-    for (base, variant, metric), rows in effects.items():
-        if metric == TESTED:
-            own = [_mean(row, groups) for row in rows]
-            tags = {key: [tags_of[each.drive].get(key) for each in own] for key in keys}
-            yield from (
-                StratumFacts(base, variant, *each) for each in strata(own, tags, confidence)
-            )
-
-
-def _totals(folder: Path) -> Totals:
-    """Return the rates of each final mask: the drives' mean, and of all pixels together."""
-    masks: defaultdict[tuple[str, str], Rows] = defaultdict(list)
-    columns = ["variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
-    for row in final_rows(read_parquet(folder / "scores.parquet", "scores", columns)):
-        masks[row["variant"], row["stage"]].append(row)
-    return {variant: {stage: _over_all(own)} for (variant, stage), own in masks.items()}
-
-
 def _over_all(rows: Rows) -> dict[str, Any]:
-    counts = Counts(*(sum(row[name] for row in rows) for name in OUTCOMES))
+    """Return the rates of a final mask: the drives' mean, and of all pixels together."""
+    counts = np.array([sum(row[name] for row in rows) for name in OUTCOMES])
     known = {name: [row[name] for row in rows if row[name] is not None] for name in METRICS}
     return {
         "drives": len(rows),
         "frames": sum(row["frames"] for row in rows),
         **{name: math.fsum(own) / len(own) if own else None for name, own in known.items()},
-        **{f"pooled_{name}": rate for name, rate in metrics.of(counts).items()},
+        **metrics.pooled(counts),
     }
-
-
-def final_rows(table: pa.Table) -> Rows:
-    """Return the rows of the final masks, on all pixels where the table has regions."""
-    from pyarrow import compute
-
-    table = table.filter(table["final"])
-    if "region" in table.column_names:
-        table = table.filter(compute.equal(table["region"], ALL))
-    rows: Rows = table.to_pylist()
-    return rows

@@ -43,7 +43,7 @@ TYPES: Final = dict(
 """The type of each kind, as NumPy and Arrow call it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Column:
     """A column of a table, with one line of documentation."""
 
@@ -57,7 +57,7 @@ class Column:
         return self.kind in (Kind.NAME, Kind.TEXT)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TableSchema:
     """A table: ``<name>.csv`` in the results of a drive, ``<name>.parquet`` in those of a fleet."""
 

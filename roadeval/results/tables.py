@@ -44,7 +44,7 @@ class ResultsError(RoadevalError):
     """Results that cannot be written or read."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TableFacts:
     """The rows of a table, and the SHA-256 of its text."""
 

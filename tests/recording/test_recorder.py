@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -167,8 +166,8 @@ def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
         with Recorder(tmp_path / "out.rrd", layout(), RecordRule.parse(rule)) as recorder:
             leave_free(monkeypatch, free)
             first = recorder.encode(result(0), 0)
-            assert recorder.forecast(replace(first, payloads={}), 1000) == ""
-            large = replace(first, payloads={"/camera": bytes(5_000_000)})
+            assert recorder.forecast(first._replace(payloads={}), 1000) == ""
+            large = first._replace(payloads={"/camera": bytes(5_000_000)})
             expected = f"the recording will take about {5 * shown} MB{said}"
             assert recorder.forecast(large, 1000).startswith(expected)
             assert recorder.forecast(large, 1000) == ""

@@ -8,7 +8,7 @@ from roadeval.recording.rows import (
     NUMBERS,
     Batcher,
     WaitLimits,
-    scalars,
+    numbers,
     states,
     texts,
 )
@@ -39,7 +39,7 @@ def test_rows_wait_for_a_part_of_the_frames_so_far(frames, waits):
 
 
 def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
-    ended = list(run(1000, lambda frame: [("/a", scalars, frame)]))
+    ended = list(run(1000, lambda frame: [("/a", numbers, (frame,))]))
     assert [row for *_, rows in ended for row in rows] == list(range(1000))
     for after, _, rows in ended[:-1]:
         assert after - rows[0] + 1 == WAIT.after(after + 1)

@@ -112,7 +112,7 @@ def test_no_more_is_held_than_there_is_room_for_and_the_run_says_so(tmp_path, mo
         plain = recorder.encode(result(0), 0)
         for number, err in enumerate([0.1, 0.5, 0.3, 0.5, 0.2, 0.4]):
             payloads = {"/camera": b"0" * (1 << 20)}
-            each = replace(plain, when=(number,) * 3, payloads=payloads, worst_error=err)
+            each = plain._replace(when=(number,) * 3, payloads=payloads, error=err)
             said = recorder.forecast(each, 6)
             assert said.endswith("worst:40 keeps those that fit in 3 MiB of memory, about 3") or (
                 number and not said

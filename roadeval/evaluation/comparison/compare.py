@@ -70,7 +70,7 @@ class ComparisonError(RoadevalError):
     """Results that cannot be compared."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ComparedResult:
     """One of the results."""
 
@@ -87,7 +87,7 @@ class ComparedResult:
     """``frames.scale``, where it is known and one for all drives."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Change:
     """What changed in a mask of a new result: one stage of one variant."""
 
@@ -119,7 +119,7 @@ class Change:
         return bool(self.difference) and all(each.is_zero for each in self.difference.values())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DriveChange:
     """The change in the ERR of a final mask on one of several drives."""
 
@@ -140,7 +140,7 @@ class DriveChange:
         return self.q is not None and self.q <= FALSE
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RegionChange:
     """The change in the ERR of a final mask within a region.
 
@@ -157,7 +157,7 @@ class RegionChange:
     difference: Difference
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Comparison:
     """Results compared with the first of them."""
 
@@ -289,7 +289,7 @@ def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
         yield replace(each, difference={**each.difference, **difference})
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _OnDrive:
     """A mask, or a region of it, on one drive."""
 

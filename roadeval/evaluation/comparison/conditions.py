@@ -59,7 +59,7 @@ class ConditionError(RoadevalError):
     """A condition that cannot be read or judged."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Condition:
     """A limit on a rate of a stage of a variant."""
 
@@ -132,7 +132,7 @@ class Condition:
         return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Judgement:
     """A condition that was judged on a result."""
 

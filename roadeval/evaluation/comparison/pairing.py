@@ -29,7 +29,7 @@ from roadeval.evaluation.stats import CameraRates
 Places = npt.NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Part:
     """A drive in a result, or one of its cameras. Its tables are read when they are asked for."""
 
@@ -60,7 +60,7 @@ Pair = tuple[Part, Part]
 """A drive in the base and in the new result."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Side:
     """One of the results that are compared."""
 
@@ -216,7 +216,7 @@ def matched(base: npt.NDArray[np.int64], new: npt.NDArray[np.int64]) -> tuple[Pl
     return mine, theirs
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MovedFrame:
     """A frame whose final ERR changed much: that of the base and of the new result."""
 
@@ -229,7 +229,7 @@ class MovedFrame:
     change: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Disagreement:
     """A frame on which two final masks disagree much."""
 

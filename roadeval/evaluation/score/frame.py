@@ -186,7 +186,7 @@ _LINEAR: Final = 1
 """OpenCV's numbers for the two, so that importing this module does not import OpenCV."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class BlindPrior:
     """Where the road was in the training frames."""
 

@@ -22,7 +22,7 @@ SPAN: Final = 1 << 20
 """More centimetres than two ends can lie apart, in either direction."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Measured:
     """A measure of a drive's final masks, in metres, or a rate over a part of the ground."""
 

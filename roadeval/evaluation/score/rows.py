@@ -92,7 +92,7 @@ def merged(chains: Iterable[Iterable[str]]) -> list[str]:
     return names
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Causes:
     """Each frame's error rate, taken apart."""
 

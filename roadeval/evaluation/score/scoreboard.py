@@ -61,7 +61,7 @@ and corrected for their number; other rates and stages say where a finding comes
 BASES: Final = (UNFILTERED, BASELINE)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Effect:
     """The paired differences of two masks of a drive, on the frames that both have."""
 

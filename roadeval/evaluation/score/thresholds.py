@@ -50,7 +50,7 @@ def at_levels(counts: Sums) -> Sums:
     return levels
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Thresholds:
     """The outcomes at each threshold, from the highest to the lowest that occurs."""
 

@@ -73,7 +73,7 @@ class _Models(NamedTuple):
     """``(g,)``: variance of the mean, in the series' variance."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class MeanDistribution:
     """Distribution of the mean of a process, given a series that is a stretch of it."""
 
@@ -207,7 +207,7 @@ def _bent(t: float, skewness: float) -> float:
     return 3 / skewness * (math.cbrt(1 + skewness * (t - skewness / 6)) - 1)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Difference:
     """A mean of paired differences, new minus base, with its interval. Fractions."""
 

@@ -54,7 +54,7 @@ _ROUNDING: Final = 1e-12
 """Sums this near to 0, in sums of the absolute values, are 0."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DriveMean:
     """The mean difference of a rate on one drive, new minus base."""
 

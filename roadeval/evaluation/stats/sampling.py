@@ -25,7 +25,7 @@ LEAST_LEFT: Final = 0.05
 """One minus the leverage of a frame is at least this."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Estimate:
     """The mean of a rate over all frames, from those that were drawn and labelled."""
 

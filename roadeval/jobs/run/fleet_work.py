@@ -21,7 +21,6 @@ from roadeval import logs
 from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig
 from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score import final_stages
 from roadeval.fleet.entry import DriveEntry, FleetError
 from roadeval.fleet.remote import stamp
@@ -38,13 +37,14 @@ from roadeval.results.fleet import (
     RESULTS,
     Record,
     frames_path,
+    is_final,
     read_record,
     record_path,
     recording_path,
     results_path,
 )
 from roadeval.results.rows import Key, cells, drive_row, frame_rows
-from roadeval.results.schema import FAILED, TABLES
+from roadeval.results.schema import FAILED
 from roadeval.results.tables import TableFile
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
@@ -133,10 +133,8 @@ def valid_record(task: DriveTask) -> Record | None:
 
 def done(record: Record, *, repeated: bool = False) -> Done:
     """Return what a record says to the fleet's command."""
-    names = TABLES["scores"].names
-    rows = (dict(zip(names, row, strict=True)) for row in record.rows["scores"])
     # The mean ERR of the first variant's final mask.
-    err = next((row["ERR"] for row in rows if row["final"] and row["region"] == ALL), None)
+    err = next((row["ERR"] for row in record.table("scores") if is_final(row)), None)
     status, reason = record.value("status"), record.value("reason") or ""
     return Done(record.drive, status, reason, record.asked, err, repeated)
 
