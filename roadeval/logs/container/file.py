@@ -77,33 +77,21 @@ def containers_in(
     ``opened`` is the file where it lies elsewhere. ``stamp_of`` is called only next to damage.
     """
     rest = FileBytes(opened or path.open("rb", buffering=BUFFER))
-    while True:
-        container = Container(path, rest, wanted, stamp_of)
-        yield container
-        rest = rest.part(len(container.source), len(rest))
-        if not len(rest):
-            return
+    while len(rest):
+        scan = Scan(rest, stamp_of)
+        if scan.next_log is not None:
+            scan = Scan(rest.part(0, scan.next_log), stamp_of)
+        yield Container(path, scan, wanted)
+        rest = rest.part(len(scan.source), len(rest))
 
 
 class Container:
-    """One MCAP log, damaged or not; the parameters are those of `containers_in`."""
+    """One MCAP log, damaged or not; ``wanted`` is that of `containers_in`."""
 
-    def __init__(
-        self,
-        path: Path,
-        source: FileBytes,
-        wanted: Wanted,
-        stamp_of: StampOf,
-    ) -> None:
-        self.path = path
-        self._wanted, self._stamp_of = wanted, stamp_of
-        self.source, self.scan = source, Scan(source, stamp_of)
-        if self.scan.next_log is not None:
-            self.source = source.part(0, self.scan.next_log)
-            self.scan = Scan(self.source, stamp_of)
-        self.reader = self.scan.reader
-        self.chunks, self.summary = self.scan.chunks, self.scan.summary
-        self.schemas, self.channels = self.scan.schemas, self.scan.channels
+    def __init__(self, path: Path, scan: Scan, wanted: Wanted) -> None:
+        self.path, self.scan, self._wanted = path, scan, wanted
+        self.source, self.reader, self.chunks = scan.source, scan.reader, scan.chunks
+        self.schemas, self.channels = scan.schemas, scan.channels
         self.data_is_right: bool | None = None
         """Whether the checksum of all data is, None before it was looked at."""
         self.misled: set[int] = set()
@@ -111,31 +99,26 @@ class Container:
         self.redefined: dict[int, str] = {}
         """Which of two descriptions of topics is believed, by the offset of the second."""
         logs = self._file()
-        if self.summary.statistics is not None and not self._is_as_counted(logs):
+        if scan.summary.statistics is not None and not self._is_as_counted(logs):
             logs = self._file(look=True)
         if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
-            late = (each for each in self.scan.late if isinstance(each, Schema) or each.id in logs)
-            self.scan.define(*late)
+            late = (each for each in scan.late if isinstance(each, Schema) or each.id in logs)
+            scan.define(*late)
             for chunk in self.chunks:
                 if chunk.offset in self.reader.bad:
-                    self.scan.define(*definitions(self.reader.remains(chunk)))
+                    scan.define(*definitions(self.reader.remains(chunk)))
             logs = self._file()
         self.logs = self._file() if self._redefine(logs) else logs
         """Where messages lie, by the number of their channel."""
-        self.looked_into = frozenset(self.scan.seen)
+        self.looked_into = frozenset(scan.seen)
         """Chunks whose messages were not filed by their message indexes."""
-        self.scan.seen.clear()
+        scan.seen.clear()
 
     @property
     def expected(self) -> Mapping[int, int]:
         """How many messages a channel should have, by the file's own statistics, if any."""
-        statistics = self.summary.statistics
+        statistics = self.scan.summary.statistics
         return statistics.channel_message_counts if statistics else {}
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether there are as many messages as a summary counts that can be relied on."""
-        return self.summary.checked and self._is_as_counted(self.logs)
 
     def topic(self, channel_id: int) -> str:
         """Return the topic of a channel, or its number where it is not defined."""
@@ -176,9 +159,7 @@ class Container:
         """
         parts = [b"%d %d" % (len(self.source), self.scan.data_crc)]
         for chunk, index in zip(self.chunks, self.scan.indexes, strict=True):
-            parts.append(
-                b"%d %d %d %d" % (chunk.offset, chunk.size, chunk.data_size, chunk.crc or 0)
-            )
+            parts.append(b"%d %d %d %d" % (chunk.offset, chunk.size, chunk.data_size, chunk.crc))
             if not chunk.crc:
                 begin = chunk.data_offset
                 parts.append(self.source[begin : begin + min(chunk.data_size, BEGIN)])
@@ -232,9 +213,9 @@ class Container:
         if number in self.scan.seen:
             return self.scan.seen[number]
         index = self.scan.indexes[number] or {}
-        look = look or not all(map(self._is_described, index))
-        with suppress(BadRecord):
-            return self.scan.look(number) if look or not index else index
+        if look or not index or not all(map(self._is_described, index)):
+            with suppress(BadRecord):
+                return self.scan.look(number)
         return index
 
     def _described(self, channel_id: int) -> tuple[Channel | None, Schema | None]:
@@ -246,43 +227,44 @@ class Container:
         return channel is not None and (schema is not None or channel.schema_id == 0)
 
     def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
-        """Where a topic is described twice, choose by its messages; return whether any was changed.
+        """Where a topic is described twice, choose by its messages; return whether there is one.
 
         Messages were written by the descriptions in the data, which stand in the first chunk or in
-        that of a channel's first message. Only those of a chunk with a checksum are believed where
-        the messages fit both.
+        that of a channel's first message: of a chunk with a checksum they are believed where the
+        messages fit both.
         """
-        before = {**self.schemas}, {**self.channels}
-        conflicts = [(offset, record, False) for offset, record in self.scan.conflicts]
+        others: list[tuple[int, Schema | Channel, bool]] = [
+            (offset, record, False) for offset, record in self.scan.conflicts
+        ]
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
         for number in sorted(first - {OUTSIDE}) if self.chunks else []:
             chunk = self.chunks[number]
             if not chunk.cut and chunk.crc and chunk.size <= IN_MEMORY:
                 with suppress(BadRecord):
                     found = definitions(self.reader.read(chunk))
-                    conflicts += [(chunk.offset, record, True) for record in found]
-        for offset, record, checked in conflicts:
+                    others += [(chunk.offset, record, True) for record in found]
+        for offset, record, checked in others:
             known: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
             other = known.setdefault(record.id, record)
             if other == record:
                 continue
-            fit = self._fit(other, logs)
-            known[record.id] = record
-            own_fit = self._fit(record, logs)
-            if own_fit < fit or (own_fit == fit and not checked):
-                known[record.id] = other
+            fits = []
+            for each in (other, record):
+                known[record.id] = each
+                fits.append(self._fit(each, logs))
+            is_second = fits[1] > fits[0] or (fits[1] == fits[0] and checked)
+            known[record.id] = record if is_second else other
             said, names = "a topic is described here in another way than before", ("that", "this")
             if checked:
                 said = "the summary describes topics in another way than the data"
                 names = "the summary", "the data"
-            name = names[known[record.id] is record]
-            doubt = "either may be wrong" if fit == own_fit else "messages fit it better"
-            self.redefined[offset] = f"{said}; {name} is believed; {doubt}"
-        return before != (self.schemas, self.channels)
+            doubt = "either may be wrong" if fits[0] == fits[1] else "messages fit it better"
+            self.redefined[offset] = f"{said}; {names[is_second]} is believed; {doubt}"
+        return bool(self.redefined)
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
         """Count the messages that a description decodes, and sum up how near their stamps are."""
-        decoded = nearness = 0
+        distances = []
         for channel_id, log in logs.items():
             channel, schema = self._described(channel_id)
             if channel is None or record not in (channel, schema):
@@ -290,10 +272,10 @@ class Container:
             for chunk, entries in log.blocks[:TRIED] if self._wanted(channel, schema) else ():
                 log_time, offset = entries[0].tolist()
                 with suppress(BadRecord):
-                    stamp = self._stamp_of(channel, schema, self.message(chunk, offset))
+                    stamp = self.scan.stamp_of(channel, schema, self.message(chunk, offset))
                     if stamp is not None:
-                        decoded, nearness = decoded + 1, nearness - abs(stamp - log_time)
-        return decoded, nearness
+                        distances.append(abs(stamp - log_time))
+        return len(distances), -sum(distances)
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,10 +315,9 @@ class Damage:
 
 def damage_of(container: Container) -> tuple[Damage, ...]:
     """List what is wrong with a log, as far as it is known by now, in the file's order."""
-    found = [*_gaps(container), *_chunks(container), *_absent(container), *_channels(container)]
-    if not any(damage.unsure_ns is not None for damage in found) and not container.reader.bad:
+    found = [*_gaps(container), *_chunks(container), *_others(container)]
+    if not any(each.unsure_ns is not None for each in found) and not container.reader.bad:
         found += _missing(container)
-    found += _wrong_sums(container)
     begin = container.source.begin
     if begin:
         reason = "another log begins here, behind the one before; its messages are read as well"
@@ -357,38 +338,36 @@ def sure_until(container: Container) -> int | None:
 
 def _gaps(container: Container) -> Iterator[Damage]:
     scan, chunks = container.scan, container.chunks
-    if not scan.gaps:
-        return
     places = [(chunk.offset, chunk.start, chunk.end) for chunk in chunks if not chunk.cut]
-    for flat in scan.loose.values():
+    for flat in scan.loose.values() if scan.gaps else ():
         places += [(at, time, time) for time, at in zip(flat[::2], flat[1::2], strict=True)]
     places.sort()
     least = [*accumulate((start for _, start, _ in reversed(places)), min)][::-1]
     # Each listed chunk that is not there is reported by itself.
-    listed = bool(container.summary.checked and container.summary.chunks and not scan.loose)
+    listed = bool(scan.summary.checked and scan.summary.chunks and not scan.loose)
     for offset, _, reason, lossy in scan.gaps:
         if not lossy and offset in container.reader.bad:
             continue
         number = bisect_left(places, (offset,))
-        before, after, least_after = None, None, BEFORE_ALL
-        if chunks and chunks[-1].cut and chunks[-1].offset == offset:
+        before = places[number - 1][2] if number else None
+        if chunks and chunks[-1].cut and chunks[-1].offset == offset and scan.saved_ns is not None:
             before = scan.saved_ns
-        if before is None and number:
-            before = places[number - 1][2]
-        if number < len(places):
-            after, least_after = places[number][1], least[number]
+        after = places[number][1] if number < len(places) else None
+        unsure = None
+        if lossy and not listed:
+            unsure = BEFORE_ALL if before is None else min([before, *least[number : number + 1]])
+            unsure += before is not None and after is None
         lossy = lossy and not listed  # noqa: PLW2901
-        unsure = None if not lossy else BEFORE_ALL if before is None else before + 1
-        if unsure is not None and before is not None and after is not None:
-            unsure = min(before, least_after)
         yield Damage(container.path, offset, reason, lossy, before, after, unsure_ns=unsure)
 
 
 def _chunks(container: Container) -> Iterator[Damage]:
-    """Chunks that cannot be read, or whose content is not what is said of it."""
-    path, reader = container.path, container.reader
+    """Chunks that cannot be read, or are not there, or whose content is not what is said of it."""
+    path, reader, summary = container.path, container.reader, container.scan.summary
+    listed = Counter(each[1:4] for each in summary.chunks.values() if summary.checked)
     for number, chunk in enumerate(container.chunks):
         at, start, end = chunk.offset, chunk.start, chunk.end
+        listed[chunk[1:4]] -= 1
         if number in container.misled:
             yield Damage(path, at, "the message index of a chunk is wrong", lossy=False)
         reason = reader.bad.get(at) or reader.kept.get(at, "")
@@ -402,18 +381,11 @@ def _chunks(container: Container) -> Iterator[Damage]:
             if index and number not in container.looked_into:
                 unsure = None
             yield Damage(path, at, reason, True, start, end, lost, unsure_ns=unsure)
-
-
-def _absent(container: Container) -> Iterator[Damage]:
-    """Chunks that the summary lists and that were not found."""
-    found = Counter((chunk.start, chunk.end, chunk.size) for chunk in container.chunks)
-    listed = container.summary.chunks.values() if container.summary.checked else ()
-    for chunk in listed:
-        start, end, size = chunk.start, chunk.end, chunk.size
-        found[start, end, size] -= 1
-        if found[start, end, size] < 0:
-            reason = "a chunk that the summary lists is not there"
-            yield Damage(container.path, chunk.offset, reason, True, start, end, unsure_ns=start)
+    for chunk in summary.chunks.values():
+        if listed[chunk[1:4]] > 0:
+            listed[chunk[1:4]] -= 1
+            reason, start = "a chunk that the summary lists is not there", chunk.start
+            yield Damage(path, chunk.offset, reason, True, start, chunk.end, unsure_ns=start)
 
 
 def _missing(container: Container) -> Iterator[Damage]:
@@ -428,8 +400,9 @@ def _missing(container: Container) -> Iterator[Damage]:
             yield Damage(container.path, end, reason, lost=lost, unsure_ns=BEFORE_ALL)
 
 
-def _channels(container: Container) -> Iterator[Damage]:
-    path = container.path
+def _others(container: Container) -> Iterator[Damage]:
+    """Topics that are described twice or nowhere, and wrong checksums."""
+    path, scan, summary = container.path, container.scan, container.scan.summary
     for offset, reason in container.redefined.items():
         yield Damage(path, offset, reason)
     for channel_id, log in container.logs.items():
@@ -437,22 +410,14 @@ def _channels(container: Container) -> Iterator[Damage]:
             reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
             span = log.first_ns, log.last_ns
             yield Damage(path, 0, reason, True, *span, unsure_ns=log.first_ns)
-
-
-def _wrong_sums(container: Container) -> Iterator[Damage]:
-    path, scan, summary = container.path, container.scan, container.summary
-    if scan.data_end is not None and summary.problem:
-        start, after = summary.start, scan.after_data
-        shift = 0 if start is None or after is None else start - after
+    if scan.after_data is not None and summary.problem:
+        shift = 0 if summary.start is None else summary.start - scan.after_data
         change = "are missing" if shift > 0 else "too many lie"
         reason = summary.problem + f", and {abs(shift)} bytes {change} before it" * bool(shift)
-        unsure = BEFORE_ALL if shift and not container.is_complete else None
-        yield Damage(path, scan.data_end, reason, lossy=bool(shift), unsure_ns=unsure)
+        unsure = BEFORE_ALL if shift else None
+        yield Damage(path, scan.data_end or 0, reason, lossy=bool(shift), unsure_ns=unsure)
     if container.data_is_right is False:
-        unchecked = bool(scan.loose) or not all(chunk.crc for chunk in container.chunks)
+        lossy = bool(summary.problem) or not container.is_covered
         reason = "the checksum of all data is wrong"
-        if unchecked:
-            reason += ", and nothing tells which message is; any may be"
-        elif summary.problem:
-            reason += ", and no summary tells whether messages are missing"
-        yield Damage(path, scan.data_end or 0, reason, unchecked or bool(summary.problem))
+        reason += ", and nothing tells which messages are wrong or missing" * lossy
+        yield Damage(path, scan.data_end or 0, reason, lossy)

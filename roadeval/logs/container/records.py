@@ -1,7 +1,7 @@
 """Bytes by position, the records of an MCAP file in them, chunks of records, and the summary.
 
 The layouts are those of https://mcap.dev/spec. The `mcap` library reads all records but messages,
-chunks and message indexes: those are read here from a few bytes, so that a file can be walked
+chunks and their indexes: those are read here from a few bytes, so that a file can be walked
 through without reading its data. Whatever does not add up raises a `BadRecord`.
 """
 
@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from io import BytesIO
-from tempfile import SpooledTemporaryFile
+from tempfile import TemporaryFile
 from typing import IO, Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -38,6 +38,8 @@ CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
 _INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
+_CHUNK_INDEX: Final = struct.Struct("<QQQQI")
+"""Start time, end time, offset and length of the chunk's record, bytes of a map."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
 _LONGEST_NAME: Final = 64
@@ -60,6 +62,8 @@ BLOCK: Final = 1 << 20
 """Bytes to uncompress at a time."""
 LARGEST_CHUNK: Final = 1 << 30
 """Most bytes that are uncompressed of a chunk: a few of them can become any number."""
+LIKELY: Final = 64
+"""By how much a chunk may have been compressed whose head claims another size."""
 IN_MEMORY: Final = 16 << 20
 """A chunk of more bytes is held in a temporary file; writers make chunks of about a megabyte."""
 CACHE: Final = 16 << 20
@@ -95,8 +99,7 @@ class FileBytes:
         return self._size
 
     def __getitem__(self, part: slice, /) -> bytes:
-        start, stop = part.start, part.stop
-        stop = min(stop, self._size)
+        start, stop = part.start, min(part.stop, self._size)
         if start >= stop:
             return b""
         try:
@@ -155,27 +158,22 @@ class Chunk(NamedTuple):
     """Log times of its first and its last message."""
     size: int
     """Bytes of its records, uncompressed."""
-    crc: int | None
-    """Checksum of these; 0 if not given, None if it may be damaged."""
+    crc: int
+    """Checksum of these; 0 if not given."""
     compression: str
     data_offset: int
     data_size: int
+    proven: bool = False
+    """Whether its checksum or the summary says that it lies here, of this length."""
     cut: bool = False
     """Whether it continues beyond the end of the file."""
     repaired: bool = False
     """Whether its own head is damaged, and what it says was found out otherwise."""
-    proven: bool = False
-    """Whether its checksum or the summary says that it lies here, of this length."""
 
     @property
     def data_end(self) -> int:
         """Where its data ends in the file."""
         return self.data_offset + self.data_size
-
-    @property
-    def listing(self) -> tuple[object, ...]:
-        """What the summary says of it as well, but for its place."""
-        return self.start, self.end, self.size, self.compression, self.data_size
 
     @property
     def record(self) -> Record:
@@ -215,17 +213,15 @@ def parse(opcode: int, body: Buffer) -> Any:
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
     """Read a chunk's head; the length that it says of its data may contradict the record's own."""
     head = source[record.body : record.body + CHUNK_HEAD.size + _LONGEST_NAME + 8 + 4]
-    if len(head) < CHUNK_HEAD.size:
-        raise BadRecord("a chunk without a head")
-    start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
-    data_at = CHUNK_HEAD.size + name_length + 8
-    if name_length > _LONGEST_NAME or len(head) < data_at:
-        raise BadRecord("a chunk whose head is damaged")
-    name = bytes(head[CHUNK_HEAD.size : data_at - 8]).decode("utf-8", "replace")
-    (data_size,) = struct.unpack_from("<Q", head, data_at - 8)
-    if name not in COMPRESSIONS:  # it is damaged, and the data has a name of its own
-        name = _MAGIC.get(bytes(head[data_at : data_at + 4]), name)
-    return Chunk(record.offset, start, end, size, crc, name, record.body + data_at, data_size)
+    with suppress(struct.error):
+        start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
+        at = CHUNK_HEAD.size + min(name_length, _LONGEST_NAME)
+        (data_size,) = struct.unpack_from("<Q", head, at)
+        name = bytes(head[CHUNK_HEAD.size : at]).decode("utf-8", "replace")
+        if name not in COMPRESSIONS:  # it is damaged, and the data has a name of its own
+            name = _MAGIC.get(bytes(head[at + 8 : at + 12]), name)
+        return Chunk(record.offset, start, end, size, crc, name, record.body + at + 8, data_size)
+    raise BadRecord("a chunk without a head")
 
 
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:
@@ -278,7 +274,8 @@ class ChunkReader:
     def __init__(self, source: FileBytes) -> None:
         self._source = source
         self._cache: OrderedDict[int, Bytes] = OrderedDict()
-        self._doubts_left = DOUBTED + 4 * len(source)
+        self.patience = DOUBTED + 4 * len(source)
+        """Bytes that may still be uncompressed in vain: below 0 no chunk is proven."""
         self.bad: dict[int, str] = {}
         """Why a chunk could not be read, by its offset."""
         self.kept: dict[int, str] = {}
@@ -301,55 +298,59 @@ class ChunkReader:
 
     def remains(self, chunk: Chunk) -> Bytes:
         """Uncompress a chunk as far as possible."""
-        return self._uncompressed(chunk, whole=False)
+        return self._uncompressed(chunk, LARGEST_CHUNK, whole=False)
 
-    def sized(self, chunk: Chunk) -> Chunk:
-        """Return a chunk with the size of what its data is uncompressed to, if time allows."""
-        return chunk if self._doubts_left < 0 else chunk._replace(size=len(self.remains(chunk)))
+    def proof(self, chunk: Chunk) -> Chunk | None:
+        """Return a chunk whose content its checksum confirms, whatever size its head claims.
 
-    def is_sound(self, chunk: Chunk) -> bool:
-        """Whether the content of a chunk is what its head says.
-
-        Without a checksum it must consist of whole records. Of a file that claims one wrong chunk
-        after the other only so many are looked at.
+        Without a checksum it must consist of whole records, of that size. None if it is not, or of
+        a file that claims one wrong chunk after the other.
         """
-        if self._doubts_left < 0 or chunk.data_end > len(self._source):
-            return False
-        with suppress(BadRecord):
-            records = self._whole(chunk)
-            if chunk.crc or max((each.end for each in walk(records)), default=0) == chunk.size:
-                self._keep(chunk.offset, records)
-                return True
-        self._doubts_left -= chunk.data_size
-        return False
+        left = len(self._source) - chunk.data_offset
+        if (chunk.size or chunk.crc) and 0 < chunk.data_size <= left and self.patience >= 0:
+            most = max(chunk.size, LIKELY * chunk.data_size) if chunk.crc else chunk.size
+            with suppress(BadRecord):
+                records = self._uncompressed(chunk, most, whole=True)
+                size = len(records)
+                if (
+                    crc_of(records) == chunk.crc
+                    if chunk.crc
+                    else size == chunk.size == max((each.end for each in walk(records)), default=0)
+                ):
+                    self._keep(chunk.offset, records)
+                    return chunk._replace(size=size, proven=True)
+                self.patience -= size
+            self.patience -= chunk.data_size
+        return None
 
     def _whole(self, chunk: Chunk) -> Bytes:
-        doubts_left = self._doubts_left
-        records = self._uncompressed(chunk, whole=True)
-        if len(records) != chunk.size:
+        records = self._uncompressed(chunk, chunk.size, whole=True)
+        if len(records) < chunk.size:
             raise BadRecord(f"a chunk of {len(records)} bytes that claims to hold {chunk.size}")
-        if chunk.crc is None:
-            raise BadRecord("a chunk whose head is damaged")
         if chunk.crc and crc_of(records) != chunk.crc:
             raise BadRecord("a chunk whose checksum is wrong")
-        self._doubts_left = doubts_left
         return records
 
-    def _uncompressed(self, chunk: Chunk, *, whole: bool) -> Bytes:
+    def _uncompressed(self, chunk: Chunk, most: int, *, whole: bool) -> Bytes:
         if chunk.compression == "" and whole and chunk.data_size > IN_MEMORY:
             return self._source.part(chunk.data_offset, chunk.data_end)
-        small = whole and chunk.size <= IN_MEMORY
-        file = BytesIO() if small else SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115
+        patience, most = self.patience, min(most, LARGEST_CHUNK)
+        file: IO[bytes] = BytesIO()
         try:
             for block in blocks(self._source, chunk):
-                self._doubts_left -= len(block)
+                self.patience -= len(block)
+                if file.tell() + len(block) > most:
+                    raise BadRecord(f"a chunk of more than {most} bytes")
+                if isinstance(file, BytesIO) and file.tell() + len(block) > IN_MEMORY:
+                    memory = file.getbuffer()
+                    file = cast("IO[bytes]", TemporaryFile())  # noqa: SIM115
+                    file.write(memory)
                 file.write(block)
-                if whole and file.tell() > chunk.size:
-                    raise BadRecord(f"a chunk of more than the {chunk.size} bytes that it claims")
         except BadRecord:
             if whole:
                 raise
-        return file.getbuffer() if isinstance(file, BytesIO) else FileBytes(cast("IO[bytes]", file))
+        self.patience = patience
+        return file.getbuffer() if isinstance(file, BytesIO) else FileBytes(file)
 
     def _keep(self, offset: int, records: Bytes) -> None:
         self._cache[offset] = records
@@ -370,27 +371,21 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
     """Uncompress a chunk into blocks of a bounded size, whatever they were compressed from."""
     import zstandard
 
-    data, left = source.part(chunk.data_offset, chunk.data_end), LARGEST_CHUNK
-    found: Iterator[bytes]
+    data = source.part(chunk.data_offset, chunk.data_end)
     try:
         if chunk.compression == "zstd":
             stream = cast("IO[bytes]", data)
-            found = zstandard.ZstdDecompressor().read_to_iter(stream, BLOCK, BLOCK)
+            yield from zstandard.ZstdDecompressor().read_to_iter(stream, BLOCK, BLOCK)
         elif chunk.compression == "lz4":
-            found = _lz4_blocks(data)
+            yield from _lz4_blocks(data)
         elif chunk.compression == "":
-            found = iter(partial(data.read, BLOCK), b"")
+            yield from iter(partial(data.read, BLOCK), b"")
         else:
             raise BadRecord(f"a chunk compressed by {chunk.compression!r}, which is unknown")
-        for block in found:
-            left -= len(block)
-            if left < 0:
-                raise BadRecord(f"a chunk of more than {LARGEST_CHUNK >> 20} MiB")
-            yield block
-        if data.left:
-            raise BadRecord("a chunk that claims more bytes than its data has")
     except (zstandard.ZstdError, RuntimeError) as error:
         raise BadRecord(f"a chunk that {chunk.compression} cannot uncompress") from error
+    if data.left:
+        raise BadRecord("a chunk that claims more bytes than its data has")
 
 
 def _lz4_blocks(data: FileBytes) -> Iterator[bytes]:
@@ -404,16 +399,14 @@ def _lz4_blocks(data: FileBytes) -> Iterator[bytes]:
         yield frame.decompress(block, BLOCK)
 
 
-SUMMARY_RECORDS: Final = (
-    *(Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX),
-    *(Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET),
-)
-"""The records that can stand in a summary."""
 _FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
 _CHECKED: Final = HEAD.size + 16
 """Bytes of the footer that its own checksum covers."""
-_MAP: Final = 32
-"""Where a chunk index has the map of the chunk's message indexes: its length, then its bytes."""
+_SUMMARY_RECORDS: Final = (
+    *(*DEFINITIONS, Opcode.STATISTICS, Opcode.CHUNK_INDEX),
+    *(Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET),
+)
+"""The records that can stand in a summary."""
 
 
 @dataclass(slots=True)
@@ -441,14 +434,14 @@ class Summary:
             if opcode == Opcode.CHUNK_INDEX:
                 chunk, index_end = _parse_chunk_index(records[body:end])
                 self.chunks[chunk.offset], self.index_ends[chunk.offset] = chunk, index_end
-            elif opcode in SUMMARY_RECORDS:
+            elif opcode in _SUMMARY_RECORDS:
                 record = parse(opcode, records[body:end])
-                if opcode == Opcode.SCHEMA:
+                if opcode == Opcode.STATISTICS:
+                    self.statistics = record
+                elif opcode == Opcode.SCHEMA:
                     self.schemas[record.id] = record
                 elif opcode == Opcode.CHANNEL:
                     self.channels[record.id] = record
-                elif opcode == Opcode.STATISTICS:
-                    self.statistics = record
             elif opcode < PRIVATE:
                 raise BadRecord("its summary is not where it should be")
         if end != len(records):
@@ -480,16 +473,16 @@ def read_summary(source: Bytes) -> Summary:
 def _parse_chunk_index(body: Buffer) -> tuple[Chunk, int]:
     """Read a chunk's head, but for its checksum, and where its message indexes end.
 
-    The map of these is left out: the library takes long for it.
+    The library would read a long map first.
     """
-    map_length = int.from_bytes(body[_MAP : _MAP + 4], "little")
-    index = parse(
-        Opcode.CHUNK_INDEX, b"".join((body[:_MAP], bytes(4), body[_MAP + 4 + map_length :]))
-    )
-    offset, name, data_size = index.chunk_start_offset, index.compression, index.compressed_size
-    end = offset + index.chunk_length
-    if end != offset + HEAD.size + CHUNK_HEAD.size + len(name.encode()) + 8 + data_size:
-        raise BadRecord("a chunk index that does not add up")
-    times, size = (index.message_start_time, index.message_end_time), index.uncompressed_size
-    chunk = Chunk(offset, *times, size, None, name, end - data_size, data_size)
-    return chunk, end + index.message_index_length
+    with suppress(struct.error, UnicodeDecodeError):
+        start, end, offset, length, at = _CHUNK_INDEX.unpack_from(body)
+        at += _CHUNK_INDEX.size + 12
+        indexes, name_length = struct.unpack_from("<QI", body, at - 12)
+        name = bytes(body[at : at + name_length]).decode()
+        data_size, size = struct.unpack_from("<QQ", body, at + name_length)
+        data_at = offset + HEAD.size + CHUNK_HEAD.size + name_length + 8
+        if data_at + data_size == offset + length:
+            chunk = Chunk(offset, start, end, size, 0, name, data_at, data_size)
+            return chunk, offset + length + indexes
+    raise BadRecord("a chunk index that does not add up")

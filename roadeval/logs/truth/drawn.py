@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -38,8 +39,10 @@ class Outline(NamedTuple):
         width, height = size
         crossings = np.zeros((height, width + 1), np.bool_)
         points = self.points()
-        for (x, y), (next_x, next_y) in zip(points, np.roll(points, -1, axis=0), strict=True):
-            first, end = np.ceil(np.clip(sorted((y, next_y)), 0, height)).astype(int)
+        for side in zip(points.tolist(), np.roll(points, -1, axis=0).tolist(), strict=True):
+            # In one direction, whichever of two outlines the side belongs to.
+            (x, y), (next_x, next_y) = sorted(side, key=itemgetter(1))
+            first, end = np.ceil(np.clip((y, next_y), 0, height)).astype(int)
             if first < end:
                 rows = np.arange(first, end)
                 at = x + (rows - y) * (next_x - x) / (next_y - y)

@@ -66,7 +66,7 @@ def test_without_a_summary_a_wrong_checksum_of_all_data_is_a_loss(tmp_path):
     data = broken.log(enable_data_crcs=True).bytes()
     end = data_end(data)
     damaged = without(3, data[: end + length_of(data, end)])
-    assert "no summary tells whether messages are missing" in losses(tmp_path, damaged)
+    assert "nothing tells which messages are wrong or missing" in losses(tmp_path, damaged)
 
 
 def test_a_chunk_whose_records_do_not_add_up_is_told_though_its_checksum_is_right(tmp_path):

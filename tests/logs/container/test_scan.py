@@ -182,7 +182,7 @@ def test_a_chunk_that_grows_beyond_all_bounds_is_given_up(
     with_chunk(path, compression, COMPRESSED_ZEROS[compression], SIZE)
     assert kept(path) == [*range(FRAMES)]
     with open_log(path) as log:
-        assert "a chunk of more than 10 MiB" in log.losses[0]
+        assert "a chunk of more than 10485760 bytes" in log.losses[0]
 
 
 @pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
