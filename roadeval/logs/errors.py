@@ -13,6 +13,10 @@ class FrameError(RoadevalError):
     """One frame that cannot be decoded; a run continues without it."""
 
 
+class LostMessageError(FrameError):
+    """A message in a chunk that cannot be read, which is a damage of the log by itself."""
+
+
 class BadRecord(Exception):  # noqa: N818  (never leaves this room)
     """A record whose parts contradict each other, or that is not there."""
 

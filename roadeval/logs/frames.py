@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from heapq import heappushpop
+from itertools import islice
 from typing import Final, TypeVar
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy.typing as npt
 from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.geometry.ground import Ground, ground_of
 from roadeval.images import format_of
-from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.errors import BadMessage, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
 from roadeval.logs.messages.pixels import to_rgb
@@ -23,7 +25,7 @@ from roadeval.logs.topics.calibration import calibration_of
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.meaning import Labels
-from roadeval.logs.truth.pairing import Camera, Clock, Partners, by_time
+from roadeval.logs.truth.pairing import REACH, Camera, Clock, Partners, by_time, frames_of
 from roadeval.logs.truth.source import (
     Label,
     LabelSource,
@@ -190,7 +192,7 @@ Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
 class Accounting:
     """Counts of frames and of truth, which grow while frames are read.
 
-    Any thread may add to ``undecodable``, which is by frame number.
+    Any thread may add to ``undecodable`` and ``in_chunks``, which are by frame number.
     """
 
     in_log: int = 0
@@ -207,11 +209,14 @@ class Accounting:
     """Of these, those that repeat an earlier one, by stamp and content."""
     undecodable: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that could not be decoded, and why."""
+    in_chunks: set[int] = field(default_factory=set)
+    """Those of them whose chunk cannot be read, which is a damage of the log by itself."""
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """The frames that could not be decoded: a sentence each."""
-        return tuple(f"frame {number}: {why}" for number, why in sorted(self.undecodable.items()))
+        """The other frames that could not be decoded: a sentence each."""
+        lost = sorted(self.undecodable.keys() - self.in_chunks)
+        return tuple(f"frame {number}: {self.undecodable[number]}" for number in lost)
 
     @property
     def repeats(self) -> tuple[str, ...]:
@@ -256,6 +261,8 @@ class LoggedFrame:
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
             self.accounting.undecodable[self.number] = str(error)
+            if isinstance(self.picture, LostMessageError):
+                self.accounting.in_chunks.add(self.number)
             raise FrameError(reason) from error
 
     def _decode(self) -> Frame:
@@ -314,8 +321,14 @@ class FrameStream:
     ``accounting`` has the counts of the frames so far.
     """
 
-    def __init__(self, selection: Selection, in_range: int, numbers: Sequence[int]) -> None:
-        """Begin a stream of the frames of these numbers, from a range of so many."""
+    def __init__(
+        self, selection: Selection, in_range: int, numbers: Sequence[int], *, labelled: bool
+    ) -> None:
+        """Begin a stream of the frames of these numbers, from a range of so many.
+
+        Of those that have no truth not even the chunks are read if only ``labelled`` ones are
+        asked for.
+        """
         images = selection.camera.images
         self._pictures: PictureSequence = images
         if selection.image.kind is TopicKind.VIDEO:
@@ -329,7 +342,7 @@ class FrameStream:
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
-        self._iterator = map(self._frame, numbers)
+        self._iterator = map(self._frame, self._with_truth() if labelled else numbers)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
         return self
@@ -344,6 +357,18 @@ class FrameStream:
     def log_times(self) -> npt.NDArray[np.int64]:
         """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
         return self._selection.camera.images.log_times[np.asarray(self._numbers, np.intp)]
+
+    def _with_truth(self) -> Iterator[int]:
+        """Yield the numbers of the frames that have truth, found by their labels, in order."""
+        if TRUTH not in self._labels:
+            return
+        source, partners = self._labels[TRUTH]
+        partners.of(self._numbers[0])
+        wanted = frozenset(self._numbers)
+        found = (each for each in frames_of(source.pairing, partners.near) if each in wanted)
+        waiting = sorted(islice(found, 2 * REACH))  # labels may be logged nearly in order
+        yield from (heappushpop(waiting, number) for number in found)
+        yield from sorted(waiting)
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {

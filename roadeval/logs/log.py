@@ -251,11 +251,17 @@ class Log:
         other.config, other._of_rig = config, True
         return other
 
-    def frames(self, selection: Selection, only: Collection[int] | None = None) -> FrameStream:
+    def frames(
+        self,
+        selection: Selection,
+        only: Collection[int] | None = None,
+        *,
+        labelled: bool = False,
+    ) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.
 
-        ``only`` are the numbers of some of them, which alone are read then. A `LogError` if there
-        is none in the range.
+        ``only`` are the numbers of some of them, which alone are read then; or the ``labelled``
+        ones alone. A `LogError` if there is none in the range.
         """
         asked, times = self.config.frames, selection.camera.images.log_times
         first, last = 0, len(times)
@@ -271,15 +277,15 @@ class Log:
             )
         numbers: Sequence[int] = range(first, last)
         if asked.labelled:
-            labelled = frames_of(selection.truth.pairing) if selection.truth else ()
-            numbers = sorted(each for each in labelled if first <= each < last)
+            found = frames_of(selection.truth.pairing) if selection.truth else ()
+            numbers = sorted(each for each in found if first <= each < last)
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
         numbers = numbers[:: asked.every][: asked.max_frames]
         if only is not None:
             numbers = [each for each in numbers if each in only]
-        return FrameStream(selection, last - first, numbers)
+        return FrameStream(selection, last - first, numbers, labelled=labelled)
 
     def close(self) -> None:
         """Close the log's files, and those of logs beside it."""

@@ -243,8 +243,8 @@ def from_file(path: Path, pipelines: Pipelines) -> tuple[Model, Schedule]:
 
 
 Frames = Callable[..., Iterable[LoggedFrame]]
-"""Returns the frames of a range, in order and from the first at each call; given some numbers it
-may leave out all others."""
+"""Returns the frames of a range, in order and from the first at each call; given some numbers, or
+asked for labelled ones, it may leave out all others."""
 
 
 def from_log(
@@ -280,10 +280,12 @@ def from_log(
     held, schedule = HeldFrames(on_frame), Schedule()
     if labelled and picks:
         ranked = picks.stamps_of(Why.RANKED)
-        for frame in decoded(each for each in frames() if each.stamp_ns in ranked):
+        every = frames(labelled=True)
+        for frame in decoded(each for each in every if each.stamp_ns in ranked):
             if frame.truth is not None and not picks.is_proposal(frame.stamp_ns, frame.truth):
                 held.add(frame)
-    with_truth = labelled and picks is None and any(each.labelled for each in frames())
+    with_truth = labelled and picks is None
+    with_truth = with_truth and any(each.labelled for each in frames(labelled=True))
     by_truth = with_truth or bool(held.frames)
     if base is not None:
         _require_adaptable(pipelines, settings, by_truth=by_truth)
@@ -344,7 +346,7 @@ def _choose(
     every: list[int] = []
 
     def candidates() -> Iterator[LoggedFrame]:
-        for each in frames():
+        for each in frames(labelled=with_truth):
             if each.labelled or not with_truth:
                 every.append(each.number)
                 yield each

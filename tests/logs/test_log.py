@@ -191,3 +191,32 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, ap
         assert sum(1 for _ in stream) == 7
         (told,) = stream.accounting.repeats
     assert told.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
+
+
+@pytest.mark.parametrize("apart", [1, 7])
+@pytest.mark.parametrize("delay", [0, 900])
+def test_labelled_frames_are_found_by_their_labels_alone(
+    tmp_path: Path, apart: int, delay: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stamps = range(1000, 9000, 100)
+    image, mask = jpeg(grey(9)), grey(0)
+    mask[3:] = 255
+    messages = [("/camera", stamp, compressed(stamp, image)) for stamp in stamps]
+    messages += [("/labels", each + delay, raw(each, mask, "mono8")) for each in stamps[3::apart]]
+    messages.sort(key=lambda message: message[1])
+    path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
+    tolerance = TopicSettings(sync_tolerance_ms=1e-3)
+    with open_log(path, LogConfig(topics=tolerance, frames=FrameSettings(every=2))) as log:
+        selection = log.select()
+        expected = [each.number for each in log.frames(selection) if each.labelled]
+        log._containers[0].reader._cache.clear()
+        read = []
+        whole = records.ChunkReader.read
+        monkeypatch.setattr(
+            records.ChunkReader,
+            "read",
+            lambda self, chunk: (read.append(chunk), whole(self, chunk))[1],
+        )
+        found = [each.number for each in log.frames(selection, labelled=True)]
+    assert found == expected
+    assert apart == 1 or len({*read}) < len(stamps)

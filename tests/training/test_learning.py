@@ -59,7 +59,7 @@ def learn(logged, *, labelled: bool = True, **settings):
 def with_seeds(logged, *, labelled: bool = True, **settings):
     wanted = TrainingSettings(**settings)
     return from_log(
-        lambda only=None: logged, PIPELINES, wanted, lambda done: None, labelled=labelled
+        lambda only=None, **_: logged, PIPELINES, wanted, lambda done: None, labelled=labelled
     )
 
 
@@ -171,7 +171,12 @@ def adapt(logged, path, pipelines, **settings):
     base, _ = from_file(path, pipelines)
     wanted = TrainingSettings(model=str(path), adapt=True, **settings)
     (model,), schedule = from_log(
-        lambda only=None: logged, pipelines, wanted, lambda done: None, labelled=True, base=base
+        lambda only=None, **_: logged,
+        pipelines,
+        wanted,
+        lambda done: None,
+        labelled=True,
+        base=base,
     )
     return base, model, schedule
 

@@ -14,7 +14,7 @@ from mcap.records import Channel, Schema
 from roadeval.images import Limits
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
-from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError
+from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import PICTURES, TopicKind
 from roadeval.logs.messages.pictures import (
     Decoder,
@@ -258,7 +258,7 @@ class TopicReader:
             message: Message = source.container.message(chunk, offset)
         except BadRecord as error:
             if source.container.is_bad(chunk):
-                raise self._error(position, str(error)) from error
+                raise LostMessageError(f"{self.name} message {position}: {error}") from error
             return None
         same_time = message.log_time == int(self.log_times[position]) % 2**64
         return message if same_time and message.channel_id == source.channel_id else None

@@ -298,7 +298,8 @@ class Partners:
 
     def __init__(self, pairing: Pairing, near: int = 0) -> None:
         self._pairing = pairing
-        self._near = min(near, max(len(pairing.labels) - 1, 0))
+        self.near = min(near, max(len(pairing.labels) - 1, 0))
+        """Position of a label near the last image's stamp."""
 
     def of(self, image: int) -> int | None:
         """Return the position of the label of an image; None if it has none."""
@@ -306,14 +307,14 @@ class Partners:
         stamp = images.stamp(image)
         if stamp == UNREADABLE or not len(labels):
             return None
-        middle = _seek(labels, stamp, _expected(labels, stamp, self._near))
+        middle = _seek(labels, stamp, _expected(labels, stamp, self.near))
         exact = next(_equal(labels, stamp, middle, reach), None)
         if exact is not None:
-            self._near = exact
+            self.near = exact
             before = _equal(images, stamp, image, reach, image)
             rank = sum(1 for _ in before)
             return next(islice(_equal(labels, stamp, exact, reach), rank, None), None)
-        label = self._near = _closest(labels, stamp, middle, reach)
+        label = self.near = _closest(labels, stamp, middle, reach)
         theirs = labels.stamp(label)
         if theirs == UNREADABLE or abs(theirs - stamp) > self._pairing.tolerance:
             return None
@@ -324,11 +325,11 @@ class Partners:
         )
 
 
-def frames_of(pairing: Pairing) -> Iterator[int]:
-    """Yield the position of each label's image, in the order of the labels."""
+def frames_of(pairing: Pairing, near: int = 0) -> Iterator[int]:
+    """Yield the position of each label's image, in the order of the labels, from one of them on."""
     images, labels = pairing.images, pairing.labels
     forth, back = Partners(pairing), Partners(replace(pairing, images=labels, labels=images))
-    for label in range(len(labels)):
+    for label in range(max(near - 2 * REACH, 0), len(labels)):
         image = back.of(label)
         # Where many stamps are equal or out of order, two labels may find the same image.
         if image is not None and forth.of(image) == label:

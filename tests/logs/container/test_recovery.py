@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from time import process_time
 
@@ -130,6 +131,18 @@ def test_a_damaged_log_gives_what_is_readable_and_says_the_rest(log: Path) -> No
     with open_log(log) as opened:
         assert decoded(opened) == (good, in_log)
         assert matches(said, " | ".join(opened.losses), log)
+
+
+@broken(["chunk_crc_field_bad"])
+def test_a_damaged_chunk_is_told_once_and_not_again_with_each_of_its_frames(log: Path) -> None:
+    with open_log(log) as opened:
+        stream = opened.frames(opened.select())
+        for frame in stream:
+            with suppress(FrameError):
+                frame.decode()
+        assert len(stream.accounting.undecodable) == 2
+        assert stream.accounting.losses == ()
+        assert sum("a chunk whose checksum is wrong" in each for each in opened.losses) == 1
 
 
 @broken(NO_FRAMES)
