@@ -301,15 +301,19 @@ class Rows:
         found: list[Any] = values[np.argsort(first)].tolist()
         return found
 
-    def masks(self) -> Iterator[tuple[str, str, Cells]]:
-        """Yield each variant and stage, as they first occur, and the places of their rows."""
-        variants, stages = self["variant"], self["stage"]
-        left = np.ones(len(self), bool)
-        while left.any():
-            first = int(left.argmax())
-            own = (variants == variants[first]) & (stages == stages[first])
-            left &= ~own
-            yield str(variants[first]), str(stages[first]), np.flatnonzero(own)
+    def groups(self, *names: str) -> Iterator[tuple[Any, Cells]]:
+        """Yield the values of some columns, a tuple, and the places of their rows, in order.
+
+        The values of each column are in the order in which they first occur.
+        """
+        groups: list[tuple[Any, Cells]] = [((), np.arange(len(self)))]
+        for column in map(self.columns.__getitem__, names):
+            groups = [
+                ((*known, value), places[column[places] == value])
+                for known, places in groups
+                for value in dict.fromkeys(column[places].tolist())
+            ]
+        yield from groups
 
 
 def joined(parts: Sequence[Rows]) -> Rows:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Final
 
@@ -42,21 +42,6 @@ LEVELS: Final = 256
 """Thresholds of KITTI's road benchmark, whose confidences have eight bits."""
 Pixels = npt.NDArray[np.intp]
 """``(n,)``: places in a flat image; `OUTSIDE` of none."""
-
-
-class Surveys:
-    """The survey for images of each size, made once."""
-
-    def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:
-        self._ground: Final = ground
-        self._settings: Final = settings
-        self._made: Final[dict[tuple[int, int], Survey]] = {}
-
-    def of(self, shape: tuple[int, int]) -> Survey:
-        """Return the survey for images of ``shape``, height and width."""
-        if shape not in self._made:
-            self._made[shape] = Survey(self._ground.scaled(shape[1], shape[0]), self._settings)
-        return self._made[shape]
 
 
 def plan_of(ground: Ground, settings: EvaluationSettings) -> Plan:
@@ -222,6 +207,12 @@ class Survey:
                 found[place, number, :, 0] = _sides(runs[number], line.borders, middle)[:2]
         by_stance = found.reshape(len(own), self.stances, 2 * places, 2)
         return by_stance[:, :, :-1]
+
+
+@lru_cache(maxsize=8)
+def survey_of(ground: Ground, settings: EvaluationSettings, shape: tuple[int, int]) -> Survey:
+    """Return the survey for images of ``shape``, height and width: made once."""
+    return Survey(ground.scaled(shape[1], shape[0]), settings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, astuple
+from dataclasses import asdict
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -106,7 +106,7 @@ def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
         "changes": [(*step, *change) for step, change in board.changes.items()],
         "heat": heat,
         "probabilities": probabilities,
-        "metres": [astuple(each) for each in board.metres()],
+        "metres": [tuple(row.values()) for row in board.metres()],
     }
 
 

@@ -102,9 +102,9 @@ def test_a_mask_without_an_edge_is_missing_and_not_wrong_by_nothing():
     truth = road(3, 3)
     sums = MetreSums()
     sums.add({"m": measured(np.zeros_like(truth), truth)})
-    (left,) = (e for e in sums.totals(Curves()) if (e.measure, e.where) == (LEFT, "10m"))
-    assert (left.frames, left.missing) == (1, 1)
-    assert np.isnan(left.value)
+    (left,) = (e for e in sums.totals(Curves()) if (e["measure"], e["where"]) == (LEFT, "10m"))
+    assert (left["frames"], left["missing"]) == (1, 1)
+    assert np.isnan(left["value"])
 
 
 def test_the_road_is_that_straight_ahead_and_holes_are_no_edges():
@@ -161,7 +161,7 @@ def test_of_a_homography_alone_nothing_is_said_of_other_cameras():
     assert len(seen.ends) == 1
     sums = MetreSums()
     sums.add({"m": seen})
-    assert all(np.isnan(each.low) for each in sums.totals(Curves()))
+    assert all(np.isnan(each["low"]) for each in sums.totals(Curves()))
 
 
 def levels(counts: npt.NDArray[np.uint32]) -> npt.NDArray[np.int64]:
@@ -224,10 +224,10 @@ def test_each_variant_has_its_own_curve_and_sizes_are_without_sign():
             ("lost", "post"): SURVEY.levels(inverse, truth),
         },
     )
-    rows = {(e.variant, e.measure, e.where): e for e in sums.totals(curves)}
-    assert rows["sure", "MaxF", ABOVE].value == 1
-    assert rows["lost", "MaxF", ABOVE].value < 0.8
-    assert rows["sure", LEFT, "10m"].p95 == pytest.approx(1, abs=0.05)
+    rows = {(e["variant"], e["measure"], e["where"]): e for e in sums.totals(curves)}
+    assert rows["sure", "MaxF", ABOVE]["value"] == 1
+    assert rows["lost", "MaxF", ABOVE]["value"] < 0.8
+    assert rows["sure", LEFT, "10m"]["p95"] == pytest.approx(1, abs=0.05)
 
 
 def test_sums_are_means_over_frames_and_ranges_over_stances():
@@ -236,22 +236,22 @@ def test_sums_are_means_over_frames_and_ranges_over_stances():
     found = [measured(mask, truth) for mask in masks]
     for each in found:
         sums.add({"m": each})
-    rows = {(e.measure, e.where): e for e in sums.totals(Curves())}
+    rows = {(e["measure"], e["where"]): e for e in sums.totals(Curves())}
     for place, region in enumerate(found[0].regions):
         counts = np.array([each.counts[:, place] for each in found]).astype(float)
         errors = (counts[..., 2:].sum(axis=2) / counts.sum(axis=2)).mean(axis=0)
         row = rows["ERR", region]
-        assert (row.value, row.low, row.high) == pytest.approx(
+        assert (row["value"], row["low"], row["high"]) == pytest.approx(
             (errors[0], errors.min(), errors.max())
         )
     lefts = np.array([differences_of(e)[:, 2] for e in found])
     expected = np.quantile(lefts, 0.5, axis=0, method="inverted_cdf")
     row = rows[LEFT, "10m"]
-    assert (row.value, row.low, row.high) == pytest.approx(
+    assert (row["value"], row["low"], row["high"]) == pytest.approx(
         (expected[0], expected.min(), expected.max()), abs=0.005
     )
     above = sum(each.counts[0, -1] for each in found)
-    assert rows["recall", ABOVE].value == pytest.approx(above[0] / (above[0] + above[3]))
+    assert rows["recall", ABOVE]["value"] == pytest.approx(above[0] / (above[0] + above[3]))
 
 
 def test_what_is_summed_up_is_numpys_quantile_of_all_frames_differences():
@@ -262,18 +262,18 @@ def test_what_is_summed_up_is_numpys_quantile_of_all_frames_differences():
         ends[rng.random(ends.shape) < 0.2] = np.nan
         found.append(FrameMetres(measures, ends, [ABOVE], np.ones((5, 1, 4), np.int64)))
         sums.add({"m": found[-1]})
-    rows = {e.measure: e for e in sums.totals(Curves())}
+    rows = {e["measure"]: e for e in sums.totals(Curves())}
     for place, (name, _) in enumerate(measures):
         every = np.array([differences_of(each)[:, place] for each in found])
         middles = np.nanquantile(every, 0.5, axis=0, method="inverted_cdf")
         row, truths = rows[name], np.array([each.ends[0, place, 1] for each in found])
         expected = middles[0], middles.min(), middles.max()
-        assert (row.value, row.low, row.high) == pytest.approx(expected)
-        assert row.p95 == pytest.approx(
+        assert (row["value"], row["low"], row["high"]) == pytest.approx(expected)
+        assert row["p95"] == pytest.approx(
             np.nanquantile(np.abs(every[:, 0]), 0.95, method="inverted_cdf")
         )
-        assert row.frames == (~np.isnan(truths)).sum()
-        assert row.missing == row.frames - (~np.isnan(every[:, 0])).sum()
+        assert row["frames"] == (~np.isnan(truths)).sum()
+        assert row["missing"] == row["frames"] - (~np.isnan(every[:, 0])).sum()
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,8 @@ def test_totals_of_the_table_are_those_of_the_run():
 
 def test_the_final_stage_is_post_or_else_the_last():
     rows = rows_of(a_table({SVM: [1], POST: [1], ("mine", "net"): [1], ("mine", "crf"): [1]}))
-    assert score.stages_of(rows) == {"filtered": "post", "mine": "crf"}
+    found = score.finals(rows)
+    assert [*zip(found["variant"], found["stage"], strict=True)] == [POST, ("mine", "crf")]
 
 
 def test_windows_of_the_table_are_those_of_the_run():

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
 from roadeval.cli.screens import tables
 from roadeval.data.words import counted
-from roadeval.evaluation.score import Measured
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections.ground import distance_table
@@ -50,7 +48,7 @@ def show(outcome: Outcome, out: Console) -> None:
     _show_files(outcome, out)
 
 
-def _scores(facts: Facts, metres: Sequence[Measured]) -> Iterator[Block]:
+def _scores(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
     """Yield the tables of a replay that scored anything."""
     yield stages_table(facts.totals)
     if facts.cameras:
@@ -64,7 +62,7 @@ def _scores(facts: Facts, metres: Sequence[Measured]) -> Iterator[Block]:
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
     if metres:
-        yield distance_table([asdict(each) for each in metres], [*facts.finals], brief=True)
+        yield distance_table(metres, [*facts.finals], brief=True)
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

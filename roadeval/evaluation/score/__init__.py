@@ -22,7 +22,7 @@ from roadeval.evaluation.score.frame import (
     BlindPrior,
     judge,
 )
-from roadeval.evaluation.score.metres import Measured, differences_of
+from roadeval.evaluation.score.metres import differences_of
 from roadeval.evaluation.score.rows import (
     FILTER,
     by_region,
@@ -37,7 +37,6 @@ from roadeval.evaluation.score.rows import (
     perfect_stages,
     region_totals,
     scene_ns,
-    stages_of,
     worst,
 )
 from roadeval.evaluation.score.scoreboard import (

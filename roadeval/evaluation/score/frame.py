@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from roadeval.data import (
     Health,
     Histogram,
     Packed,
+    Probability,
     Role,
     Tally,
     Truth,
@@ -30,7 +32,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Bits
 from roadeval.evaluation import metrics, regions
-from roadeval.evaluation.metres import ABOVE, Surveys
+from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.score.counts import Name, contours, count, error_map
 from roadeval.evaluation.score.metres import measure
@@ -43,6 +45,7 @@ from roadeval.evaluation.settings import (
     FAILED_FNR,
     EvaluationSettings,
 )
+from roadeval.geometry.ground import Ground
 
 K = TypeVar("K", str, int)
 """What further masks are of: the stage that was replaced by the truth, or a training's seed."""
@@ -56,7 +59,7 @@ def score_frame(
     settings: EvaluationSettings,
     prior: BlindPrior | None,
     *,
-    surveys: Surveys | None = None,
+    ground: Ground | None = None,
 ) -> FrameResult:
     """Score one frame; one that is not `EVALUATED` is passed on without counts.
 
@@ -65,10 +68,11 @@ def score_frame(
 
     A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
     stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on;
-    ``surveys`` are those of the ground, where the camera is known.
+    ``ground`` is what is before the camera, where that is known.
     """
     if role is Role.TRAINING and frame.truth is not None:
-        return FrameResult(frame, role, variants, histograms=_histograms(frame.truth, variants))
+        found = _by_stage(variants, partial(histogram, truth=frame.truth))
+        return FrameResult(frame, role, variants, histograms=found)
     if role is Role.UNLABELLED:
         return FrameResult(frame, role, variants, doubts=doubts_of(variants))
     if role is Role.PICKED and frame.truth is not None:
@@ -82,7 +86,7 @@ def score_frame(
     if prior is not None:
         masks[BASELINE, FINAL_STAGE] = prior.mask(truth.shape)
     names, bits = list(masks), truth.bits_of(masks.values())
-    survey = surveys.of(truth.shape) if surveys else None
+    survey = survey_of(ground, settings, truth.shape) if ground else None
     labelled = LabelledFrame(frame, truth, variants, settings, survey)
     tallies = tally(names, bits, truth, regions.of_frame(labelled))
     finals = {result.variant: result.rates for result in tallies}
@@ -100,16 +104,11 @@ def score_frame(
         truth_bits=truth,
         changes=changes(names, bits, truth),
         contours=contours(final_bits, truth, settings.boundary_width),
-        histograms=_histograms(frame.truth, variants),
+        histograms=_by_stage(variants, partial(histogram, truth=frame.truth)),
         oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
         repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
         metres=metres,
-        above={
-            (variant.variant, each.stage): survey.levels(each.output.probability, frame.truth)
-            for variant in variants
-            for each in variant.stages
-            if survey and each.output.probability is not None
-        },
+        above=_by_stage(variants, partial(survey.levels, truth=frame.truth)) if survey else {},
     )
 
 
@@ -132,9 +131,12 @@ def _apart(truth: Truth, variants: Iterable[VariantResult]) -> dict[str, Any]:
     }
 
 
-def _histograms(truth: Truth, variants: Iterable[VariantResult]) -> dict[Name, Histogram]:
+def _by_stage(
+    variants: Iterable[VariantResult], counted: Callable[[Probability], Histogram]
+) -> dict[Name, Histogram]:
+    """Return what is counted of each stage that says how probable road is."""
     return {
-        (variant.variant, each.stage): histogram(each.output.probability, truth)
+        (variant.variant, each.stage): counted(each.output.probability)
         for variant in variants
         for each in variant.stages
         if each.output.probability is not None

@@ -5,42 +5,23 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import FrameMetres
+from roadeval.data import Counts, FrameMetres
 from roadeval.data.arrays import Bits, Floats, Sums, TruthBits
+from roadeval.evaluation import metrics
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, Survey
 from roadeval.evaluation.score.counts import count
 from roadeval.evaluation.score.thresholds import Curves
 
 RECALLS: Final = np.linspace(0, 1, 11)
 CENTIMETRES: Final = 100
-SPAN: Final = 1 << 20
-"""More centimetres than two ends can lie apart, in either direction."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A measure of a drive's final masks, in metres, or a rate over a part of the ground."""
-
-    variant: str
-    measure: str
-    where: str
-    """As ``10m``, ``ahead``, ``0-10m`` or ``from_above``."""
-    frames: int
-    """Frames on which the truth has it."""
-    missing: int
-    """Of these, frames on which the mask has not."""
-    value: float
-    """The median of mask minus truth, positive where the mask reaches too far; or a rate."""
-    p95: float
-    """The 95th percentile of the size of the difference; NaN of a rate."""
-    low: float
-    high: float
-    """The least and the greatest value as the camera might stand; NaN where that is not known."""
+_COLUMNS: Final = (
+    *("variant", "measure", "where", "frames", "missing", "value", "p95", "low", "high"),
+)
+"""Those of ``metres``."""
 
 
 def measure(survey: Survey, masks: Mapping[str, Bits], truth: TruthBits) -> dict[str, FrameMetres]:
@@ -70,9 +51,8 @@ class MetreSums:
     def __init__(self) -> None:
         self._measures: Sequence[tuple[str, int]] = ()
         self._regions: Sequence[str] = ()
-        self._differences: Final[defaultdict[str, Counter[int]]] = defaultdict(Counter)
-        """How often each difference in centimetres, plus `SPAN` times the place of its stance and
-        measure."""
+        self._differences: Final = defaultdict[tuple[str, int], Counter[int]](Counter)
+        """By variant, and by stance and measure in a row: how often each, in centimetres."""
         self._seen: Final[dict[str, Sums]] = {}
         """``(M,)``: frames on which the truth has the measure."""
         self._rates: Final[dict[str, Floats]] = {}
@@ -85,47 +65,46 @@ class MetreSums:
         for variant, own in metres.items():
             self._measures, self._regions = own.measures, own.regions
             self._seen[variant] = self._seen.get(variant, 0) + ~np.isnan(own.ends[0, :, 1])
-            differences = differences_of(own).ravel()
-            keys = np.rint(differences * CENTIMETRES) + SPAN * np.arange(len(differences))
-            self._differences[variant].update(keys[~np.isnan(keys)].astype(int).tolist())
+            for place, metres_off in enumerate(differences_of(own).ravel().tolist()):
+                if not math.isnan(metres_off):
+                    self._differences[variant, place][round(metres_off * CENTIMETRES)] += 1
             labelled, wrong = own.counts.sum(axis=2), own.counts[..., 2:].sum(axis=2)
             known = labelled > 0
             shares = np.divide(wrong, labelled, out=np.zeros(wrong.shape), where=known)
             self._rates[variant] = self._rates.get(variant, 0) + np.stack([shares, known], axis=2)
             self._above[variant] = self._above.get(variant, 0) + own.counts[0, -1]
 
-    def totals(self, curves: Curves) -> Iterator[Measured]:
-        """Yield the measures, variant by variant.
+    def totals(self, curves: Curves) -> Iterator[dict[str, Any]]:
+        """Yield the rows of ``metres``, variant by variant.
 
         ``curves`` are of the ground seen from above: where a final mask is a threshold on how
         probable road is, they give MaxF and AP.
         """
+        for cells in self._rows({variant: own for (variant, _), own in curves.counts.items()}):
+            yield dict(zip(_COLUMNS, cells, strict=True))
+
+    def _rows(self, curves: Mapping[str, Sums]) -> Iterator[tuple[Any, ...]]:
+        nan = math.nan
         for variant, sums in self._rates.items():
             for place, region in enumerate(self._regions):
                 with np.errstate(invalid="ignore"):
-                    value, low, high = _ranged(sums[:, place, 0] / sums[:, place, 1])
-                frames = int(sums[0, place, 1])
-                yield Measured(variant, "ERR", region, frames, 0, value, math.nan, low, high)
-            for name, value in kitti(self._above[variant], _final(curves, variant)).items():
-                yield Measured(variant, name, ABOVE, 0, 0, value, *(math.nan,) * 3)
+                    value, *ends = _ranged(sums[:, place, 0] / sums[:, place, 1])
+                yield (variant, "ERR", region, int(sums[0, place, 1]), 0, value, nan, *ends)
+            for name, value in kitti(self._above[variant], curves.get(variant)).items():
+                yield variant, name, ABOVE, 0, 0, value, nan, nan, nan
             for place, (measured, at) in enumerate(self._measures):
-                every = [
-                    self._of(variant, stance * len(self._measures) + place)
-                    for stance in range(len(sums))
-                ]
-                value, low, high = _ranged(np.array([quantile(each, 0.5) for each in every]))
-                frames = int(self._seen[variant][place])
-                p95 = quantile(np.abs(every[0]), 0.95)
+                places = range(place, len(sums) * len(self._measures), len(self._measures))
+                every = [self._of(variant, each) for each in places]
+                value, *ends = _ranged(np.array([quantile(each, 0.5) for each in every]))
+                frames, p95 = int(self._seen[variant][place]), quantile(np.abs(every[0]), 0.95)
                 where, missing = f"{at}m" if at else "ahead", frames - len(every[0])
-                yield Measured(variant, measured, where, frames, missing, value, p95, low, high)
+                yield (variant, measured, where, frames, missing, value, p95, *ends)
 
     def _of(self, variant: str, place: int) -> Floats:
         """Return a variant's differences at a place, ``(n,)`` metres, in no order."""
-        counter = self._differences[variant]
-        keys, counts = (np.array([*each], np.int64) for each in (counter, counter.values()))
-        own = np.abs(keys - place * SPAN) < SPAN // 2
-        metres: Floats = (keys[own] - place * SPAN) / CENTIMETRES
-        return np.repeat(metres, counts[own])
+        counter = self._differences[variant, place]
+        counts = np.array([*counter.values()], int)
+        return np.repeat(np.array([*counter], float) / CENTIMETRES, counts)
 
 
 def _ranged(every: Floats) -> tuple[float, float, float]:
@@ -152,11 +131,6 @@ def quantile(metres: Floats, share: float) -> float:
     return float(np.quantile(metres, share, method="inverted_cdf"))
 
 
-def _final(curves: Curves, variant: str) -> Sums | None:
-    found = [counts for (own, _), counts in curves.counts.items() if own == variant]
-    return found[-1] if found else None
-
-
 def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     """Compute what KITTI's road benchmark does, of cells of the ground seen from above [1]_.
 
@@ -170,14 +144,10 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     .. [1] J. Fritsch, T. Kuehnl, A. Geiger, A New Performance Measure and Evaluation Benchmark for
        Road Detection Algorithms, ITSC 2013.
     """
-    tp, _, fp, fn = counts.tolist()
     if levels is None or not levels[1].sum():
-        nan = math.nan
-        return {
-            "F1": 2 * tp / (2 * tp + fp + fn) if tp + fp + fn else nan,
-            "precision": tp / (tp + fp) if tp + fp else nan,
-            "recall": tp / (tp + fn) if tp + fn else nan,
-        }
+        found = Counts(*counts.tolist())
+        rates = {name: metrics.OVERLAP[name].function(found) for name in ("F1", "precision")}
+        return {**rates, "recall": metrics.METRICS["TPR"].function(found)}
     # Road is what has at least the probability k / 255.
     negative, positive = levels[:, ::-1].cumsum(axis=1)[:, ::-1]
     found = positive > 0

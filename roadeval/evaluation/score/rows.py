@@ -33,15 +33,10 @@ FILTER: Final = "filter"
 Ints = npt.NDArray[np.int64]
 
 
-def stages_of(rows: Rows) -> dict[str, str]:
-    """Return each variant's final stage: ``post``, or the last that it has."""
-    return final_stages((variant, stage) for variant, stage, _ in rows.masks())
-
-
 def finals(rows: Rows) -> Rows:
     """Return the rows of each variant's final mask."""
-    last = stages_of(rows)
-    own = [places for variant, stage, places in rows.masks() if stage == last[variant]]
+    masks = dict(rows.groups("variant", "stage"))
+    own = [masks[mask] for mask in final_stages(masks).items()]
     return rows.take(np.sort(np.concatenate(own)) if own else slice(0))
 
 
@@ -53,11 +48,9 @@ def counts_of(rows: Rows) -> FourCounts:
 def region_totals(regions: Rows) -> dict[tuple[str, str, str], Total]:
     """Sum up the rows of ``regions`` by variant, stage and region, frames that have it alone."""
     table, found = counts_of(regions), {}
-    for variant, stage, places in regions.masks():
-        names = regions["region"][places]
-        for region in dict.fromkeys(names.tolist()):
-            known = table[places[names == region]]
-            found[variant, stage, region] = sum_up(known[known.any(axis=1)])
+    for mask, places in regions.groups("variant", "stage", "region"):
+        known = table[places]
+        found[mask] = sum_up(known[known.any(axis=1)])
     return found
 
 
@@ -68,11 +61,11 @@ def overlap(total: Mapping[str, Any]) -> dict[str, float]:
 
 def camera_masks(rows: Rows) -> Camera:
     """Return the masks of the rows of ``frames`` of a camera, in the table's order."""
-    return [
-        FrameCounts(variant, stage, own["frame"], own["stamp_ns"], counts_of(own))
-        for variant, stage, places in rows.masks()
-        for own in [rows.take(places)]
-    ]
+    found = []
+    for (variant, stage), places in rows.groups("variant", "stage"):
+        own = rows.take(places)
+        found.append(FrameCounts(variant, stage, own["frame"], own["stamp_ns"], counts_of(own)))
+    return found
 
 
 def merged(chains: Iterable[Iterable[str]]) -> list[str]:
@@ -137,7 +130,7 @@ def causes(rows: Rows, variant: str) -> Causes:
 def _errors(own: Rows, frames: Ints) -> dict[str, Floats]:
     """Return a variant's ERR on frames by its stages, in the order they ran; NaN where unknown."""
     found = {}
-    for _, stage, places in own.masks():
+    for (stage,), places in own.groups("stage"):
         found[stage] = np.full(len(frames), np.nan)
         chosen = places[np.isin(own["frame"][places], frames)]
         found[stage][np.searchsorted(frames, own["frame"][chosen])] = own["ERR"][chosen]
@@ -229,14 +222,11 @@ def by_region(rows: Rows) -> dict[tuple[str, str], dict[str, float]]:
     share of all labelled pixels, and of all wrong ones.
     """
     last = finals(rows)
-    sums: dict[tuple[str, str], Counts] = {}
-    for variant, _, places in last.masks():
-        names, table = last["region"][places], counts_of(last.take(places))
-        for region in dict.fromkeys(names.tolist()):
-            sums[region, variant] = Counts(*table[names == region].sum(axis=0).tolist())
+    table, groups = counts_of(last), last.groups("variant", "region")
+    sums = {mask: Counts(*table[places].sum(axis=0).tolist()) for mask, places in groups}
     found = {}
-    for (region, variant), counts in sums.items():
-        whole = [sums[half, variant] for half in HALVES if (half, variant) in sums]
+    for (variant, region), counts in sums.items():
+        whole = [sums[variant, half] for half in HALVES if (variant, half) in sums]
         rates = {name: metric.function(counts) for name, metric in metrics.SHORT.items()}
         pixels = counts.n, sum(each.n for each in whole)
         errors = counts.fp + counts.fn, sum(each.fp + each.fn for each in whole)
@@ -252,11 +242,9 @@ def perfect_stages(oracles: Rows, frames: Rows) -> Iterator[dict[str, Any]]:
     the ERR on the same frames as it really is.
     """
     last = finals(frames)
-    named = zip(oracles["variant"].tolist(), oracles["oracle"].tolist(), strict=True)
-    for variant, oracle in dict.fromkeys(named):
-        own = oracles.of_variant(variant)
-        own = own.take(own["oracle"] == oracle)
-        own, real = own.take(own["stage"] == own["stage"][-1]), last.of_variant(variant)
+    for (variant, oracle), places in oracles.groups("variant", "oracle"):
+        own, real = oracles.take(places), last.of_variant(variant)
+        own = own.take(own["stage"] == own["stage"][-1])
         _, here, there = np.intersect1d(own["frame"], real["frame"], return_indices=True)
         rates, as_is = (
             means(metrics.table(counts_of(each))) for each in (own.take(here), real.take(there))

@@ -32,7 +32,6 @@ from roadeval.data import (
     Transition,
     VariantResult,
 )
-from roadeval.evaluation.metres import Surveys
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
     Camera,
@@ -48,7 +47,7 @@ from roadeval.evaluation.score.counts import (
     windows,
 )
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
-from roadeval.evaluation.score.metres import Measured, MetreSums
+from roadeval.evaluation.score.metres import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
@@ -178,7 +177,7 @@ class Scoreboard:
         self._settings: Final = settings
         self._order: Final = (*variants, BASELINE)
         self._prior: Final = prior
-        self._surveys: Final = Surveys(ground, settings) if ground else None
+        self._ground: Final = ground
         self._metres: Final = MetreSums()
         self._above: Final = Curves()
         self._when: Final = array("q")
@@ -204,9 +203,8 @@ class Scoreboard:
 
     def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
         """Score one frame; changes nothing, so any thread may call it at any time."""
-        return score_frame(
-            frame, role, variants, self._settings, self._prior, surveys=self._surveys
-        )
+        settings, prior = self._settings, self._prior
+        return score_frame(frame, role, variants, settings, prior, ground=self._ground)
 
     def add(self, result: FrameResult) -> tuple[Doubt, ...]:
         """Add a scored frame: in the drive's order, from one thread.
@@ -262,8 +260,8 @@ class Scoreboard:
         """Sum up by variant, stage and region, as in `totals`."""
         return self._regions.totals()
 
-    def metres(self) -> Iterator[Measured]:
-        """Yield the measures in metres; none where the camera is not known."""
+    def metres(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of ``metres``; none where the camera is not known."""
         return self._metres.totals(self._above)
 
     def windows(self) -> list[dict[str, Any]]:

@@ -11,7 +11,6 @@ from roadeval import logs
 from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
-from roadeval.evaluation.score import Measured
 from roadeval.fleet import readable
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -44,8 +43,8 @@ class Outcome:
     """Where in their code stages failed that are among the losses."""
     rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     """Those of the tables ``scores`` and ``effects``."""
-    metres: tuple[Measured, ...] = ()
-    """The measures on the ground; empty of a rig, and of a camera that is not known."""
+    metres: tuple[Mapping[str, Any], ...] = ()
+    """The rows of ``metres``; empty of a rig, and of a camera that is not known."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -155,7 +154,7 @@ class _Ended:
     windows: Sequence[Row]
     rows: Mapping[str, list[dict[str, Any]]]
     """Those of ``scores`` and ``effects``."""
-    metres: tuple[Measured, ...]
+    metres: tuple[Mapping[str, Any], ...]
 
 
 def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _Ended:

@@ -327,7 +327,7 @@ def precision_over_recall(levels: Rows, totals: Totals) -> Chart:
     the masks lie.
     """
     drawn, curves = looks([*totals]), []
-    for name, _, places in levels.masks():
+    for (name, _), places in levels.groups("variant", "stage"):
         rows = levels.take(places)
         found = Thresholds.of(np.stack([rows["other"], rows["road"]]))
         if found.road:

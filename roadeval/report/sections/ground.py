@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from roadeval.data import BASELINE, UNFILTERED, Rows
@@ -20,7 +20,7 @@ UNSURE: Final = "\N{ALMOST EQUAL TO}"
 """Before a number that a wrong camera could explain."""
 KITTI: Final = (("MaxF", "F1"), ("AP", ""), ("precision",) * 2, ("recall",) * 2)
 """Measures of KITTI's benchmark, each with its counterpart of a mask without probabilities."""
-Row = dict[str, Any]
+Row = Mapping[str, Any]
 
 
 def on_the_ground(findings: Findings) -> Iterator[Block]:
