@@ -54,7 +54,7 @@ class Recording:
     """A recording on disk, the ``.rrd`` file that a replay wrote.
 
     A partial one, of a run that was interrupted or killed, is read as far as it goes: then
-    ``complete`` is False, and ``summary`` and ``windows`` may be empty. A `RecordingError` if it is
+    ``complete`` is False, and ``summary`` and tables may be empty. A `RecordingError` if it is
     no recording by this program, or of another format, or one of several cameras of which
     ``camera`` names none.
 
@@ -119,18 +119,6 @@ class Recording:
         """The last frames of a partial recording, which may lack some layers."""
         return () if self.complete else self.frame_numbers[-at.MOST_WAITING :]
 
-    @cached_property
-    def roles(self) -> dict[int, str]:
-        """The role of each frame, see `roadeval.data.Role`.
-
-        The last frames of a partial recording may have the role of the frame before them.
-        """
-        changes = dict(self._file.rows(at.ROLE, "StateChange:state"))
-        roles, role = {}, ""
-        for frame in self.frame_numbers:
-            role = roles[frame] = str(changes.get(frame, role))
-        return roles
-
     def result(self, name: str) -> str | None:
         """Return the text of a result, as ``summary``; None if the run ended before it."""
         return self._file.document(at.result_path(name))
@@ -153,16 +141,6 @@ class Recording:
     def frames(self) -> pd.DataFrame:
         """The rows of ``frames.csv``."""
         return self.table("frames")
-
-    @cached_property
-    def regions(self) -> pd.DataFrame:
-        """The rows of ``regions.csv``."""
-        return self.table("regions")
-
-    @cached_property
-    def windows(self) -> pd.DataFrame:
-        """The rows of ``windows.csv``."""
-        return self.table("windows")
 
     def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table by its name, as ``oracles``; empty if the run has none."""
@@ -202,10 +180,6 @@ class Recording:
     def truth(self, frame: int) -> npt.NDArray[np.uint8]:
         """Return the truth, ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored."""
         return self._array(at.TRUTH_PATH, frame)
-
-    def true_shadow(self, frame: int) -> npt.NDArray[np.uint8]:
-        """Return the truth of shadow, ``(H, W)`` uint8: 0 lit, 1 shadow, 255 ignored."""
-        return self._array(at.TRUE_SHADOW, frame)
 
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any]:
         """Return a layer of a variant on a frame.

@@ -78,7 +78,8 @@ def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tm
     why = line.removeprefix("roadeval: error: ")
     assert (run.returncode, why.partition(";")[0]) == (
         1,
-        "post.filterd.ERR > +0.5pp: nothing compared is called post.filterd",
+        "post.filterd.ERR > +0.5pp: not judged in reports, because nothing compared is called "
+        "post.filterd",
     )
     suite = ElementTree.parse(tmp_path / "c.xml").getroot()
     assert (suite.get("errors"), suite.get("failures")) == ("1", "0")

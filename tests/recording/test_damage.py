@@ -38,7 +38,6 @@ def damaged(whole, draw):
 def parts(recording):
     """Everything that is read of a recording, a function each."""
     yield "summary", lambda: recording.summary
-    yield "roles", lambda: recording.roles
     yield "timing", lambda: recording.scalars("/timing/filtered/post").to_csv()
     yield "notes", lambda: [recording.notes(frame) for frame in range(20)]
     for table in ("frames", "windows"):

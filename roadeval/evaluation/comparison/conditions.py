@@ -19,9 +19,9 @@ ordered pairs of five seeds on a drive of CamVid (0006R0) two trip +0.5 pp, and 
 surely; without room, at +0 pp, seven still do. Only the mean change of ACC, ERR, FNR and FPR has an
 interval.
 
-A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
-is undefined, a change is asked for between different scales, certainty without an interval, and
-where frames are too few. They must be at least as many as an interval needs
+A condition that cannot be judged is never taken for one that is kept: where a rate is undefined, a
+change is asked for between different scales, certainty without an interval, and where frames are
+too few. They must be at least as many as an interval needs
 (``evaluation.least_frames``), and for a change at least half of the frames of the shorter result;
 where several drives are compared, half of the scored drives of the smaller one.
 """
@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -56,7 +56,7 @@ _GRAMMAR: Final = re.compile(
 
 
 class ConditionError(RoadevalError):
-    """A condition that cannot be read or judged."""
+    """A condition that cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -106,30 +106,29 @@ class Condition:
         return cls(own, stage, variant, rate, sign, float(number), is_change, bool(surely))
 
     def judge(self, mask: Change) -> Judgement:
-        """Judge the condition on what was found of the mask that it names.
-
-        A `ConditionError` if the rate is undefined there, or its change has no interval and one is
-        asked for.
-        """
+        """Judge the condition on what was found of the mask that it names."""
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         difference = mask.difference.get(self.rate) if self.is_change else None
         value, low, high = after - before if self.is_change else after, None, None
         if difference is not None:
             value, low, high = difference.mean, difference.low, difference.high
         if math.isnan(value):
-            raise ConditionError(f"{self.text}: undefined in {mask.result}, so not judged")
+            return self.unjudged(mask.result, f"the rate is undefined in {mask.result}")
         limited: float | None = value
         if self.surely:
             # The end of the interval that is nearest to keeping the limit.
             limited = low if self.operator in (">", ">=") else high
         if limited is None:
-            assert difference is not None
-            raise ConditionError(
-                f"{self.text}: not judged in {mask.result}, because "
-                f"{difference.none_because}; replay more, or leave out 'surely'"
-            )
+            why = difference.none_because if difference else ""
+            return self.unjudged(mask.result, f"{why}; replay more, or leave out 'surely'")
         holds = OPERATORS[self.operator](100 * limited, self.limit)
         return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
+
+    def unjudged(self, result: str, because: str) -> Judgement:
+        """Return that it could not be judged on a result, and why."""
+        why = f"{self.text}: not judged in {result}, because {because}"
+        nan = math.nan
+        return Judgement(self, result, 0, nan, nan, nan, None, None, None, why)
 
 
 @dataclass(frozen=True)
@@ -154,41 +153,23 @@ class Judgement:
     why: str = ""
     """The reason then."""
 
-    @classmethod
-    def none(cls, condition: Condition, result: str, why: object) -> Judgement:
-        """Return that a condition could not be judged on a result, and why."""
-        unknown = math.nan, math.nan, math.nan
-        return cls(condition, result, 0, *unknown, None, None, None, str(why))
-
 
 def judge(
     comparison: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
-) -> tuple[Judgement, ...]:
-    """Judge each condition, in order, on every result that it names a mask of.
-
-    A `ConditionError` if a condition asks for what is not there, or for a change between different
-    scales, or if there are too few frames.
-    """
-    judgements = []
+) -> Iterator[Judgement]:
+    """Judge each condition, in order, on every result that it names a mask of."""
     for condition in conditions:
-        for mask in _named(condition, comparison):
-            if why := _unjudged(condition, mask, comparison.results, settings.least_frames):
-                raise ConditionError(f"{condition.text}: not judged, because {why}")
-            judgements.append(condition.judge(mask))
-    return tuple(judgements)
-
-
-def _named(condition: Condition, comparison: Comparison) -> list[Change]:
-    """Return what was found of the mask that a condition names, a row a result."""
-    masks = comparison.changes if condition.is_change else comparison.levels
-    named = [m for m in masks if (m.stage, m.variant) == (condition.stage, condition.variant)]
-    if not named:
-        there = ", ".join(sorted({f"{mask.stage}.{mask.variant}" for mask in masks}))
-        raise ConditionError(
-            f"{condition.text}: nothing compared is called {condition.stage}.{condition.variant}; "
-            f"there are {there}"
-        )
-    return named
+        name = condition.stage, condition.variant
+        masks = comparison.changes if condition.is_change else comparison.levels
+        named = [mask for mask in masks if (mask.stage, mask.variant) == name]
+        for mask in named:
+            why = _unjudged(condition, mask, comparison.results, settings.least_frames)
+            yield condition.unjudged(mask.result, why) if why else condition.judge(mask)
+        if not named:
+            there = ", ".join(sorted({f"{mask.stage}.{mask.variant}" for mask in masks}))
+            why = f"nothing compared is called {'.'.join(name)}; there are {there}"
+            new = ", ".join(each.label for each in comparison.results[1:])
+            yield condition.unjudged(new, why)
 
 
 def _unjudged(

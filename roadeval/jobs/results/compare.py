@@ -16,7 +16,6 @@ from roadeval.evaluation import comparison, score
 from roadeval.evaluation.comparison import (
     Comparison,
     Condition,
-    ConditionError,
     Judgement,
     Side,
     judge,
@@ -24,7 +23,7 @@ from roadeval.evaluation.comparison import (
 )
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import TESTED
-from roadeval.evaluation.settings import NOTEWORTHY, EvaluationSettings
+from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.results.frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Strip
@@ -111,19 +110,8 @@ def compare(
     recordings = {
         side.label: each.drive for side, each in labelled if each.drive and each.drive.recording
     }
-    judgements = tuple(_judged(found, conditions, settings))
+    judgements = tuple(judge(found, conditions, settings))
     return Compared(found, judgements, tuple(alone or ()), recordings)
-
-
-def _judged(
-    found: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
-) -> Iterator[Judgement]:
-    for condition in conditions:
-        try:
-            yield from judge(found, [condition], settings)
-        except ConditionError as error:
-            new = ", ".join(each.label for each in found.results[1:])
-            yield Judgement.none(condition, new, error)
 
 
 def _sides(

@@ -45,11 +45,10 @@ def read(result: DriveResult) -> None:
 
 
 def pictures(recording: Recording) -> Iterator[Callable[[], Any]]:
-    """Yield what returns a picture, a role, a number of the first frames."""
-    yield lambda: recording.roles
+    """Yield what returns a picture or a number of the first frames."""
     yield lambda: recording.scalars("/timing/filtered/post")
     for frame in recording.frame_numbers[:2]:
-        for whole in (recording.image, recording.truth, recording.true_shadow, recording.notes):
+        for whole in (recording.image, recording.truth, recording.notes):
             yield lambda whole=whole, frame=frame: whole(frame)
         for variant in recording.variants:
             for spec in variant.layers:
