@@ -71,7 +71,7 @@ IGNORED: Final = 4
 """The outcome of a pixel, as a code. Recordings hold these codes: they do not change."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Packed:
     """A mask as `Bits`, and its ``width`` in pixels."""
 
@@ -123,7 +123,7 @@ def unpack(bits: Bits, width: int) -> Plane:
     return np.unpackbits(bits.view(np.uint8), axis=1, count=width, bitorder="little")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TruthBits:
     """A truth as `Bits`: ``shape`` (H, W), the ``road`` and the ``other`` (non-road) pixels."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mounting:
     """Where a camera is, as seen from the frame at the root of the log's transforms."""
 
@@ -17,7 +17,7 @@ class Mounting:
     """From the camera's axes to its axes, as a quaternion x, y, z, w."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Calibration:
     """A camera's intrinsics, as the log has them."""
 

@@ -27,7 +27,7 @@ ROAD: Final = 1
 IGNORE: Final = 255
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Moment:
     """When an image was taken: its ``number`` and ``stamp_ns``, as in `Frame`."""
 
@@ -35,7 +35,7 @@ class Moment:
     stamp_ns: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """One camera image with its times and, if the log has one, its truth."""
 

@@ -28,7 +28,7 @@ class LayerKind(StrEnum):
     SCALAR = "scalar"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LabelClass:
     """One value of a label image: its name and its sRGB colour with opacity (0..255 each)."""
 
@@ -37,7 +37,7 @@ class LabelClass:
     rgba: tuple[int, int, int, int]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LayerSpec:
     """The description of a layer, known before the first frame."""
 
@@ -59,7 +59,7 @@ class LayerSpec:
     """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Layer:
     """A named array that a stage hands out; a mask of two classes may stay packed."""
 
@@ -96,6 +96,8 @@ ERRORS: Final = LayerSpec(
 )
 
 
-def mask_spec(name: str, title: str) -> LayerSpec:
-    """Describe a road mask (0 non-road, 1 road) named ``name``."""
-    return LayerSpec(name, LayerKind.MASK, title, ROAD_CLASSES)
+def mask_spec(name: str, title: str, **colours: tuple[int, int, int, int]) -> LayerSpec:
+    """Describe a mask named ``name``: of 0 non-road and 1 road, or of named classes from 0."""
+    named = enumerate(colours.items())
+    classes = tuple(LabelClass(value, each, colour) for value, (each, colour) in named)
+    return LayerSpec(name, LayerKind.MASK, title, classes or ROAD_CLASSES)

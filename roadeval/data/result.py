@@ -72,7 +72,7 @@ class Counts(NamedTuple):
         return self.tp + self.tn + self.fp + self.fn
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Tally:
     """The counts of one stage of one variant on one frame, whole and by region.
 
@@ -103,7 +103,7 @@ Transition = tuple[str, str, str, str]
 """From one mask to another: variant and stage before, variant and stage after."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Output:
     """The output of a stage for a frame."""
 
@@ -125,7 +125,7 @@ class Output:
     """The same of each class of road, where there are several."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class StageResult:
     """The output of one stage of one variant on one frame, and the wall time it took."""
 
@@ -139,7 +139,7 @@ class StageResult:
         return StageResult(self.stage, kept, self.seconds)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class VariantResult:
     """The outputs of a variant's stages for one frame, in the order they ran.
 
@@ -170,7 +170,7 @@ class VariantResult:
         return mask.pixels()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class VariantLayout:
     """A variant as known before the first frame: its stages with masks and its layers."""
 
@@ -188,7 +188,7 @@ class Health(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Doubt:
     """How much a variant's final mask is in doubt on a frame without truth; never an error rate."""
 
@@ -208,7 +208,7 @@ class Doubt:
         return sum(self.differs.values()) / len(self.differs) if self.differs else math.nan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class FrameMetres:
     """The measures of a final mask of a frame in metres.
 
@@ -225,7 +225,7 @@ class FrameMetres:
     """``(S, R, 4)``: TP, TN, FP and FN."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
 
@@ -270,7 +270,7 @@ class FrameResult:
 Cells = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Rows:
     """Rows of a table."""
 

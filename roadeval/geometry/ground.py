@@ -41,7 +41,7 @@ class GroundError(RoadevalError):
     """A camera of which no ground can be made."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Ground:
     """Flat ground, and a camera over it."""
 

@@ -16,7 +16,7 @@ class ImageError(ValueError):
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Limits:
     """How large an image may be."""
 

@@ -158,14 +158,22 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
     `run_sums`; a pixel counts once in each component that reaches it.
     """
     height, columns = planes[0].shape
-    y, x = np.nonzero(unpack(ring, columns))
-    padded = np.pad(paint(runs, height, columns), width)
-    window = np.lib.stride_tricks.sliding_window_view(padded, (2 * width + 1, 2 * width + 1))
-    near = window[y, x].reshape(len(y), (2 * width + 1) ** 2)
-    pixel = np.repeat(np.arange(len(y)), near.shape[1])
-    pairs = np.unique(pixel * count + near.ravel())
-    pairs = pairs[pairs % count > 0]
-    return _sums(pairs % count, np.dstack(planes)[y, x][pairs // count], count)
+    label, pixel = ring_pairs(paint(runs, height, columns), unpack(ring, columns), width)
+    return _sums(label, np.dstack(planes).reshape(-1, 3)[pixel], count)
+
+
+def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
+    """Return every ``(component, pixel)`` where the pixel lies in the component's ring (Eq. 10).
+
+    ``labels`` and ``ring`` are ``(H, W)``, ``width`` as of `ring_sums`. Pixels are flat indices; a
+    pixel near two components occurs with both.
+    """
+    pixel = np.flatnonzero(ring)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(labels, width), [2 * width + 1] * 2)
+    near = windows[np.nonzero(ring)].reshape(len(pixel), (2 * width + 1) ** 2)
+    keys = np.unique(near.astype(np.int64) * labels.size + pixel[:, None])
+    label, pixel = np.divmod(keys, labels.size)
+    return label[label > 0], pixel[label > 0]
 
 
 def _sums(labels: npt.NDArray[np.integer], colours: npt.NDArray[np.uint8], count: int) -> Sums:

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Self
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import CERTAIN, Mask, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
-from roadeval.networks.onnx_file import OnnxFile, load
+from roadeval.networks.onnx_file import Array, OnnxFile, load, tried
 from roadeval.networks.settings import NetSettings
 from roadeval.runtime.text import visible
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Road:
     """The road of a frame by a network."""
 
@@ -33,7 +31,7 @@ class Road:
     """The codes of each class of road, where there are several and they are graded."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Network:
     """A network with complete settings; any thread may call its methods."""
 
@@ -58,51 +56,46 @@ class Network:
         the greatest of theirs. A `NetworkError` if the network fails on it, or gives NaN.
         """
         settings = self.settings
-        assert settings.size is not None
-        height, width = image.shape[:2]
-        place = placement((width, height), settings.size, settings.resize)
-        values = input_values(place.image(image), settings, self.file.inputs[0].dtype)
+        frame = image.shape[1], image.shape[0]
+        values = input_values(placed(image, settings), settings, self.file.inputs[0].dtype)
         outputs = self.file.run(values, settings.outputs or ())
-        codes = np.maximum.reduce([self._codes(output, place, settings) for output in outputs])
+        codes = np.maximum.reduce([self._codes(output, frame, settings) for output in outputs])
         limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * CERTAIN)
         mask = (codes > limit).astype(np.uint8)
         graded = not any(map(is_labels, outputs))
-        classes = settings.road or ()
-        if not graded or len(classes) * len(outputs) == 1:
+        alone = [replace(settings, road=(each,)) for each in settings.road or ()]
+        if not graded or len(alone) * len(outputs) == 1:
             return Road(mask, codes, graded)
-        alone = [replace(settings, road=(each,)) for each in classes]
-        return Road(
-            *(mask, codes, graded),
-            tuple(self._codes(output, place, each) for each in alone for output in outputs),
-        )
+        planes = (self._codes(output, frame, each) for each in alone for output in outputs)
+        return Road(mask, codes, graded, tuple(planes))
 
     def facts(self) -> Mapping[str, Any]:
         """Return facts about the network for results, beside its settings."""
         from onnxruntime import __version__
 
+        named = self.file.metadata.get("license") or self.file.metadata.get("licence") or ""
+        licence = visible(" ".join(named.split()))
         return {
             "onnxruntime": __version__,
             "file": self.file.path.name,
             "sha256": self.file.sha256,
-            "licence": licence(self.file.metadata),
+            "licence": (licence if len(licence) <= QUOTED else f"{licence[:QUOTED]}...") or None,
             "inputs": [str(each) for each in self.file.inputs],
             "outputs": [str(each) for each in self.file.outputs],
             "road": [*map(str, self.settings.road or ())],
         }
 
-    def _codes(
-        self, output: npt.NDArray[Any], place: Placement, settings: NetSettings
-    ) -> Probability:
+    def _codes(self, output: Array, frame: Size, settings: NetSettings) -> Probability:
         scores = as_scores(output, settings.layout)
         assert scores is not None
         if is_labels(output):
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
-            return place.back(CERTAIN * road, exact=True)
+            return brought_back(CERTAIN * road, frame, settings, cv2.INTER_NEAREST_EXACT)
         shares = road_probability(scores.astype(np.float32), settings)
         if not np.isfinite(shares).all():
             raise self.file.error("gives NaN")
-        framed = np.clip(place.back(shares, exact=False), 0, 1)
-        return np.rint(framed * np.float32(CERTAIN)).astype(np.uint16)
+        framed = brought_back(shares, frame, settings, cv2.INTER_LINEAR)
+        return np.rint(np.clip(framed, 0, 1) * CERTAIN).astype(np.uint16)
 
 
 def road_probability(scores: Values, settings: NetSettings) -> Values:
@@ -112,79 +105,60 @@ def road_probability(scores: Values, settings: NetSettings) -> Values:
     so that the mask is where it is above one half. For ``threshold`` it is the sum over the classes
     of road, and of a ``sigmoid`` the greatest of them.
     """
-    chosen = np.zeros(len(scores), np.bool_)
-    chosen[list(settings.road or ())] = True
+    chosen = np.isin(np.arange(len(scores)), settings.road or ())
     best: Values = scores[chosen].max(axis=0)
     if settings.decide == "argmax":
         other = scores[~chosen].max(axis=0)
         if settings.activation != "none":
             return sigmoid(best - other)
-        with np.errstate(invalid="ignore"):
-            share: Values = best / (best + other)
-        return np.where(best + other > 0, share, 0.0).astype(np.float32)
+        total = best + other
+        return np.divide(best, total, out=np.zeros_like(best), where=total > 0)
     if settings.activation == "sigmoid":
         return sigmoid(best)
     if settings.activation == "softmax":
         powers = np.exp(scores - scores.max(axis=0))
-        share = powers[chosen].sum(axis=0) / powers.sum(axis=0)
-    else:
-        share = np.clip(scores[chosen].sum(axis=0), 0, 1)
-    return share
+        return powers[chosen].sum(axis=0) / powers.sum(axis=0)
+    return np.clip(scores[chosen].sum(axis=0), 0, 1)
 
 
 GREY: Final = 114
 """Grey level around an image that does not fill a letterbox."""
 
-Plane = npt.NDArray[Any]
+Size = tuple[int, int]
+"""Width and height."""
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
-    """Where frames of one size lie in a network's input; sizes are width and height."""
-
-    frame: tuple[int, int]
-    size: tuple[int, int]
-    inner: tuple[int, int]
-    """Size that the frame is brought to."""
-
-    def image(self, image: Rgb) -> Rgb:
-        """Return the input's pixels, ``(h, w, 3)`` uint8, of an ``(H, W, 3)`` uint8 frame."""
-        small: Rgb = cv2.resize(image, self.inner, interpolation=cv2.INTER_LINEAR)
-        if self.inner == self.size:
-            return small
-        whole = np.full((*self.size[::-1], 3), GREY, np.uint8)
-        whole[self._inside()] = small
-        return whole
-
-    def back(self, plane: Plane, *, exact: bool) -> Plane:
-        """Bring an ``(h, w)`` map of the input, or a smaller one of all of it, to the frame's size.
-
-        Interpolated linearly, or if ``exact`` by the nearest pixel, as for labels.
-        """
-        how = cv2.INTER_NEAREST_EXACT if exact else cv2.INTER_LINEAR
-        if self.inner != self.size:
-            whole = cv2.resize(plane, self.size, interpolation=how)
-            plane = np.ascontiguousarray(whole[self._inside()])
-        framed: Plane = cv2.resize(plane, self.frame, interpolation=how)
-        return framed
-
-    def _inside(self) -> tuple[slice, slice]:
-        """Return the rows and columns of the input where the frame lies: in the middle."""
-        (left, top), (width, height) = np.subtract(self.size, self.inner) // 2, self.inner
-        return slice(top, top + height), slice(left, left + width)
+def inside(frame: Size, settings: NetSettings) -> tuple[slice, slice]:
+    """Return the rows and columns of the input where a frame lies: in the middle."""
+    assert settings.size is not None
+    width, height = settings.size
+    if settings.resize == "stretch":
+        return slice(height), slice(width)
+    ratio = min(width / frame[0], height / frame[1])
+    inner = (max(1, round(side * ratio)) for side in frame)
+    starts = [((whole - side) // 2, side) for whole, side in zip(settings.size, inner, strict=True)]
+    columns, rows = (slice(start, start + side) for start, side in starts)
+    return rows, columns
 
 
-@lru_cache(maxsize=16)
-def placement(frame: tuple[int, int], size: tuple[int, int], resize: str) -> Placement:
-    """Place frames of a width and height in an input of a size, see `NetSettings.resize`."""
-    if resize == "stretch":
-        return Placement(frame, size, size)
-    ratio = min(whole / side for whole, side in zip(size, frame, strict=True))
-    width, height = (max(1, round(side * ratio)) for side in frame)
-    return Placement(frame, size, (width, height))
+def placed(image: Rgb, settings: NetSettings) -> Rgb:
+    """Return the input's pixels, ``(h, w, 3)`` uint8, of an ``(H, W, 3)`` uint8 frame."""
+    assert settings.size is not None
+    whole = np.full((*settings.size[::-1], 3), GREY, np.uint8)
+    there = whole[inside((image.shape[1], image.shape[0]), settings)]
+    there[...] = cv2.resize(image, there.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    return whole
 
 
-def input_values(image: Rgb, settings: NetSettings, dtype: str) -> npt.NDArray[Any]:
+def brought_back(plane: Array, frame: Size, settings: NetSettings, how: int) -> Array:
+    """Bring an ``(h, w)`` map of the input, or a smaller one of all of it, to the frame's size."""
+    if settings.resize != "stretch":
+        whole = cv2.resize(plane, settings.size, interpolation=how)
+        plane = np.ascontiguousarray(whole[inside(frame, settings)])
+    return cv2.resize(plane, frame, interpolation=how)
+
+
+def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
     """Compute ``(level scale - mean) / deviation`` of an ``(h, w, 3)`` uint8 RGB image.
 
     The image has the input's size, the settings are complete; whole numbers are rounded.
@@ -196,12 +170,10 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> npt.NDArray[A
     mean, deviation = (np.array(each, np.float64) for each in (settings.mean, settings.deviation))
     factor = (np.float64(settings.scale or 1) / deviation).astype(np.float32)
     values = image * factor - (mean / deviation).astype(np.float32)
-    kind = np.dtype(dtype)
-    if kind.kind in "iu":
-        limits = np.iinfo(kind)
-        values = np.clip(np.rint(values), limits.min, limits.max)
+    if np.dtype(dtype).kind == "u":
+        values = np.clip(np.rint(values), 0, 255)
     planes = values.transpose(2, 0, 1) if settings.layout == "NCHW" else values
-    return np.ascontiguousarray(planes[None], kind)
+    return np.ascontiguousarray(planes[None], dtype)
 
 
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
@@ -216,33 +188,25 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     A `NetworkError` if the network cannot be used, or a value cannot be read from its file: one
     line that asks for it and lists the network's inputs and outputs.
     """
-    settings = replace(settings, sha256=file.sha256)
-    settings = _numbers(_input(settings, file), file)
+    settings = _input(replace(settings, sha256=file.sha256), file)
     known = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(known) > 1:
         raise file.question("gives several outputs: name those that show road by `net.outputs`")
     outputs = settings.outputs or known
-    for name in outputs:
-        if name not in known:
-            raise file.question(f"has no output {name!r}: see `net.outputs`")
+    if unknown := [name for name in outputs if name not in known]:
+        raise file.question(f"has no output {unknown[0]!r}: see `net.outputs`")
     settings = replace(settings, outputs=outputs)
-    for name, array in zip(outputs, file.tried(settings.input_shape, outputs), strict=True):
+    for name, array in zip(outputs, tried(file, settings.input_shape, outputs), strict=True):
         settings = _meaning(settings, file, name, array)
     return settings
 
 
-def licence(metadata: Mapping[str, str]) -> str | None:
-    """Return the file's licence in one line; None if it names none."""
-    text = " ".join((metadata.get("license") or metadata.get("licence") or "").split())
-    return visible(text if len(text) <= QUOTED else f"{text[:QUOTED]}...") if text else None
-
-
-def is_labels(output: npt.NDArray[Any]) -> bool:
+def is_labels(output: Array) -> bool:
     """Return whether an output holds classes themselves, and not scores of each."""
     return bool(output.dtype.kind in "iub")
 
 
-def as_scores(output: npt.NDArray[Any], layout: str | None) -> npt.NDArray[Any] | None:
+def as_scores(output: Array, layout: str | None) -> Array | None:
     """Return an output as classes, rows and columns; None where it is no map of the image.
 
     It is of one image, ``(1, C, h, w)``, or ``(1, h, w, C)`` where the input's layout is ``NHWC``,
@@ -257,12 +221,12 @@ def as_scores(output: npt.NDArray[Any], layout: str | None) -> npt.NDArray[Any] 
 
 
 def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """Complete layout, channels and size."""
+    """Complete all that is said of the input."""
     shape = file.inputs[0].shape if len(file.inputs) == 1 else ()
     if len(shape) != 4 or shape[0] not in (None, 1) or file.inputs[0].dtype not in FED:
         raise file.question("takes no image: that is one input of four lengths, the first one 1")
     layout = settings.layout or ("NCHW" if shape[1] in (1, 3) else "NHWC")
-    _, count, rows, columns = shape if layout == "NCHW" else (1, shape[3], shape[1], shape[2])
+    count, rows, columns = shape[1:] if layout == "NCHW" else (shape[3], shape[1], shape[2])
     if settings.layout is None and count not in (1, 3):
         raise file.question("give the order of its input's lengths by `net.layout`")
     width, height = settings.size or (columns, rows)
@@ -272,35 +236,26 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
         )
     if columns not in (None, width) or rows not in (None, height):
         raise file.question(f"takes no input of {width}x{height}: see `net.size`")
-    channels = settings.channels or ("grey" if count == 1 else "rgb")
-    settings = replace(settings, layout=layout, channels=channels, size=(width, height))
-    if count not in (None, settings.channel_count):
-        raise file.question(
-            f"its input has {count} channels, and {channels} has {settings.channel_count}"
-        )
-    return settings
-
-
-def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """Complete scale, mean and deviation."""
     settings = replace(
         settings,
+        layout=layout,
+        channels=settings.channels or ("grey" if count == 1 else "rgb"),
+        size=(width, height),
         scale=settings.scale or (1.0 if file.inputs[0].dtype == "uint8" else 1 / 255),
         mean=settings.mean or (0.0,),
         deviation=settings.deviation or (1.0,),
     )
+    if count not in (None, own := settings.channel_count):
+        raise file.question(f"its input has {count} channels, and {settings.channels} has {own}")
     for name in ("mean", "deviation"):
-        if len(getattr(settings, name)) not in (1, settings.channel_count):
+        if len(getattr(settings, name)) not in (1, own):
             raise file.error(
-                f"`net.{name}` must hold one number, or one for each of the "
-                f"{settings.channel_count} channels"
+                f"`net.{name}` must hold one number, or one for each of {own} channels"
             )
     return settings
 
 
-def _meaning(
-    settings: NetSettings, file: OnnxFile, name: str, output: npt.NDArray[Any]
-) -> NetSettings:
+def _meaning(settings: NetSettings, file: OnnxFile, name: str, output: Array) -> NetSettings:
     """Complete what an output means."""
     assert settings.size is not None
     width, height = settings.size
@@ -310,29 +265,22 @@ def _meaning(
     is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
     if not is_map or (is_labels(output) and count != 1):
         raise file.question(f"its output {name!r} is no map of the image, but {output.shape}")
-    if is_labels(output):
-        road = _road(settings, file, None)
-        return replace(settings, road=road, activation="none", decide="argmax")
-    decide = settings.decide or ("threshold" if count == 1 else "argmax")
-    if decide == "argmax" and count == 1:
-        raise file.question(
-            f"its output {name!r} has one class, which beats no other: see `net.decide`"
-        )
-    is_probability = file.makers.get(name, "").lower() in ("softmax", "sigmoid")
-    usual: Literal["softmax", "sigmoid"] = "sigmoid" if count == 1 else "softmax"
-    activation = settings.activation or ("none" if is_probability else usual)
-    road = _road(settings, file, count)
-    if decide == "argmax" and len(road) == count:
-        raise file.question("all of its classes are road: see `net.road`")
-    return replace(settings, road=road, activation=activation, decide=decide)
-
-
-def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int, ...]:
-    """Return the numbers of the classes that are road, of ``count``; None: of labels."""
-    road = settings.road or ((count - 1,) if count in (1, 2) else ())
+    made: dict[str, Any] = {"activation": "none", "decide": "argmax"}
+    if not is_labels(output):
+        is_probability = file.makers.get(name, "").lower() in ("softmax", "sigmoid")
+        usual = "none" if is_probability else "sigmoid" if count == 1 else "softmax"
+        decide = settings.decide or ("threshold" if count == 1 else "argmax")
+        made = {"activation": settings.activation or usual, "decide": decide}
+    road = settings.road or ((count - 1,) if count <= 2 and not is_labels(output) else ())
     if not road:
-        of = "" if count is None else f" of its {count}"
+        of = "" if is_labels(output) else f" of its {count}"
         raise file.question(f"give the numbers of the classes{of} that are road by `net.road`")
-    if count is not None and max(road) >= count:
-        raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
-    return road
+    if not is_labels(output):
+        if max(road) >= count:
+            raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
+        if made["decide"] == "argmax" and len(road) == count:
+            raise file.question(
+                f"all classes of its output {name!r} are road, which then beat no other: see "
+                "`net.road` and `net.decide`"
+            )
+    return replace(settings, road=road, **made)

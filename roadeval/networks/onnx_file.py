@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data.words import first_of
 from roadeval.networks.settings import NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
@@ -40,7 +41,7 @@ onnxruntime.InferenceSession(sys.argv[1], options, providers=["CPUExecutionProvi
 """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Tensor:
     """An input or an output."""
 
@@ -54,15 +55,15 @@ class Tensor:
     def of(cls, found: Any) -> Tensor:
         """Convert onnxruntime's description."""
         kind = re.sub(r"^tensor\((.*)\)$", r"\1", found.type)
-        sizes = (each if isinstance(each, int) and each > 0 else None for each in found.shape)
-        return cls(found.name, {"float": "float32", "double": "float64"}.get(kind, kind), (*sizes,))
+        sizes = tuple(n if isinstance(n, int) and n > 0 else None for n in found.shape)
+        return cls(found.name, {"float": "float32", "double": "float64"}.get(kind, kind), sizes)
 
     def __str__(self) -> str:
         sizes = ", ".join("?" if size is None else str(size) for size in self.shape)
         return f"{visible(self.name)} {self.dtype} ({sizes})"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class OnnxFile:
     """A network that onnxruntime has opened; any thread may run it, each call on one thread."""
 
@@ -77,7 +78,6 @@ class OnnxFile:
     metadata: Mapping[str, str]
     makers: Mapping[str, str]
     """By output: the operator that makes its numbers, see `maker`."""
-    _tried: dict[Any, list[Array]] = field(default_factory=dict)
 
     def run(self, values: Array, outputs: tuple[str, ...]) -> list[Array]:
         """Compute some outputs for the values of the one input; a `NetworkError` if that fails."""
@@ -85,24 +85,20 @@ class OnnxFile:
             found = self.session.run(outputs, {self.inputs[0].name: values})
         return [np.asarray(each) for each in found]
 
-    def tried(self, shape: tuple[int, ...], outputs: tuple[str, ...]) -> list[Array]:
-        """Return some outputs for an input of zeros, which show every frame's shapes and types."""
-        key = (shape, outputs)
-        if key not in self._tried:
-            self._tried[key] = self.run(np.zeros(shape, self.inputs[0].dtype), outputs)
-        return self._tried[key]
-
     def error(self, problem: str) -> NetworkError:
         """Return an error about the file."""
         return NetworkError(f"{self.path}: {problem}")
 
     def question(self, what: str) -> NetworkError:
         """Return an error that asks for what the file leaves open, and lists what it has."""
-        listed = []
-        for tensors in (self.inputs, self.outputs):
-            more = f", and {len(tensors) - _SHOWN} more" if len(tensors) > _SHOWN else ""
-            listed.append(", ".join(map(str, tensors[:_SHOWN])) + more)
-        return self.error(f"{what} (inputs: {listed[0]}; outputs: {listed[1]})")
+        inputs, outputs = (first_of([*map(str, e)], _SHOWN) for e in (self.inputs, self.outputs))
+        return self.error(f"{what} (inputs: {inputs}; outputs: {outputs})")
+
+
+@lru_cache(maxsize=8)
+def tried(file: OnnxFile, shape: tuple[int, ...], outputs: tuple[str, ...]) -> list[Array]:
+    """Return some outputs for an input of zeros, which show every frame's shapes and types."""
+    return file.run(np.zeros(shape, file.inputs[0].dtype), outputs)
 
 
 def load(settings: NetSettings) -> OnnxFile:
@@ -113,16 +109,12 @@ def load(settings: NetSettings) -> OnnxFile:
     if not settings.file:
         raise NetworkError("`net.file` names no network: give the path of an ONNX file")
     path = Path(settings.file)
-    try:
+    with _readable(path, "cannot read the network"):
         check_input(path)
         there = path.stat()
-    except FileNotFoundError as error:
-        raise NetworkError(f"{path}: there is no such network") from error
-    except (OSError, ValueError) as error:
-        raise _unreadable(path, "cannot read the network", error) from error
     if there.st_size > LARGEST:
         raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
-    file = _opened(path, (there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns))
+    file = _opened(path, there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns)
     if settings.sha256 not in (None, file.sha256):
         raise file.error(
             f"is another network than was asked for: its SHA-256 is {file.sha256}, and "
@@ -132,19 +124,26 @@ def load(settings: NetSettings) -> OnnxFile:
 
 
 @lru_cache(maxsize=4)
-def _opened(path: Path, _state: tuple[int, ...]) -> OnnxFile:
+def _opened(path: Path, *_state: int) -> OnnxFile:
     import onnxruntime
 
-    try:
+    with _readable(path, "cannot read the network"):
         content = path.read_bytes()
-        beside = sorted(set(weight_files(memoryview(content))))
-    except OSError as error:
-        raise _unreadable(path, "cannot read the network", error) from error
+    try:
+        model = memoryview(content)
+        beside, made_by = sorted(set(weight_files(model))), makers(model)
     except ValueError as error:
         raise NetworkError(f"{path}: {_DAMAGED}") from error
     digest = hashlib.sha256(content)
     for name in beside:
-        _add(digest, path, name)
+        inner = PurePosixPath(name)
+        if inner.is_absolute() or ".." in inner.parts or "\\" in name or ":" in name:
+            raise NetworkError(f"{path}: asks for weights outside its folder: {visible(name)}")
+        with _readable(path, f"its weights lie in {visible(name)} beside it, which cannot be read"):
+            check_input(path.parent / inner)
+            with (path.parent / inner).open("rb") as file:
+                while block := file.read(1 << 20):
+                    digest.update(block)
     # Some damaged files end the process that opens them, so another process opens them first.
     # -P: an onnxruntime.py that lies beside the network must not be what is imported.
     probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
@@ -162,27 +161,18 @@ def _opened(path: Path, _state: tuple[int, ...]) -> OnnxFile:
             tuple(map(Tensor.of, each)) for each in (session.get_inputs(), session.get_outputs())
         )
         metadata = session.get_modelmeta().custom_metadata_map
-        makers = {each.name: maker(memoryview(content), each.name) for each in outputs}
-    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata, makers)
+    found = {each.name: maker(made_by, each.name) for each in outputs}
+    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata, found)
 
 
-def _add(digest: Any, path: Path, name: str) -> None:
-    """Add a file with weights to a digest; it must lie in the folder of the network or below."""
-    inner = PurePosixPath(name)
-    if inner.is_absolute() or ".." in inner.parts or "\\" in name or ":" in name:
-        raise NetworkError(f"{path}: asks for weights outside its folder: {visible(name)}")
+@contextmanager
+def _readable(path: Path, what: str) -> Iterator[None]:
+    """Turn an error of reading into one line."""
     try:
-        check_input(path.parent / inner)
-        with (path.parent / inner).open("rb") as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
+        yield
     except (OSError, ValueError) as error:
-        what = f"its weights lie in {visible(name)} beside it, which cannot be read"
-        raise _unreadable(path, what, error) from error
-
-
-def _unreadable(path: Path, what: str, error: OSError | ValueError) -> NetworkError:
-    return NetworkError(f"{path}: {what}: {getattr(error, 'strerror', None) or error}")
+        reason = getattr(error, "strerror", None) or error
+        raise NetworkError(f"{path}: {what}: {reason}") from error
 
 
 @contextmanager
@@ -212,29 +202,33 @@ PASSING: Final = frozenset(
     {"Cast", "Identity", "Reshape", "Resize", "Slice", "Squeeze", "Transpose", "Unsqueeze"}
 )
 """Operators whose output holds the numbers of their input."""
-_GRAPH, _NODE, _INITIALIZER, _EXTERNAL_DATA = 7, 1, 5, 13
+NODES: Final = (7, 1)
+EXTERNAL_DATA: Final = (7, 5, 13)
+"""Fields of the graph, and of its initializers."""
 
 
 def weight_files(model: memoryview) -> Iterator[str]:
     """Yield the names of the files beside it that hold a model's weights."""
-    for graph in _all(model, _GRAPH):
-        for tensor in _all(graph, _INITIALIZER):
-            for entry in _all(tensor, _EXTERNAL_DATA):
-                key, value = ("".join(map(_text, _all(entry, number))) for number in (1, 2))
-                if key == "location":
-                    yield value
+    for entry in _all(model, *EXTERNAL_DATA):
+        key, value = ("".join(map(_text, _all(entry, number))) for number in (1, 2))
+        if key == "location":
+            yield value
 
 
-def maker(model: memoryview, output: str) -> str:
+def makers(model: memoryview) -> dict[str, tuple[str, list[str]]]:
+    """Return the operator that makes each tensor, and its inputs."""
+    made_by: dict[str, tuple[str, list[str]]] = {}
+    for node in _all(model, *NODES):
+        inputs, outputs, names = (list(map(_text, _all(node, n))) for n in (1, 2, 4))
+        made_by |= dict.fromkeys(outputs, ("".join(names), inputs))
+    return made_by
+
+
+def maker(made_by: Mapping[str, tuple[str, list[str]]], output: str) -> str:
     """Return the operator that makes the numbers of an output; empty where no node makes it.
 
     Operators that only move or convert numbers are passed over.
     """
-    made_by: dict[str, tuple[str, list[str]]] = {}
-    for graph in _all(model, _GRAPH):
-        for node in _all(graph, _NODE):
-            inputs, outputs, names = (list(map(_text, _all(node, n))) for n in (1, 2, 4))
-            made_by |= dict.fromkeys(outputs, ("".join(names), inputs))
     for _ in made_by:
         operator, inputs = made_by.get(output, ("", []))
         if operator not in PASSING or not inputs:
@@ -243,11 +237,11 @@ def maker(model: memoryview, output: str) -> str:
     return ""
 
 
-def _all(message: memoryview, number: int) -> Iterator[memoryview]:
-    """Yield the bytes of each field of a message that has this number."""
+def _all(message: memoryview, number: int, *inner: int) -> Iterator[memoryview]:
+    """Yield the bytes of each field of a message that has this number, or of fields within it."""
     for found, value in protobuf_fields(message):
         if found == number and isinstance(value, memoryview):
-            yield value
+            yield from _all(value, *inner) if inner else (value,)
 
 
 def _text(value: memoryview) -> str:

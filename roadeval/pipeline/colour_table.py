@@ -12,15 +12,12 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from numpy.polynomial.chebyshev import chebpts1, chebvander
 
-from roadeval.data import Mask, ones
-from roadeval.data.arrays import Floats, Planes, Words
-from roadeval.kernels import KERNELS
+from roadeval.data import ones
+from roadeval.data.arrays import Flags, Floats, Plane, Words
 
-Colours = npt.NDArray[np.uint8]
-Decide = Callable[[Colours], npt.NDArray[np.bool_]]
+Decide = Callable[[Plane], Flags]
 Margins = tuple[Callable[[int], Floats], float]
 """From a red level 0..255 to ``(256, 256)`` float64 margins by green and blue level; no margin is
 further than the number from the true one."""
@@ -64,7 +61,7 @@ def sums_of_products(
     back = np.ascontiguousarray(matrix.T)
 
     def margins(level: int) -> Floats:
-        values: Floats = matrix @ ((green * red[level]) @ blue.T) @ back
+        values = matrix @ ((green * red[level]) @ blue.T) @ back
         values += offset
         return values
 
@@ -82,29 +79,13 @@ def _chebyshev(count: int) -> tuple[Floats, Floats]:
     return (nodes + 1.0) * 127.5, matrix.astype(np.float64)
 
 
-class ColourTable:
-    """Which colours have a positive margin, each decided as exactly as by `decide`.
+def table_of(margins: Margins, decide: Decide) -> Words:
+    """Return which colours have a positive margin, for `roadeval.kernels.plain.look_up_colours`.
 
-    ``margins`` is the margin of every colour: it decides where it is further from 0 than its error
-    bound. ``decide`` is asked for the colours that are left, ``(n, 3)`` uint8 to ``(n,)`` bool:
-    some twenty as a rule. Where more than `FEW` are left, as of a machine that has learnt nothing
-    and whose margin is 0 everywhere, none of them has a positive one.
-    """
-
-    def __init__(self, margins: Margins, decide: Decide) -> None:
-        self._road, left = _table(margins)
-        if 0 < ones(left) <= FEW:
-            places = np.flatnonzero(np.unpackbits(left.view(np.uint8), bitorder="little"))
-            road = places[decide(_colours(places))]
-            np.bitwise_or.at(self._road, road >> 6, np.uint64(1) << (road & 63).astype(np.uint64))
-
-    def look_up(self, planes: Planes) -> Mask:
-        """Return ``(H, W)`` uint8, 1 where a pixel's margin is positive; from any thread."""
-        return KERNELS.look_up_colours(planes, self._road)
-
-
-def _table(margins: Margins) -> tuple[Words, Words]:
-    """Return the words of the colours that are road for certain, and of those undecided.
+    Each is decided as exactly as by ``decide``: the margins decide where they are further from 0
+    than their error bound, and ``decide`` the colours that are left, ``(n, 3)`` uint8 to ``(n,)``
+    bool: some twenty as a rule. Where more than `FEW` are left, as of a machine that has learnt
+    nothing and whose margin is 0 everywhere, none of them has a positive one.
 
     A word holds a cube of 4x4x4 colours, so a block of four red levels fills 64 x 64 words::
 
@@ -120,23 +101,19 @@ def _table(margins: Margins) -> tuple[Words, Words]:
     """
     words = np.empty((2, 64, 64 * 64), np.uint64)
     block = np.empty((2, 64, 64, 4, 4), np.uint32)
-    road, left = block
     of_red, error = margins
     for red in range(256):
         margin = of_red(red)
         above = margin > error
-        for kind, slab in ((road, above), (left, above ^ (margin >= -error))):
+        for kind, slab in zip(block, (above, above ^ (margin >= -error)), strict=True):
             kind[:, :, red & 3] = slab.view(np.uint32).reshape(64, 4, 64).transpose(0, 2, 1)
         if red & 3 == 3:
             colours = block.view(np.bool_).reshape(2, -1)
-            bits = np.packbits(colours, axis=1, bitorder="little")
-            words[:, red >> 2] = bits.view(np.uint64)
-    return words[0].reshape(-1), words[1].reshape(-1)
-
-
-def _colours(places: npt.NDArray[np.int64]) -> Colours:
-    """Return the ``(n, 3)`` colours of ``(n,)`` places: the word times 64, and the bit in it."""
-    coarse = places >> 18, places >> 12 & 63, places >> 6 & 63
-    fine = places >> 4 & 3, places >> 2 & 3, places & 3
-    channels = [c << 2 | f for c, f in zip(coarse, fine, strict=True)]
-    return np.stack(channels, axis=1).astype(np.uint8)
+            words[:, red >> 2] = np.packbits(colours, axis=1, bitorder="little").view(np.uint64)
+    road, left = words.reshape(2, -1)
+    if 0 < ones(left) <= FEW:
+        places = np.flatnonzero(np.unpackbits(left.view(np.uint8), bitorder="little"))
+        cubes = np.array(np.unravel_index(places, (64, 64, 64, 4, 4, 4)))
+        positive = places[decide((cubes[:3] << 2 | cubes[3:]).T.astype(np.uint8))]
+        np.bitwise_or.at(road, positive >> 6, np.uint64(1) << (positive & 63).astype(np.uint64))
+    return road

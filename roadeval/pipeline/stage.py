@@ -40,7 +40,6 @@ from roadeval.data import (
     Moment,
     Output,
     Packed,
-    Probability,
     Rgb,
     Truth,
 )
@@ -48,7 +47,6 @@ from roadeval.data.arrays import Flags, Places, Planes
 from roadeval.errors import RoadevalError
 
 __all__ = [
-    "Opinion",
     "Output",
     "Stage",
     "TrainingSet",
@@ -80,28 +78,6 @@ class AbsentError(StageError):
 
 
 @dataclass(frozen=True, eq=False)
-class Opinion:
-    """What a method says of a frame."""
-
-    mask: Packed
-    """Its road mask."""
-    probability: Probability | None = None
-    """How probable road is, ``(H, W)`` uint16 codes; None where it gives masks alone."""
-    by_class: tuple[Probability, ...] = ()
-    """The same of each class of road, where there are several."""
-
-    @property
-    def planes(self) -> tuple[Probability, ...]:
-        """How probable each class of road is."""
-        return self.by_class or (() if self.probability is None else (self.probability,))
-
-    def mirrored(self) -> Opinion:
-        """Return what it says of the mirrored frame, left and right exchanged."""
-        planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in self.planes)
-        return Opinion(Packed.of(self.mask.pixels()[:, ::-1]), by_class=planes)
-
-
-@dataclass(frozen=True, eq=False)
 class View:
     """What a stage sees of a frame: views of one image share its arrays."""
 
@@ -111,16 +87,16 @@ class View:
     """The same after the filters that ran before this stage, C-contiguous."""
     planes: Planes = field(repr=False)
     """Red, green and blue of ``image``, ``(H, W)`` uint8 each."""
-    opinion: Opinion | None = None
-    """That of the previous stage that made a road mask, if there was one."""
+    opinion: Output | None = None
+    """The output of the previous stage that made a road mask, if there was one."""
     moment: Moment | None = None
     """When the image was taken; None for one that belongs to no drive."""
-    given: Mapping[str, Opinion] = field(default_factory=dict)
+    given: Mapping[str, Output] = field(default_factory=dict)
     """What other methods' masks say of the frame, by the names of their variants."""
 
     @classmethod
     def of(
-        cls, image: Rgb, moment: Moment | None = None, given: Mapping[str, Opinion] | None = None
+        cls, image: Rgb, moment: Moment | None = None, given: Mapping[str, Output] | None = None
     ) -> View:
         """Return what the first stage sees of an ``(H, W, 3)`` uint8 RGB image."""
         image = np.ascontiguousarray(image)
@@ -130,7 +106,7 @@ class View:
     def of_frame(cls, frame: Frame) -> View:
         """Return what the first stage sees of a frame."""
         given = {
-            name: Opinion(Packed.of(mask), frame.probabilities.get(name))
+            name: Output(mask=Packed.of(mask), probability=frame.probabilities.get(name))
             for name, mask in frame.external.items()
         }
         return cls.of(frame.image, frame.moment, given)
@@ -144,9 +120,7 @@ class View:
         """Return what the next stage sees."""
         image = self.image if output.image is None else output.image
         planes = self.planes if image is self.image else split(image)
-        opinion = self.opinion
-        if output.mask is not None:
-            opinion = Opinion(output.mask, output.probability, output.by_class)
+        opinion = self.opinion if output.mask is None else output
         return replace(self, image=image, planes=planes, opinion=opinion)
 
 
@@ -260,7 +234,7 @@ class TrainingSet:
     rest are sampled; None where the labels are a guess, whose share is not to be trusted."""
     truths: tuple[Truth, ...] = ()
     """Of the frames, whole: for what few pixels do not tell."""
-    opinions: tuple[Opinion | None, ...] = ()
+    opinions: tuple[Output | None, ...] = ()
     """What the stage before says of each frame, if it makes a mask; empty where none is asked."""
 
     def colours(self) -> npt.NDArray[np.uint8]:

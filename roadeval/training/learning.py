@@ -126,7 +126,7 @@ def _fitted(
         views = (View.of_frame(each).after(Output(image=image)) for each, image in seen)
         after = (view.after(run(view)) for view in views)
         if stage.yields_mask:
-            opinions = tuple(view.opinion for view in after)
+            opinions = tuple(view.opinion and replace(view.opinion, layers=()) for view in after)
             training_set = replace(training_set, opinions=opinions)
         else:
             training_set = replace(training_set, images=tuple(view.image for view in after))

@@ -178,8 +178,10 @@ def test_sums_do_not_wrap_at_8_bits(module):
 def test_every_kernel_has_a_twin():
     own = (f for f in vars(plain).values() if isfunction(f) and f.__module__ == plain.__name__)
     twins = {f.__name__: f for f in own if not f.__name__.startswith("_")}
-    assert set(twins) - set(fast.LOOPS) == {"label_runs", "paint"}
-    assert all(signature(getattr(fast, name)) == signature(twins[name]) for name in fast.LOOPS)
+    assert set(twins) - set(fast.LOOPS) == {"label_runs", "paint", "ring_pairs"}
+    for name in fast.LOOPS:
+        loop, twin = (signature(each).parameters for each in (getattr(fast, name), twins[name]))
+        assert [*loop] == [*twin]
 
 
 def test_the_twins_can_be_chosen(monkeypatch):

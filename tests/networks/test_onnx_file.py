@@ -44,7 +44,7 @@ def test_weights_beside_the_file_are_part_of_the_digest(tmp_path):
 
 
 def test_a_missing_file(tmp_path):
-    assert "there is no such network" in refused(tmp_path / "n.onnx")
+    assert "cannot read the network: No such file" in refused(tmp_path / "n.onnx")
 
 
 @pytest.mark.parametrize("content", [b"hello", b"\x89PNG\r\n\x1a\n", bytes(1000)])

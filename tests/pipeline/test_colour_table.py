@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from roadeval.kernels import KERNELS
 from roadeval.pipeline.colour_table import (
     FEW,
     LEVELS,
-    ColourTable,
     sums_of_products,
     sums_of_terms,
+    table_of,
 )
 from tests.pipeline.images import noise
 
@@ -38,10 +39,12 @@ def every_colour(red):
 
 def test_every_colour_is_decided_as_by_the_definition():
     asked = []
-    table = ColourTable((margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
+    table = table_of((margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
     for red in (0, 29, 30, 31, 90, 147, 150, 255):
         colours = every_colour(red)
-        np.testing.assert_array_equal(table.look_up(planes(colours))[0], decide(colours))
+        np.testing.assert_array_equal(
+            KERNELS.look_up_colours(planes(colours), table)[0], decide(colours)
+        )
     assert 0 < sum(asked) < FEW
 
 
@@ -50,14 +53,14 @@ def test_what_is_certain_is_not_asked_for():
         raise AssertionError
 
     colours = noise(1, 4000)[0]
-    found = ColourTable((margin, 0.0), fail).look_up(planes(colours))
+    found = KERNELS.look_up_colours(planes(colours), table_of((margin, 0.0), fail))
     np.testing.assert_array_equal(found[0], decide(colours))
     assert 0 < found.mean() < 1
 
 
 def test_a_machine_that_has_learnt_nothing_calls_nothing_road():
-    table = ColourTable((lambda red: np.zeros((256, 256)), 1.0), decide)
-    assert not table.look_up(planes(noise(1, 4000)[0])).any()
+    table = table_of((lambda red: np.zeros((256, 256)), 1.0), decide)
+    assert not KERNELS.look_up_colours(planes(noise(1, 4000)[0]), table).any()
 
 
 RNG = np.random.default_rng(0)

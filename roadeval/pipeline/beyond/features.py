@@ -14,11 +14,11 @@ from typing import Final
 import cv2
 import numpy as np
 
-from roadeval.data import CERTAIN, Rgb
+from roadeval.data import CERTAIN, Packed, Probability, Rgb
 from roadeval.data.arrays import Places, Values
 from roadeval.pipeline.beyond.scene import BARRIERS, Scene, distance, mean
 from roadeval.pipeline.reference_patch import ReferencePatch
-from roadeval.pipeline.stage import Opinion, TrainingSet
+from roadeval.pipeline.stage import Output, TrainingSet
 
 Named = Mapping[str, Values]
 """Features by name."""
@@ -233,27 +233,38 @@ SURE: Final = 1 / CERTAIN
 """The probability nearest to 0 or 1 that a log-odds is computed of."""
 
 
-def opinions(opinion: Opinion, shape: tuple[int, int]) -> Values:
+def _planes(opinion: Output) -> tuple[Probability, ...]:
+    return opinion.by_class or (() if opinion.probability is None else (opinion.probability,))
+
+
+def _mirrored(opinion: Output) -> Output:
+    assert opinion.mask is not None
+    mask = Packed.of(opinion.mask.pixels()[:, ::-1])
+    planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in _planes(opinion))
+    return Output(mask=mask, by_class=planes)
+
+
+def opinions(opinion: Output, shape: tuple[int, int]) -> Values:
     """Return the log-odds of road of each plane of an opinion, ``(P, h, w)`` float32.
 
     Of a mask without any it is the signed distance to the mask's edge in pixels of the working
     image, positive inside. ``shape`` is the working image's height and width.
     """
     size = shape[::-1]
-    if not opinion.planes:
-        mask = cv2.resize(opinion.mask.pixels(), size, interpolation=cv2.INTER_NEAREST_EXACT)
-        inside, outside = (
-            cv2.distanceTransform(side, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-            for side in (mask, 1 - mask)
-        )
-        return np.clip(inside - outside, -max(size), max(size))[None]
-    planes = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in opinion.planes]
-    share = np.stack(planes).astype(np.float32) * SURE
-    return np.log((share + SURE) / (1 - share + SURE))
+    if planes := _planes(opinion):
+        small = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in planes]
+        share = np.stack(small).astype(np.float32) * SURE
+        return np.log((share + SURE) / (1 - share + SURE))
+    assert opinion.mask is not None
+    mask = cv2.resize(opinion.mask.pixels(), size, interpolation=cv2.INTER_NEAREST_EXACT)
+    inside, outside = (
+        cv2.distanceTransform(side, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for side in (mask, 1 - mask)
+    )
+    return np.clip(inside - outside, -max(size), max(size))[None]
 
 
 def at_samples(
-    sample: TrainingSet, see: Callable[[Rgb, Opinion | None], tuple[Scene, Values]]
+    sample: TrainingSet, see: Callable[[Rgb, Output | None], tuple[Scene, Values]]
 ) -> tuple[Values, Values]:
     """Return the features of the sampled pixels, and of the same in the mirrored images.
 
@@ -262,7 +273,7 @@ def at_samples(
     and what is said of it, and the features, ``(F, h, w)``.
     """
 
-    def at(image: Rgb, opinion: Opinion | None, row: Places, column: Places) -> Values:
+    def at(image: Rgb, opinion: Output | None, row: Places, column: Places) -> Values:
         _, planes = see(image, opinion)
         _, height, width = planes.shape
         return planes[:, row * height // image.shape[0], column * width // image.shape[1]].T
@@ -272,7 +283,7 @@ def at_samples(
     for index, (image, opinion) in enumerate(zip(sample.images, heard, strict=True)):
         here = np.flatnonzero(sample.frame == index)
         row, column = sample.row[here], sample.column[here]
-        flipped = np.ascontiguousarray(image[:, ::-1]), opinion and opinion.mirrored()
+        flipped = np.ascontiguousarray(image[:, ::-1]), opinion and _mirrored(opinion)
         opposite = at(*flipped, row, image.shape[1] - 1 - column)
         found.append((here, at(image, opinion, row, column), opposite))
     order, straight, mirrored = map(np.concatenate, zip(*found, strict=True))

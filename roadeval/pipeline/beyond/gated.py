@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Packed, Rgb, Truth, colours
+from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, Truth, colours, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
@@ -79,18 +79,17 @@ EDGE: Final = 2
 """Pixels of the working image beside the shadow that are neither it nor lit."""
 
 
-def _mask(name: str, title: str, inside: str) -> LayerSpec:
-    classes = (LabelClass(0, "none", colours.CLEAR), LabelClass(1, inside, SHADOW_COLOUR))
-    return LayerSpec(name, LayerKind.MASK, title, classes)
-
-
 def _map(name: str, title: str, span: tuple[float, float]) -> LayerSpec:
     return LayerSpec(name, LayerKind.SCALAR, title, value_range=span, exact=False)
 
 
-CANDIDATES: Final = _mask("candidates", "Dark, where road may be", "candidate")
+CANDIDATES: Final = mask_spec(
+    "candidates", "Dark, where road may be", none=colours.CLEAR, candidate=SHADOW_COLOUR
+)
 SHADED: Final = _map("shaded", "How likely it is road in the shade", (0.0, 1.0))
-SHADOW: Final = _mask("shadow", "More likely road in the shade than not", "shadow")
+SHADOW: Final = mask_spec(
+    "shadow", "More likely road in the shade than not", none=colours.CLEAR, shadow=SHADOW_COLOUR
+)
 GAIN: Final = _map("gain", "Greatest gain of a channel", (1.0, GREATEST_GAIN))
 COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
 

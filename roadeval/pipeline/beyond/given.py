@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from roadeval.data import Layer, mask_spec
@@ -21,11 +22,11 @@ class GivenSettings:
 @per_view
 def bind(settings: GivenSettings, _learnt: None, view: View) -> Output:
     """Return the mask of what is seen; an `AbsentError` for a frame without."""
-    if (found := view.given.get(settings.name)) is None:
+    found = view.given.get(settings.name)
+    if found is None or found.mask is None:
         which = f"frame {view.moment.number}" if view.moment else "the image"
         raise AbsentError(f"given: {which} has no mask of {settings.name}")
-    own = (Layer(GIVEN, found.mask),)
-    return Output(own, mask=found.mask, probability=found.probability)
+    return replace(found, layers=(Layer(GIVEN, found.mask),))
 
 
 STAGE: Final = Stage(

@@ -9,7 +9,6 @@ import numpy as np
 
 from roadeval.data import CERTAIN, Layer, Packed, Probability, best_code, histogram, mask_spec
 from roadeval.pipeline.stage import (
-    Opinion,
     Output,
     Stage,
     StageError,
@@ -28,7 +27,7 @@ class ThresholdSettings:
     """The threshold has no settings: all labelled pixels of the training frames decide."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Threshold:
     """What the training frames chose."""
 
@@ -39,7 +38,7 @@ class Threshold:
         check_range("code", self.code, 0, CERTAIN)
 
 
-def codes_of(opinion: Opinion | None) -> Probability:
+def codes_of(opinion: Output | None) -> Probability:
     """Return how probable road is by the stage before; a `StageError` if that does not say so."""
     if opinion is None or opinion.probability is None:
         raise StageError("threshold: the stage before does not say how probable road is")

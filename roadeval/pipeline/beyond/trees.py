@@ -47,7 +47,6 @@ from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
     GREATEST,
     MisfitError,
-    Opinion,
     Output,
     Stage,
     StageError,
@@ -276,9 +275,7 @@ class Blend:
         return trees + weight * (self.network.sums(values) - trees)
 
 
-def see(
-    settings: TreesSettings, image: Rgb, opinion: Opinion | None = None
-) -> tuple[Scene, Values]:
+def see(settings: TreesSettings, image: Rgb, opinion: Output | None = None) -> tuple[Scene, Values]:
     """Return the scene of ``(H, W, 3)`` uint8 RGB, and its features, ``(F, h, w)`` float32.
 
     Those of the opinion come last, where the settings ask for it.

@@ -12,7 +12,7 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Packed, colours, mask_spec
+from roadeval.data import Layer, Packed, colours, mask_spec
 from roadeval.data.arrays import Reach
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.stage import Output, Stage, View, stage_settings
@@ -21,14 +21,11 @@ LINE: Final = 3
 """Side of the square that erodes the result for its boundary (Eq. 22), which gives a line one pixel
 wide."""
 POST: Final = mask_spec("post", "Road (Eq. 17-23)")
-BOUNDARY: Final = LayerSpec(
+BOUNDARY: Final = mask_spec(
     "boundary",
-    LayerKind.MASK,
     "Road boundary (Eq. 22)",
-    (
-        LabelClass(0, "none", colours.CLEAR),
-        LabelClass(1, "boundary", colours.with_opacity(colours.BOUNDARY, 255)),
-    ),
+    none=colours.CLEAR,
+    boundary=colours.with_opacity(colours.BOUNDARY, 255),
 )
 
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
 from roadeval.data import (
-    LabelClass,
     Layer,
     LayerKind,
     LayerSpec,
@@ -26,33 +25,24 @@ from roadeval.data import (
     Truth,
     colours,
     everywhere,
+    mask_spec,
 )
-from roadeval.data.arrays import Floats, Labels, Runs
+from roadeval.data.arrays import Floats, Labels, Plane, Runs, Sums
 from roadeval.kernels import KERNELS
-from roadeval.kernels.plain import paint
+from roadeval.kernels.plain import paint, ring_pairs
 from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
-
-Codes = npt.NDArray[np.uint8]
 
 SHADOW_COLOUR: Final = colours.with_opacity(colours.SHADOW, 160)
 RING_COLOUR: Final = colours.with_opacity(colours.RING, 220)
 
 NDI: Final = LayerSpec("ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0))
-SHADOW: Final = LayerSpec(
-    "shadow",
-    LayerKind.MASK,
-    "Shadow mask (Eq. 8)",
-    (LabelClass(0, "lit", colours.CLEAR), LabelClass(1, "shadow", SHADOW_COLOUR)),
-)
-RINGS: Final = LayerSpec(
+SHADOW: Final = mask_spec("shadow", "Shadow mask (Eq. 8)", lit=colours.CLEAR, shadow=SHADOW_COLOUR)
+RINGS: Final = mask_spec(
     "rings",
-    LayerKind.MASK,
     "Components and buffer rings (Eq. 9-10)",
-    (
-        LabelClass(0, "none", colours.CLEAR),
-        LabelClass(1, "shadow", SHADOW_COLOUR),
-        LabelClass(2, "ring", RING_COLOUR),
-    ),
+    none=colours.CLEAR,
+    shadow=SHADOW_COLOUR,
+    ring=RING_COLOUR,
 )
 COMPENSATED: Final = LayerSpec(
     "compensated", LayerKind.RGB, "Compensated image (Eq. 11)", exact=False
@@ -84,33 +74,32 @@ class ShadowSettings:
     back as step 5 of section 4.2 says)."""
 
 
-def value(rgb: npt.NDArray[np.uint8]) -> Floats:
+def value(rgb: Plane) -> Floats:
     """Return V of ``(..., 3)`` uint8 RGB: ``(R + G + B) / 3`` over 255, in 0..1 (Eq. 3)."""
-    result: Floats = rgb.sum(axis=-1, dtype=np.int64) / (3 * 255)
-    return result
+    return rgb.sum(axis=-1, dtype=np.int64) / (3 * 255)
 
 
-def saturation(rgb: npt.NDArray[np.uint8]) -> Floats:
+def saturation(rgb: Plane) -> Floats:
     """Return S of ``(..., 3)`` uint8 RGB: ``1 - 3 min / (R + G + B)`` 0 for black (Eq. 4)."""
     total = rgb.sum(axis=-1, dtype=np.int64)
     low = rgb.min(axis=-1).astype(np.int64)
     return np.where(total > 0, 1.0 - 3.0 * low / np.maximum(total, 1), 0.0)
 
 
-def hue(rgb: npt.NDArray[np.uint8]) -> Floats:
+def hue(rgb: Plane) -> Floats:
     """Return H of ``(..., 3)`` uint8 RGB in degrees, 0..360; 0 for greys (Eq. 5).
 
     The printed equation gives both branches the condition ``B <= G``; the second one is
     ``360 - theta`` where ``B > G``.
     """
-    r, g, b = (rgb[..., c].astype(np.float64) for c in range(3))
+    r, g, b = np.moveaxis(rgb.astype(np.float64), -1, 0)
     root = np.sqrt((r - g) ** 2 + (r - b) * (g - b))
     cosine = 0.5 * ((r - g) + (r - b)) / np.where(root > 0, root, 1.0)
     theta = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     return np.where(root > 0, np.where(b <= g, theta, 360.0 - theta), 0.0)
 
 
-def hsv_to_rgb(h: Floats, s: Floats, v: Floats) -> npt.NDArray[np.uint8]:
+def hsv_to_rgb(h: Floats, s: Floats, v: Floats) -> Plane:
     """Invert Eq. 3-5: ``(...,)`` degrees, 0..1, 0..1 to ``(..., 3)`` uint8 RGB, clipped.
 
     Within each third of the hue circle the least channel is ``V (1 - S)``, the leading one
@@ -139,29 +128,23 @@ def ndi(saturation: Floats, value: Floats) -> Floats:
     return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)
 
 
-def ndi_code(index: Floats) -> Codes:
-    """Quantise NDI in -1..1 to the codes 0..255, ``rint((NDI + 1) * 127.5)``, uint8."""
-    return np.rint((index + 1.0) * 127.5).astype(np.uint8)
-
-
-def _ndi_codes() -> Codes:
+def _ndi_codes() -> Plane:
     total = np.arange(3 * 255 + 1, dtype=np.float64)[:, None]
     least = np.minimum(np.arange(256, dtype=np.float64)[None, :], np.floor(total / 3))
     # NDI stays the same when S and V grow alike: times 765 (R + G + B) both are whole numbers,
     # and a code that lies halfway, as (R + G + B, min) = (85, 0) does, is rounded as one.
-    return ndi_code(ndi(3 * 255 * (total - 3.0 * least), total**2))
+    index = ndi(3 * 255 * (total - 3.0 * least), total**2)
+    return np.rint((index + 1.0) * 127.5).astype(np.uint8)
 
 
 NDI_CODES: Final = _ndi_codes()
-"""``(766, 256)`` uint8: the code of Eq. 6 by ``R + G + B`` and ``min(R, G, B)``, on which alone
-S, V and so NDI depend."""
-
-
+"""``(766, 256)`` uint8: Eq. 6 by ``R + G + B`` and ``min(R, G, B)``, on which alone S, V and so NDI
+depend, as the codes ``rint((NDI + 1) * 127.5)``."""
 _LEVELS: Final = np.arange(256)
 """j of Eq. 7."""
 
 
-def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
+def otsu_threshold(histogram: Sums) -> int | None:
     """Return Otsu's threshold of a ``(256,)`` histogram (Eq. 7 as its source means it).
 
     The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) (1 - w(T)))``, with the weight
@@ -173,7 +156,7 @@ def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     return _first_maximum(moment[-1] * lower - moment * total, lower * (total - lower))
 
 
-def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
+def printed_threshold(histogram: Sums) -> int | None:
     """Return Eq. 7's threshold with the definitions printed beside it: ``mu(T) = sum_{j>T} p_j``.
 
     The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))``, where it is defined.
@@ -185,7 +168,7 @@ def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     return _first_maximum(mean * lower - upper * total, lower * upper)
 
 
-def _first_maximum(difference: npt.NDArray[np.int64], weights: npt.NDArray[np.int64]) -> int | None:
+def _first_maximum(difference: Sums, weights: Sums) -> int | None:
     """Return the lowest T of greatest ``difference^2 / weights``, of those with positive weights.
 
     Both criteria of Eq. 7 times the squared number of pixels: whole numbers, so that codes
@@ -197,24 +180,22 @@ def _first_maximum(difference: npt.NDArray[np.int64], weights: npt.NDArray[np.in
     return int(np.argmax(np.where(weights > 0, criterion, -1.0)))
 
 
-def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask:
+def shadow_mask(codes: Plane, threshold: int | None, *, inclusive: bool) -> Mask:
     """Return the mask of Eq. 8, ``(H, W)`` uint8: codes above ``threshold`` (or equal to it)."""
     if threshold is None:
         return np.zeros(codes.shape, np.uint8)
     return (codes >= threshold if inclusive else codes > threshold).view(np.uint8)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Components:
-    """Connected components of an image of ``shape`` (H, W), numbered from 1.
-
-    ``runs`` is ``(n, 4)`` int32: row, first column, column after the last, and label of each of
-    their rows' stretches. ``count`` is their number.
-    """
+    """Connected components of an image, numbered from 1."""
 
     runs: Runs
+    """Their rows' stretches."""
     count: int
     shape: tuple[int, int]
+    """Height and width of the image."""
 
     def labels(self) -> Labels:
         """Return their label image: ``(H, W)`` int32, 0 outside."""
@@ -223,8 +204,7 @@ class Components:
 
 def connected_components(shadow: Packed, connectivity: int) -> Components:
     """Return the 4- or 8-connected components of a mask: Eq. 9's fixed point for every seed."""
-    runs, count = KERNELS.components(shadow.bits, shadow.width, connectivity)
-    return Components(runs, count, shadow.shape)
+    return Components(*KERNELS.components(shadow.bits, shadow.width, connectivity), shadow.shape)
 
 
 def buffer_ring(shadow: Packed, width: int) -> Packed:
@@ -233,55 +213,15 @@ def buffer_ring(shadow: Packed, width: int) -> Packed:
     return Packed(reached & ~shadow.bits, shadow.width)
 
 
-def ring_pairs(
-    labels: Labels, ring: Mask, width: int
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return every ``(component, pixel)`` where the pixel lies in the component's ring (Eq. 10).
-
-    Pixels are flat indices; a pixel near two components occurs with both.
-    """
-    y, x = np.nonzero(ring)
-    rows, columns = labels.shape
-    size = rows * columns
-    pairs = np.empty(0, np.int64)
-    for dy in range(-width, width + 1):
-        keys = []
-        for dx in range(-width, width + 1):
-            v, u = y + dy, x + dx
-            valid = (v >= 0) & (v < rows) & (u >= 0) & (u < columns)
-            near = labels[v[valid], u[valid]].astype(np.int64)
-            keys.append((near * size + y[valid] * columns + x[valid])[near > 0])
-        # Row by row: the repetitions of a wide ring would take much memory together.
-        pairs = np.unique(np.concatenate([pairs, *keys]))
-    return pairs // size, pairs % size
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Moments:
+class Moments(NamedTuple):
     """Pixels ``(count,)``, means and population standard deviations ``(count, C)`` by label."""
 
-    pixels: npt.NDArray[np.int64]
+    pixels: Sums
     mean: Floats
     deviation: Floats
 
-    def __getitem__(self, labels: slice) -> Moments:
-        """Return those of some of the labels."""
-        return Moments(self.pixels[labels], self.mean[labels], self.deviation[labels])
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Compensation:
-    """The linear map of each component, ``target + (I - source) * gain``; ``(count, C)`` each.
-
-    Components without a ring map to themselves.
-    """
-
-    source: Floats
-    target: Floats
-    gain: Floats
-
-
-def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
+def moments_of_sums(sums: Sums) -> Moments:
     """Moments by label from `roadeval.kernels.plain.run_sums`.
 
     The variance is taken about the grey level next to the mean, in integers: nothing cancels,
@@ -301,36 +241,37 @@ def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
 def moments_of_values(labels: npt.NDArray[np.integer], values: Floats, count: int) -> Moments:
     """Moments by label of ``(n, C)`` values, in two passes; below 1e-9 a deviation is 0."""
     pixels = np.bincount(labels, minlength=count)
-    n = np.maximum(pixels, 1)[:, None]
 
     def mean(quantity: Floats) -> Floats:
-        columns = [np.bincount(labels, quantity[:, c], count) for c in range(quantity.shape[1])]
-        return np.stack(columns, axis=1) / n
+        sums = [np.bincount(labels, column, count) for column in quantity.T]
+        return np.stack(sums, axis=1) / np.maximum(pixels, 1)[:, None]
 
     centre = mean(values)
     deviation = np.sqrt(mean((values - centre[labels]) ** 2))
     return Moments(pixels, centre, np.where(deviation < 1e-9, 0.0, deviation))
 
 
-def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Compensation:
+def compensation(
+    inside: Moments, ring: Moments, settings: ShadowSettings
+) -> tuple[Floats, Floats, Floats]:
     """Compute the linear map of Eq. 11 for every component, each channel by itself.
 
+    Returns source, target and gain of ``target + (I - source) * gain``, ``(count, C)`` each.
     ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 where sigma is 0),
     after which the component has its ring's mean and deviation. ``printed`` gives
     ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 where the ring's variance is 0),
-    which has the ratio upside down and flattens the region instead.
+    which has the ratio upside down and flattens the region instead. Components without a ring map
+    to themselves.
     """
-    if settings.statistic == "deviation":
-        numerator, denominator = ring.deviation, inside.deviation
-    else:
-        numerator, denominator = inside.deviation**2, ring.deviation**2
-    gain = np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), 1.0)
+    above, below = ring.deviation, inside.deviation
+    if settings.statistic == "printed":
+        above, below = below**2, above**2
+    gain = np.divide(above, below, out=np.ones_like(above), where=below > 0)
     if settings.max_gain is not None:
         gain = np.minimum(gain, settings.max_gain)
     here = ring.pixels[:, None] > 0
     here[0] = False
-    target = np.where(here, ring.mean, inside.mean)
-    return Compensation(inside.mean, target, np.where(here, gain, 1.0))
+    return inside.mean, np.where(here, ring.mean, inside.mean), np.where(here, gain, 1.0)
 
 
 def compensate(view: View, found: Components, ring: Packed, settings: ShadowSettings) -> Rgb:
@@ -340,17 +281,38 @@ def compensate(view: View, found: Components, ring: Packed, settings: ShadowSett
     """
     if not found.count:
         return view.image
-    if settings.colour_space == "hsi":
-        return _compensate_hsi(view.image, found, ring, settings)
     count, width = found.count + 1, settings.ring_width
+    if settings.colour_space == "hsi":
+        return _compensate_hsi(view.image, found.labels(), ring, settings)
     inside = KERNELS.run_sums(view.planes, found.runs, count)
     around = KERNELS.ring_sums(view.planes, found.runs, ring.bits, count, width)
     # In one call: most of its time does not depend on their number.
-    both = moments_of_sums(np.concatenate([inside, around]))
-    change = compensation(both[:count], both[count:], settings)
+    m = moments_of_sums(np.concatenate([inside, around]))
+    parts = np.s_[:count], np.s_[count:]
+    halves = [Moments(m.pixels[each], m.mean[each], m.deviation[each]) for each in parts]
     # The kernels take C-contiguous arrays.
-    linear = map(np.ascontiguousarray, (change.source, change.target, change.gain))
+    linear = map(np.ascontiguousarray, compensation(halves[0], halves[1], settings))
     return KERNELS.transfer(view.image, found.runs, *linear)
+
+
+def _compensate_hsi(image: Rgb, labels: Labels, ring: Packed, settings: ShadowSettings) -> Rgb:
+    """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
+    result, flat = image.reshape(-1, 3).copy(), labels.ravel()
+    shadow, count = np.flatnonzero(flat), int(flat.max()) + 1
+    label, pixel = ring_pairs(labels, ring.pixels(), settings.ring_width)
+    k, colour = flat[shadow], result[shadow]
+    values = _saturation_value(colour)
+    ring_values = _saturation_value(result[pixel])
+    moments = moments_of_values(k, values, count), moments_of_values(label, ring_values, count)
+    source, target, gain = compensation(*moments, settings)
+    s, v = np.clip(target[k] + (values - source[k]) * gain[k], 0.0, 1.0).T
+    # Components that are left as they are come back exactly: the conversion inverts every hsi.
+    result[shadow] = hsv_to_rgb(hue(colour), s, v)
+    return result.reshape(image.shape)
+
+
+def _saturation_value(rgb: Plane) -> Floats:
+    return np.stack([saturation(rgb), value(rgb)], axis=-1)
 
 
 def lift(view: View, shadow: Packed, settings: ShadowSettings) -> tuple[Rgb, Packed]:
@@ -361,29 +323,6 @@ def lift(view: View, shadow: Packed, settings: ShadowSettings) -> tuple[Rgb, Pac
     found = connected_components(shadow, settings.connectivity)
     ring = buffer_ring(shadow, settings.ring_width)
     return compensate(view, found, ring, settings), ring
-
-
-def _compensate_hsi(image: Rgb, found: Components, ring: Packed, settings: ShadowSettings) -> Rgb:
-    """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
-    labels = found.labels()
-    label, pixel = ring_pairs(labels, ring.pixels(), settings.ring_width)
-    flat = image.reshape(-1, 3)
-    shadow = np.flatnonzero(labels)
-    k = labels.ravel()[shadow]
-    values = _saturation_value(flat[shadow])
-    inside = moments_of_values(k, values, found.count + 1)
-    around = moments_of_values(label, _saturation_value(flat[pixel]), found.count + 1)
-    change = compensation(inside, around, settings)
-    mapped = change.target[k] + (values - change.source[k]) * change.gain[k]
-    mapped = np.clip(mapped, 0.0, 1.0)
-    result = flat.copy()
-    # Components that are left as they are come back exactly: the conversion inverts every hsi.
-    result[shadow] = hsv_to_rgb(hue(flat[shadow]), mapped[:, 0], mapped[:, 1])
-    return result.reshape(image.shape)
-
-
-def _saturation_value(rgb: npt.NDArray[np.uint8]) -> Floats:
-    return np.stack([saturation(rgb), value(rgb)], axis=-1)
 
 
 @per_view

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
+from roadeval.data.arrays import Floats
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.stage import (
     Output,
@@ -39,12 +39,12 @@ class SimilaritySettings:
     degrees of freedom: the share of normally distributed road colours kept."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RoadColour:
     """Mean ``(3,)`` and covariance ``(3, 3)`` of the road training set, RGB in 0..255."""
 
-    mean: npt.NDArray[np.float64]
-    covariance: npt.NDArray[np.float64]
+    mean: Floats
+    covariance: Floats
 
     def __post_init__(self) -> None:
         check_arrays(self, np.float64, mean=(3,), covariance=(3, 3))
@@ -69,15 +69,14 @@ def limit(quantile: float) -> float:
     return float(special("chdtri")(3, 1.0 - quantile))
 
 
-def whitening(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def whitening(covariance: Floats) -> Floats:
     """Return W, ``(3, 3)`` lower triangular, of a positive covariance S: ``W^T W = S^-1``.
 
     So the distance of Eq. 2 is ``|W (x - m)|``, which rounding can neither make negative nor blow
     up: even where S is singular but for the least ridge it is off by less than 0.01 in single
     precision.
     """
-    factors: npt.NDArray[np.float64] = np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
-    return factors
+    return np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
@@ -86,9 +85,8 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
     (its brackets are misplaced).
     """
-    factors = whitening(road.covariance + RIDGE * np.eye(3))
-    greatest = limit(settings.quantile)
-    spec = _distance(settings)
+    factors, greatest = whitening(road.covariance + RIDGE * np.eye(3)), limit(settings.quantile)
+    spec, _ = layers(settings)
 
     def run(view: View) -> Output:
         distance, near = KERNELS.mahalanobis(view.planes, road.mean, factors, greatest)
@@ -98,16 +96,12 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     return run
 
 
-def _distance(settings: SimilaritySettings) -> LayerSpec:
-    """Describe the distance map, shown from 0 to three times the limit."""
+def layers(settings: SimilaritySettings) -> tuple[LayerSpec, LayerSpec]:
+    """Return the layers of phase 1: the distance is shown from 0 to three times the limit."""
     span = (0.0, 3.0 * limit(settings.quantile) ** 0.5)
     title = "Mahalanobis distance to road (Eq. 2)"
-    return LayerSpec("distance", LayerKind.SCALAR, title, value_range=span, exact=False)
-
-
-def layers(settings: SimilaritySettings) -> tuple[LayerSpec, ...]:
-    """Return the layers of phase 1."""
-    return _distance(settings), SIMILARITY
+    distance = LayerSpec("distance", LayerKind.SCALAR, title, value_range=span, exact=False)
+    return distance, SIMILARITY
 
 
 STAGE: Final = Stage(

@@ -8,18 +8,18 @@ from functools import lru_cache
 from typing import Annotated, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from roadeval.data import Layer, Packed, mask_spec
-from roadeval.data.arrays import Floats
+from roadeval.data.arrays import Flags, Floats, Plane, Words
+from roadeval.kernels import KERNELS
 from roadeval.pipeline.colour_table import (
     EPS,
     LEVELS,
-    ColourTable,
     Margins,
     sums_of_products,
     sums_of_terms,
+    table_of,
 )
 from roadeval.pipeline.stage import (
     Output,
@@ -63,7 +63,7 @@ NOT_RUN: Final = ("sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg")
 """The packages around scikit-learn's libsvm and liblinear: see `roadeval.runtime.imports`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class SupportVectors:
     """A fitted machine (Eq. 15-16)."""
 
@@ -79,10 +79,14 @@ class SupportVectors:
     """B."""
 
     def __post_init__(self) -> None:
-        check_arrays(self, np.float64, mean=(3,), scale=(3,))
-        check_arrays(self, np.float64, vectors=("m", 3), weights=("m",), offset=())
+        shapes = {"mean": (3,), "scale": (3,), "vectors": ("m", 3), "weights": ("m",)}
+        check_arrays(self, np.float64, **shapes, offset=())
         check_range("mean", self.mean, 0, 255)
         check_range("scale", self.scale, 1e-6, 255)
+
+
+Solution = tuple[Floats, Floats, float]
+"""Support vectors, their weights and the offset."""
 
 
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
@@ -101,9 +105,7 @@ def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     return SupportVectors(mean, scale, *solution)
 
 
-def _by_libsvm(
-    features: Floats, road: npt.NDArray[np.bool_], settings: SvmSettings
-) -> tuple[Floats, Floats, float]:
+def _by_libsvm(features: Floats, road: Flags, settings: SvmSettings) -> Solution:
     """Return what `_by_svc` does, bit for bit, by calling libsvm as it does.
 
     That alone saves a second of computing, in which scikit-learn is imported. But the function
@@ -128,24 +130,17 @@ def _by_libsvm(
     return vectors, -weights, -float(offset)
 
 
-def _by_svc(
-    features: Floats, road: npt.NDArray[np.bool_], settings: SvmSettings
-) -> tuple[Floats, Floats, float]:
+def _by_svc(features: Floats, road: Flags, settings: SvmSettings) -> Solution:
     """Solve the dual; return the support vectors, their weights and the offset."""
     # Only here: the import takes a second and 40 MiB, and a model from a file needs neither.
     svm = whole("sklearn.svm")
     machine = svm.SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
     machine.fit(features, road)
-    return (
-        np.ascontiguousarray(machine.support_vectors_),
-        np.ascontiguousarray(machine.dual_coef_[0]),
-        float(machine.intercept_[0]),
-    )
+    vectors, weights = map(np.ascontiguousarray, (machine.support_vectors_, machine.dual_coef_[0]))
+    return vectors, weights, float(machine.intercept_[0])
 
 
-def decision(
-    colours: npt.NDArray[np.uint8], machine: SupportVectors, settings: SvmSettings
-) -> Floats:
+def decision(colours: Plane, machine: SupportVectors, settings: SvmSettings) -> Floats:
     """Compute ``sum_i lambda_i y_i K(x, x_i) + b`` of ``(n, 3)`` uint8 colours (Eq. 16).
 
     Returns ``(n,)`` float64, equal to scikit-learn's ``decision_function`` up to rounding. A
@@ -155,17 +150,13 @@ def decision(
     if settings.kernel == "linear":
         # Eq. 15: the machine's plane, w = sum_i lambda_i y_i x_i.
         terms = features * (machine.weights @ machine.vectors)
-        plane: Floats = terms.sum(axis=1) + machine.offset
-        return plane
+        return terms.sum(axis=1) + machine.offset
     result = np.empty(len(features))
     rows = max(1, _BLOCK // max(1, len(machine.vectors)))
     for start in range(0, len(features), rows):
         block = slice(start, start + rows)
-        first, second, third = (
-            (features[block, channel, None] - machine.vectors[:, channel]) ** 2
-            for channel in range(3)
-        )
-        squared = first + second + third
+        pairs = zip(features[block].T, machine.vectors.T, strict=True)
+        squared = sum((own[:, None] - vector) ** 2 for own, vector in pairs)
         # Row by row: a matrix product would round a row depending on the other rows.
         terms = np.exp(-settings.gamma * squared) * machine.weights
         result[block] = terms.sum(axis=1) + machine.offset
@@ -173,7 +164,7 @@ def decision(
 
 
 @lru_cache(maxsize=4)
-def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
+def colour_table(machine: SupportVectors, settings: SvmSettings) -> Words:
     """Return the decision of Eq. 16 for every colour there is.
 
     A pixel's features are its three channels alone, so this is the whole machine. The last four
@@ -183,7 +174,7 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):
-        return ColourTable(
+        return table_of(
             _margins(machine, settings),
             lambda colours: decision(colours, machine, settings) > settings.threshold,
         )
@@ -194,13 +185,11 @@ def _margins(machine: SupportVectors, settings: SvmSettings) -> Margins:
     offset = machine.offset - settings.threshold
 
     def features(channel: int, levels: Floats) -> Floats:
-        result: Floats = (levels - machine.mean[channel]) / machine.scale[channel]
-        return result
+        return (levels - machine.mean[channel]) / machine.scale[channel]
 
     def factor(channel: int, levels: Floats) -> Floats:
         away = features(channel, levels)[:, None] - machine.vectors[:, channel]
-        result: Floats = np.exp(-settings.gamma * away**2)
-        return result
+        return np.exp(-settings.gamma * away**2)
 
     every = np.stack([features(channel, LEVELS) for channel in range(3)])
     if settings.kernel == "linear":
@@ -218,7 +207,7 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
     table = colour_table(machine, settings)
 
     def run(view: View) -> Output:
-        road = Packed.of(table.look_up(view.planes))
+        road = Packed.of(KERNELS.look_up_colours(view.planes, table))
         return Output((Layer(SVM, road),), mask=road)
 
     return run

@@ -19,7 +19,7 @@ from roadeval.pipeline.beyond.trees import (
     balanced_back,
     grow,
 )
-from roadeval.pipeline.stage import MisfitError, Opinion, StageError, TrainingSet, View
+from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)
 
@@ -137,7 +137,7 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
 def opinion_of(road):
     """What a method says that knows the left side alone, by its mask and by two planes."""
     codes = np.where(road, 60000, 3000).astype(np.uint16)
-    return Opinion(Packed.of(road), by_class=(codes, 65535 - codes))
+    return Output(mask=Packed.of(road), by_class=(codes, 65535 - codes))
 
 
 def test_a_mirrored_image_has_the_mirrored_opinion():
@@ -156,9 +156,9 @@ def test_a_mirrored_image_has_the_mirrored_opinion():
 def test_a_mask_alone_says_how_far_its_edge_is():
     mask = np.zeros((24, 32), bool)
     mask[:, :12] = True
-    (signed,) = opinions(Opinion(Packed.of(mask)), (24, 32))
+    (signed,) = opinions(Output(mask=Packed.of(mask)), (24, 32))
     np.testing.assert_array_equal(signed[5, [0, 11, 12, 31]], [12, 1, -1, -20])
-    everywhere = opinions(Opinion(Packed.of(np.ones_like(mask))), (24, 32))
+    everywhere = opinions(Output(mask=Packed.of(np.ones_like(mask))), (24, 32))
     assert np.isfinite(everywhere).all()
 
 
@@ -168,7 +168,7 @@ def test_trees_that_hear_nothing_say_so():
     learnt = trees.fit(sample, heard)
     with pytest.raises(StageError, match="asks for a stage before it"):
         trees.bind(heard, learnt)(VIEW)
-    more = replace(VIEW, opinion=Opinion(sample.opinions[0].mask))
+    more = replace(VIEW, opinion=Output(mask=sample.opinions[0].mask))
     with pytest.raises(StageError, match="how probable other classes"):
         trees.bind(heard, learnt)(more)
     with pytest.raises(MisfitError, match="train it again"):
