@@ -55,5 +55,6 @@ from roadeval.data.result import (
     VariantLayout,
     VariantResult,
     as_plain,
+    as_tree,
     is_plain,
 )

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -314,6 +314,17 @@ class Rows:
                 for value in dict.fromkeys(column[places].tolist())
             ]
         yield from groups
+
+
+T = TypeVar("T")
+
+
+def as_tree(items: Iterable[tuple[tuple[str, str], T]]) -> dict[str, dict[str, T]]:
+    """Return what there is by two names, as a variant's and a stage's, one within the other."""
+    tree: dict[str, dict[str, T]] = {}
+    for (one, other), item in items:
+        tree.setdefault(one, {})[other] = item
+    return tree
 
 
 def joined(parts: Sequence[Rows]) -> Rows:

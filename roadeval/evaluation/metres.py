@@ -65,12 +65,12 @@ class Survey:
     """
 
     def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:
-        self.ground: Final = ground
-        self._settings: Final = settings
-        self._shape: Final = ground.height, ground.width
-        self._grounds: Final = [ground.moved(*each) for each in STANCES[: self.stances]]
+        self.ground = ground
+        self._settings = settings
+        self._shape = ground.height, ground.width
+        self._grounds = [ground.moved(*each) for each in STANCES[: self.stances]]
         edges = [(name, at) for at in settings.edges_at for name in (LEFT, RIGHT)]
-        self.measures: Final = (*edges, (FREE, 0))
+        self.measures = (*edges, (FREE, 0))
         """The name of each measure, and the distance at which it is taken."""
 
     @property

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from enum import StrEnum
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -83,7 +82,7 @@ class SeveralCamerasError(RecordingError):
     def __init__(self, path: object, cameras: Sequence[str]) -> None:
         names = ", ".join(cameras)
         super().__init__(f"{path}: a recording of several cameras; name one of {names}")
-        self.cameras: Final = cameras
+        self.cameras = cameras
 
 
 class DamagedError(RecordingError):
@@ -241,20 +240,6 @@ def result_path(name: str) -> str:
     return f"/results/{name}"
 
 
-class RuleKind(StrEnum):
-    """Which images a recording keeps."""
-
-    ALL = "all"
-    MASKS = "masks"
-    """Masks and labels of every frame, with the camera's image."""
-    WORST = "worst"
-    """All images of the frames with the highest ERR."""
-    EVERY = "every"
-    """All images of every N-th frame."""
-    NONE = "none"
-    """No recording at all."""
-
-
 _RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")
 
 
@@ -263,17 +248,20 @@ class RecordRule:
     """The setting ``output.record``. Numbers, notes and tables of all frames are always recorded.
 
     >>> RecordRule.parse("worst:20")
-    RecordRule(kind=<RuleKind.WORST: 'worst'>, number=20)
+    RecordRule(kind='worst', number=20)
     """
 
-    kind: RuleKind = RuleKind.ALL
+    kind: str = "all"
+    """Of which frames all images are kept: ``all``, the ``worst`` (with the highest ERR), ``every``
+    N-th one. Of ``masks`` those of every frame, with the camera's image; ``none`` records nothing.
+    """
     number: int = 0
     """K of ``worst:K``, N of ``every:N``."""
 
     @property
     def recorded(self) -> bool:
         """Whether there is a recording."""
-        return self.kind is not RuleKind.NONE
+        return self.kind != "none"
 
     @classmethod
     def parse(cls, text: str) -> RecordRule:
@@ -284,4 +272,4 @@ class RecordRule:
                 f"`output.record` {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
             )
         plain, counted, number = match.groups()
-        return cls(RuleKind(plain or counted), int(number or 0))
+        return cls(plain or counted, int(number or 0))

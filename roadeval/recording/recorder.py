@@ -37,7 +37,7 @@ from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
 from roadeval.recording import views
 from roadeval.recording.codecs import Codec, codecs_of
-from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
+from roadeval.recording.layout import Layout, RecordingError, RecordRule
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import indexed_messages
 from roadeval.runtime.files import NewFile, writing
@@ -147,7 +147,7 @@ class WorstFrames:
     """
 
     def __init__(self, most: int) -> None:
-        self._most: Final = most
+        self._most = most
         self._bytes = 0
         self._heap: list[tuple[float, int, str, EncodedFrame]] = []
         """ERR, minus the number, and the camera of each frame, the least first; and the frame with
@@ -286,11 +286,11 @@ class Recorder:
         frame, health, error = result.frame, result.health, worst_error(result, own.layout)
         kinds: Collection[LayerKind] = tuple(LayerKind)
         match self._rule.kind:
-            case RuleKind.MASKS:
+            case "masks":
                 kinds = (LayerKind.MASK, LayerKind.LABELS)
-            case RuleKind.EVERY if position % self._rule.number:
+            case "every" if position % self._rule.number:
                 kinds = ()
-            case RuleKind.WORST if error < self._worst.least:
+            case "worst" if error < self._worst.least:
                 kinds = ()
         states = {at.ROLE: result.role.value}
         states |= {at.state_path(v.name): health.get(v.name, "") for v in own.layout.variants}
@@ -317,7 +317,7 @@ class Recorder:
         if below not in self._shown:
             paths = (path.removeprefix(below) for path in encoded.numbers)
             self._log_static(views.timing_lines(paths), below)
-        put_aside = encoded.payloads and self._rule.kind is RuleKind.WORST
+        put_aside = encoded.payloads and self._rule.kind == "worst"
         self._add_images(encoded._replace(payloads={}) if put_aside else encoded)
         for path, state in encoded.states.items():
             if self._states.get(path, "") != state:
@@ -343,11 +343,11 @@ class Recorder:
             return ""
         self._foretold = True
         shown = {
-            RuleKind.WORST: min(self._rule.number, frames),
-            RuleKind.EVERY: math.ceil(frames / max(self._rule.number, 1)),
+            "worst": min(self._rule.number, frames),
+            "every": math.ceil(frames / max(self._rule.number, 1)),
         }.get(self._rule.kind, frames)
         size, room = shown * encoded.size, self._room()
-        if self._rule.kind is RuleKind.WORST and size > HELD:
+        if self._rule.kind == "worst" and size > HELD:
             kept = f"{HELD >> 20} MiB of memory, about {HELD // encoded.size}"
             return f"`output.record` worst:{self._rule.number} keeps those that fit in {kept}"
         said = f"the recording will take about {size / 1e6:.0f} MB"

@@ -59,8 +59,8 @@ class WindowViewer:
     """The viewer's window, moved from frame to frame; opened again after it was closed."""
 
     def __init__(self) -> None:
-        self._stack: Final = ExitStack()
-        self._lock: Final = Lock()
+        self._stack = ExitStack()
+        self._lock = Lock()
         self._shown: tuple[Path, subprocess.Popen[bytes], ViewerClient] | None = None
 
     def show(self, recording: Path, frame: int | None) -> subprocess.Popen[bytes]:

@@ -95,8 +95,8 @@ class FleetFolder:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.path: Final = folder
-        self.facts: Final = FleetFacts.read(folder / FLEET)
+        self.path = folder
+        self.facts = FleetFacts.read(folder / FLEET)
         if not all(is_plain(member.drive) for member in self.facts.drives):
             raise ResultsError(
                 f"{folder / FLEET}: damaged (a drive's name is not made of letters, digits, '-' "
@@ -307,7 +307,7 @@ class FleetWriter:
     """Writes the folder of a fleet."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder: Final = Path(folder).absolute()
+        self.folder = Path(folder).absolute()
 
     def begin(self) -> None:
         """Make the folder, or see that it is a fleet's of this version.

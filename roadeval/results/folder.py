@@ -56,8 +56,8 @@ class ResultsWriter:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._new: Final = NewFolder(folder, CONTENT)
-        self._open: Final[dict[str, _Growing]] = {}
+        self._new = NewFolder(folder, CONTENT)
+        self._open: dict[str, _Growing] = {}
         self._finished = False
 
     @property
@@ -124,10 +124,10 @@ class _Growing:
     """A table that grows."""
 
     def __init__(self, folder: Path, table: TableSchema) -> None:
-        self.path: Final = folder / f"{table.name}.csv"
+        self.path = folder / f"{table.name}.csv"
         self.rows = 0
-        self._digest: Final = hashlib.sha256()
-        self._file: Final[IO[bytes]] = self.path.open("wb")
+        self._digest = hashlib.sha256()
+        self._file: IO[bytes] = self.path.open("wb")
         self._write(table.header)
 
     @property
@@ -162,10 +162,10 @@ class ResultsFolder:
     """
 
     def __init__(self, folder: Path, camera: str = "") -> None:
-        self._folder: Final = folder
-        self._camera: Final = camera
-        self._whole: Final = Facts.read(folder / SUMMARY)
-        self.facts: Final = self._whole.cameras[camera] if camera else self._whole
+        self._folder = folder
+        self._camera = camera
+        self._whole = Facts.read(folder / SUMMARY)
+        self.facts = self._whole.cameras[camera] if camera else self._whole
 
     def table(self, name: str) -> pd.DataFrame:
         """Read a table by its name in `roadeval.results.schema.TABLES`.

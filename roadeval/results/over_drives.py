@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import OUTCOMES
+from roadeval.data import OUTCOMES, as_tree
 from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import TESTED, Effect, corrected
@@ -63,9 +63,8 @@ def summarise(
                 parts += (StratumFacts(base, variant, *each) for each in found)
         effects[base].append(Effect(base, variant, rows[0]["stage"], final=True, rates=rates))
     differences = [each for own in effects.values() for each in corrected(own)]
-    totals: dict[str, dict[str, dict[str, Any]]] = {}
-    for (variant, stage), rows in _by(tables["scores"], "variant", "stage").items():
-        totals.setdefault(variant, {})[stage] = _over_all(rows)
+    masks = _by(tables["scores"], "variant", "stage")
+    totals = as_tree((mask, _over_all(rows)) for mask, rows in masks.items())
     return FleetFacts(
         verdict=verdict(totals, differences),
         version=VERSION,
@@ -81,11 +80,11 @@ def summarise(
     )
 
 
-def _by(rows: Rows, *names: str) -> dict[tuple[str, ...], list[Mapping[str, Any]]]:
+def _by(rows: Rows, *names: str) -> dict[Any, list[Mapping[str, Any]]]:
     """Return rows by the values of some columns, as they first occur."""
-    found: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    found = defaultdict[Any, list[Mapping[str, Any]]](list)
     for row in rows:
-        found.setdefault(tuple(row[name] for name in names), []).append(row)
+        found[tuple(row[name] for name in names)].append(row)
     return found
 
 

@@ -239,8 +239,8 @@ class TableFile:
         for tag in tags:
             schema = schema.append(pa.field(f"{TAG}{tag}", pa.string()))
         about = {"roadeval": json.dumps(FLEET_FORMAT), "about": TABLES[name].doc}
-        self._schema: Final = schema.with_metadata(about)
-        self._file: Final = NewFile(path)
+        self._schema = schema.with_metadata(about)
+        self._file = NewFile(path)
         self._rows: list[Any] = []
         self._writer: parquet.ParquetWriter | None = None
         self._finished = False

@@ -11,15 +11,19 @@ from skimage.segmentation import find_boundaries
 from roadeval.data import IGNORE, FrameResult, Role, TruthBits, pack
 from roadeval.evaluation import score
 from roadeval.evaluation.score import EdgesAndFlicker
-from roadeval.evaluation.score.counts import TRIMAP, boundary_iou, trimap
+from roadeval.evaluation.score.counts import TRIMAP
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 
 TRUTH = pixels("##..", "##.?")
 
 
+def contour(mask, truth, width=1, widths=TRIMAP):
+    """Boundary F, boundary IoU and trimap of a mask."""
+    return score.contours({"net": pack(mask)}, TruthBits.of(truth), width, widths)["net"]
+
+
 def one(mask, truth, width=1):
-    packed = TruthBits.of(truth)
-    return score.boundary_f({"net": pack(mask)}, packed, width)["net"]
+    return contour(mask, truth, width)[0]
 
 
 def edge_of(labels):
@@ -76,7 +80,7 @@ def test_equals_distance_transforms(width):
 
 
 def rims_overlap(mask, truth):
-    return boundary_iou({"net": pack(mask)}, TruthBits.of(truth))["net"]
+    return contour(mask, truth)[1]
 
 
 def wavy(seed, shape=(120, 160), ignored=True):
@@ -172,7 +176,7 @@ def test_an_edge_is_scikit_images_inner_boundary():
 
 
 def near_edge(mask, truth, widths=TRIMAP):
-    return trimap([pack(mask)], TruthBits.of(truth), widths)[0].tolist()
+    return contour(mask, truth, widths=widths)[2].tolist()
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -342,18 +342,18 @@ class _Against:
         self, base: Side, new: Side, match: Match, settings: EvaluationSettings, *, across: bool
     ) -> None:
         pairs, self._left_out = match
-        self.label: Final = new.label
+        self.label = new.label
         self._base, self._new, self._settings, self._across = base, new, settings, across
-        self._several: Final = len({new.drive for _, new in pairs}) > 1
-        self._alone: Final = len(pairs) == 1
+        self._several = len({new.drive for _, new in pairs}) > 1
+        self._alone = len(pairs) == 1
         """Whether it is one camera of one drive, whose frames have numbers of their own."""
-        self.changed: Final = _changed_settings(pairs)
+        self.changed = _changed_settings(pairs)
         self.frames, self._lost = [0, 0], [0, 0]
         """Of the base and of the new result: evaluated frames, and those that the other lacks."""
         self._relabelled = 0
-        self._apart: Final[list[str]] = []
+        self._apart: list[str] = []
         self.levels, self.masks, self._regions = _Masks(list), _Masks(list), _Masks(list)
-        self._known: Final[dict[str, None]] = {}  # the regions of all drives
+        self._known: dict[str, None] = {}  # the regions of all drives
         self.moved: list[MovedFrame] = []
         self.disagreements: list[Disagreement] = []
         firsts: dict[str | None, str] = {}

@@ -8,7 +8,7 @@ from roadeval.evaluation.score.counts import (
     GrowingCounts,
     Name,
     Total,
-    boundary_f,
+    contours,
     count,
     edge_of,
     error_map,

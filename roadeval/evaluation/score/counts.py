@@ -140,9 +140,7 @@ class RegionSums:
 
     def __init__(self) -> None:
         size = 1 + len(OUTCOMES) + 2 * len(metrics.METRICS)
-        self._sums: Final[defaultdict[tuple[str, str, str], Floats]] = defaultdict(
-            lambda: np.zeros(size)
-        )
+        self._sums = defaultdict[tuple[str, str, str], Floats](lambda: np.zeros(size))
         """Frames, counts, sums of rates, and on how many frames each rate is defined."""
 
     def add(self, tallies: Sequence[Tally]) -> None:
@@ -308,8 +306,8 @@ class EdgesAndFlicker:
     """
 
     def __init__(self, width: int) -> None:
-        self._width: Final = width
-        self._sums: Final = defaultdict[str, _Sums](_no_sums)
+        self._width = width
+        self._sums = defaultdict[str, _Sums](_no_sums)
         self._before: tuple[TruthBits, Mapping[str, Packed]] | None = None
 
     def add(self, result: FrameResult) -> None:
@@ -362,13 +360,25 @@ class EdgesAndFlicker:
         return found
 
 
-def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, float]:
-    """Compute the boundary F of some masks: ``F = 2 P R / (P + R)`` [1]_ [2]_.
+def contours(
+    masks: Mapping[str, Bits], truth: TruthBits, width: int, widths: Sequence[int] = TRIMAP
+) -> dict[str, Contour]:
+    """Compute how well masks, ``(H, words)`` each by name, follow the truth's edge.
 
-    P is the share of the mask's edge pixels that lie within ``width`` of the truth's edge, R the
-    share of the truth's edge pixels within ``width`` of the mask's. 0 if only one of the two has an
-    edge, NaN if neither has. ``masks`` are ``(H, words)`` each, by name; ``width`` is the tolerance
-    in pixels, Euclidean distance. Ignored pixels are on neither side of an edge.
+    Boundary F is ``F = 2 P R / (P + R)`` [1]_ [2]_. P is the share of the mask's edge pixels that
+    lie within ``width`` of the truth's edge, R the share of the truth's edge pixels within
+    ``width`` of the mask's, in pixels of Euclidean distance. 0 if only one of the two has an edge,
+    NaN if neither has.
+
+    Boundary IoU is that of the bands of road along the two edges [3]_. A band is as wide as 2 % of
+    the diagonal, in chessboard distance; as in the authors' code the image's border is an edge. NaN
+    where both bands are empty.
+
+    The trimap [4]_, ``(w, 2)``, counts the wrong pixels and all labelled ones within ``widths``,
+    rising, of the truth's edge: a pixel is within a width if the square of side ``2 * width + 1``
+    around it holds both road and non-road.
+
+    Ignored pixels are on neither side of an edge, and in no count.
 
     References
     ----------
@@ -376,65 +386,40 @@ def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[
        2013.
     .. [2] F. Perazzi et al., A Benchmark Dataset and Evaluation Methodology for Video Object
        Segmentation, CVPR 2016, section 5.
+    .. [3] B. Cheng et al., Boundary IoU, CVPR 2021.
+    .. [4] P. Kohli et al., Robust Higher Order Potentials for Enforcing Label Consistency, IJCV 82,
+       2009.
     """
-    true_edge, labelled = edge_of(truth), truth.labelled
-    near_truth = grow(true_edge, disk(width), truth)
-    scores = {}
-    for name, mask in masks.items():
-        edge = edge_of(TruthBits(truth.shape, mask & labelled, labelled & ~mask))
-        p, q = ones(edge), ones(true_edge)
-        if not p or not q:
-            scores[name] = 0.0 if p or q else math.nan
-            continue
-        precision = ones(edge & near_truth) / p
-        recall = ones(true_edge & grow(edge, disk(width), truth)) / q
-        both = precision + recall
-        scores[name] = 2 * precision * recall / both if both else 0.0
-    return scores
+    labelled, element = truth.labelled, square(max(1, round(0.02 * math.hypot(*truth.shape))))
 
+    def band(own: TruthBits) -> Bits:
+        inside = everywhere(truth.shape) ^ own.other
+        return own.road & ~KERNELS.erode(inside, element, truth.shape[1])
 
-def boundary_iou(masks: Mapping[str, Bits], truth: TruthBits) -> dict[str, float]:
-    """Compute the boundary IoU of some masks: that of the bands of road along the two edges.
-
-    After B. Cheng et al., Boundary IoU, CVPR 2021. A band is as wide as 2 % of the diagonal, in
-    chessboard distance; as in the authors' code the image's border is an edge. Ignored pixels make
-    none, and are in no count. NaN where both bands are empty.
-    """
-    element = square(max(1, round(0.02 * math.hypot(*truth.shape))))
-
-    def band(road: Bits, other: Bits) -> Bits:
-        inside = KERNELS.erode(everywhere(truth.shape) ^ other, element, truth.shape[1])
-        return road & ~inside
-
-    true_band, labelled, scores = band(truth.road, truth.other), truth.labelled, {}
-    for name, mask in masks.items():
-        own = band(mask & labelled, labelled & ~mask)
-        union = ones(own | true_band)
-        scores[name] = ones(own & true_band) / union if union else math.nan
-    return scores
-
-
-def trimap(masks: Iterable[Bits], truth: TruthBits, widths: Sequence[int] = TRIMAP) -> Sums:
-    """Count each mask's wrong pixels, and all labelled ones, within widths of the truth's edge.
-
-    After P. Kohli et al., IJCV 82, 2009. A pixel is within a width if the square of side
-    ``2 * width + 1`` around it holds both road and non-road. ``masks`` are K of ``(H, words)``,
-    ``widths`` rise; returned are ``(K, w, 2)``.
-    """
-    road, other, near = truth.road, truth.other, []
-    for before, width in pairwise((0, *widths)):
+    true_edge, true_band = edge_of(truth), band(truth)
+    near_truth, q = grow(true_edge, disk(width), truth), ones(true_edge)
+    road, other, near, found = truth.road, truth.other, [], {}
+    for before, after in pairwise((0, *widths)):
         # A square grown by a square is the square of both widths.
-        road, other = (grow(each, square(width - before), truth) for each in (road, other))
+        road, other = (grow(each, square(after - before), truth) for each in (road, other))
         near.append(road & other)
-    counted = flat([*(mask ^ truth.road for mask in masks), truth.labelled])
-    counts = KERNELS.count_bits(counted, flat([truth.labelled]), flat(near))[:, 0]
-    return np.stack([counts[:-1], np.broadcast_to(counts[-1], counts[:-1].shape)], axis=2)
-
-
-def contours(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, Contour]:
-    """Compute the boundary F, with its ``width``, the boundary IoU and the trimap of some masks."""
-    scores = boundary_f(masks, truth, width).values(), boundary_iou(masks, truth).values()
-    return dict(zip(masks, zip(*scores, trimap(masks.values(), truth), strict=True), strict=True))
+    counted = flat([labelled, *(mask ^ truth.road for mask in masks.values())])
+    whole, *wrong = KERNELS.count_bits(counted, flat([labelled]), flat(near))[:, 0]
+    for (name, mask), errors in zip(masks.items(), wrong, strict=True):
+        own = TruthBits(truth.shape, mask & labelled, labelled & ~mask)
+        edge, own_band = edge_of(own), band(own)
+        p, score = ones(edge), math.nan
+        if p and q:
+            recall = ones(true_edge & grow(edge, disk(width), truth)) / q
+            precision = ones(edge & near_truth) / p
+            both = precision + recall
+            score = 2 * precision * recall / both if both else 0.0
+        elif p or q:
+            score = 0.0
+        union = ones(own_band | true_band)
+        overlap = ones(own_band & true_band) / union if union else math.nan
+        found[name] = score, overlap, np.stack([errors, whole], axis=1)
+    return found
 
 
 def edge_of(labels: TruthBits) -> Bits:

@@ -51,13 +51,13 @@ class MetreSums:
     def __init__(self) -> None:
         self._measures: Sequence[tuple[str, int]] = ()
         self._regions: Sequence[str] = ()
-        self._differences: Final = defaultdict[tuple[str, int], Counter[int]](Counter)
+        self._differences = defaultdict[tuple[str, int], Counter[int]](Counter)
         """By variant, and by stance and measure in a row: how often each, in centimetres."""
-        self._seen: Final[dict[str, Sums]] = {}
+        self._seen: dict[str, Sums] = {}
         """``(M,)``: frames on which the truth has the measure."""
-        self._rates: Final[dict[str, Floats]] = {}
+        self._rates: dict[str, Floats] = {}
         """``(S, R, 2)``: sums of the frames' ERR, and frames that have one."""
-        self._above: Final[dict[str, Sums]] = {}
+        self._above: dict[str, Sums] = {}
         """``(4,)``: cells of the ground seen from above, by outcome."""
 
     def add(self, metres: Mapping[str, FrameMetres]) -> None:

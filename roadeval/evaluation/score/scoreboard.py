@@ -31,6 +31,7 @@ from roadeval.data import (
     Role,
     Transition,
     VariantResult,
+    as_tree,
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
@@ -174,32 +175,32 @@ class Scoreboard:
     ) -> None:
         if BASELINE in variants:
             raise ValueError(f"no variant may be called {BASELINE!r}")
-        self._settings: Final = settings
-        self._order: Final = (*variants, BASELINE)
-        self._prior: Final = prior
-        self._ground: Final = ground
-        self._metres: Final = MetreSums()
-        self._above: Final = Curves()
-        self._when: Final = array("q")
+        self._settings = settings
+        self._order = (*variants, BASELINE)
+        self._prior = prior
+        self._ground = ground
+        self._metres = MetreSums()
+        self._above = Curves()
+        self._when = array("q")
         """Number and stamp of each evaluated frame."""
-        self._roles: Final[Counter[str]] = Counter()
-        self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
-        self._counts: Final = GrowingCounts()
-        self._oracles: Final[defaultdict[str, GrowingCounts]] = defaultdict(GrowingCounts)
-        self._repeats: Final[defaultdict[int, GrowingCounts]] = defaultdict(GrowingCounts)
-        self._regions: Final = RegionSums()
-        self.heat: Final[defaultdict[str, HeatMap]] = defaultdict(HeatMap)
+        self._roles: Counter[str] = Counter()
+        self._health = defaultdict[str, Counter[str]](Counter)
+        self._counts = GrowingCounts()
+        self._oracles = defaultdict[str, GrowingCounts](GrowingCounts)
+        self._repeats = defaultdict[int, GrowingCounts](GrowingCounts)
+        self._regions = RegionSums()
+        self.heat = defaultdict[str, HeatMap](HeatMap)
         """Where each variant's final mask errs."""
-        self.changes: Final[defaultdict[Transition, Change]] = defaultdict(Change)
+        self.changes = defaultdict[Transition, Change](Change)
         """Every change between masks."""
-        self.curves: Final = Curves()
-        self.unlabelled: Final = Unlabelled()
+        self.curves = Curves()
+        self.unlabelled = Unlabelled()
         """The frames without truth."""
-        self.apart: Final[dict[int, Mapping[str, float]]] = {}
+        self.apart: dict[int, Mapping[str, float]] = {}
         """ERR of the frames that were picked by rank, by number and variant."""
-        self._training: Final = Curves()
-        self._edges: Final = EdgesAndFlicker(settings.boundary_width)
-        self._seconds: Final[defaultdict[Name, list[float]]] = defaultdict(lambda: [0.0, 0])
+        self._training = Curves()
+        self._edges = EdgesAndFlicker(settings.boundary_width)
+        self._seconds = defaultdict[Name, list[float]](lambda: [0.0, 0])
 
     def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
         """Score one frame; changes nothing, so any thread may call it at any time."""
@@ -292,30 +293,27 @@ class Scoreboard:
             return {}
         trainings = [{mask.name: mask for mask in each} for each in (self.masks(), *further)]
         names = [name for name in trainings[0] if name in trainings[-1]]
-        sums: dict[str, dict[str, dict[str, list[float]]]] = {}
-        difference: dict[str, dict[str, list[float]]] = {}
+        sums, difference, rates = {}, {}, (*METRICS, *(f"pooled_{rate}" for rate in METRICS))
         for variant, stage in names:
             each = [sum_up(training[variant, stage].counts) for training in trainings]
-            rates = (*METRICS, *(f"pooled_{rate}" for rate in METRICS))
-            sums.setdefault(variant, {})[stage] = {r: [own[r] for own in each] for r in rates}
+            sums[variant, stage] = {rate: [own[rate] for own in each] for rate in rates}
             if variant == FILTERED and (UNFILTERED, stage) in names:
                 changes = [_mean_difference(training, stage) for training in trainings]
                 difference[stage] = {rate: [one[rate] for one in changes] for rate in COMPARED}
-        return {"totals": sums, "difference": difference}
+        return {"totals": as_tree(sums.items()), "difference": difference}
 
     def summary(self) -> dict[str, Any]:
         """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
-        seconds: dict[str, dict[str, float]] = {}
-        for (variant, stage), (total, runs) in self._seconds.items():
-            seconds.setdefault(variant, {})[stage] = total / runs
+        seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
         curves, beyond, masks = self.curves.totals(), self._edges.totals(), self.masks()
         for mask in {each.variant: each for each in masks}.values():  # the final ones
             errors = mask.rates[:, [*METRICS].index(TESTED)]
             beyond[mask.variant]["episodes"] = episodes(mask.stamps, errors, DEGRADED_ERR)
-        oracles: dict[str, dict[str, Any]] = {}
-        for oracle, counts in self._oracles.items():
-            for variant, own in totals(self._so_far(counts)).items():
-                oracles.setdefault(variant, {})[oracle] = own
+        oracles = as_tree(
+            ((variant, oracle), own)
+            for oracle, counts in self._oracles.items()
+            for variant, own in totals(self._so_far(counts)).items()
+        )
         return {
             "totals": totals(masks),
             "beyond": beyond,
@@ -338,10 +336,7 @@ class Scoreboard:
 
 def totals(masks: Camera) -> Totals:
     """Sum up masks by variant and stage, as in ``summary.json``: see `sum_up`."""
-    sums: Totals = {}
-    for mask in masks:
-        sums.setdefault(mask.variant, {})[mask.stage] = sum_up(mask.counts)
-    return sums
+    return as_tree((mask.name, sum_up(mask.counts)) for mask in masks)
 
 
 def _mean_difference(training: Mapping[Name, FrameCounts], stage: str) -> dict[str, float]:

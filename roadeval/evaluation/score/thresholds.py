@@ -31,6 +31,7 @@ from roadeval.data import (
     Histogram,
     Transition,
     TruthBits,
+    as_tree,
     best_code,
     everywhere,
     ones,
@@ -110,23 +111,21 @@ class Curves:
     """The labelled pixels of a drive by how probable road is, for each variant and stage."""
 
     def __init__(self) -> None:
-        self.counts: Final[dict[Name, Sums]] = {}
+        self.counts: dict[Name, Sums] = {}
         """``(2, 65536)`` int64 each, or of the ground ``(2, 256)``: non-road and road."""
-        self._frames: Final[Counter[Name]] = Counter()
+        self._frames: Counter[Name] = Counter()
 
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
         """Return ERR of all pixels at the threshold that errs least on other frames.
 
         By variant and stage of both: the ``threshold`` as a fraction, and ``ERR``.
         """
-        found: dict[str, dict[str, dict[str, float]]] = {}
-        for (variant, stage), counts in self.counts.items():
-            if (variant, stage) in others.counts:
-                code = best_code(others.counts[variant, stage])
-                err = float(wrong_above(counts)[code] / counts.sum())
-                at = {"threshold": code / (CODES - 1), "ERR": err}
-                found.setdefault(variant, {})[stage] = at
-        return found
+        found = {}
+        for name in (name for name in self.counts if name in others.counts):
+            code, counts = best_code(others.counts[name]), self.counts[name]
+            err = float(wrong_above(counts)[code] / counts.sum())
+            found[name] = {"threshold": code / (CODES - 1), "ERR": err}
+        return as_tree(found.items())
 
     def add(self, histograms: Mapping[Name, Histogram]) -> None:
         """Add the histograms of a frame."""
@@ -139,15 +138,11 @@ class Curves:
 
         The ``frames``, ``AP``, and what `Thresholds.max_f` finds.
         """
-        found: dict[str, dict[str, dict[str, Any]]] = {}
-        for (variant, stage), counts in self.counts.items():
-            thresholds = Thresholds.of(counts)
-            found.setdefault(variant, {})[stage] = {
-                "frames": self._frames[variant, stage],
-                "AP": thresholds.average_precision,
-                **thresholds.max_f(),
-            }
-        return found
+        found = {}
+        for name, counts in self.counts.items():
+            own, frames = Thresholds.of(counts), self._frames[name]
+            found[name] = {"frames": frames, "AP": own.average_precision, **own.max_f()}
+        return as_tree(found.items())
 
 
 CELLS: Final = 160

@@ -72,12 +72,10 @@ class Unlabelled:
     """Collects the doubts on a drive's frames, and adds their flicker."""
 
     def __init__(self) -> None:
-        self._numbers: Final = defaultdict[str, "array[float]"](lambda: array("d"))
-        self._stamps: Final = defaultdict[str, "array[int]"](lambda: array("q"))
-        self._stages: Final[dict[str, str]] = {}
-        self._differ: Final[defaultdict[tuple[str, str], list[float]]] = defaultdict(
-            lambda: [0.0, 0]
-        )
+        self._numbers = defaultdict[str, "array[float]"](lambda: array("d"))
+        self._stamps = defaultdict[str, "array[int]"](lambda: array("q"))
+        self._stages: dict[str, str] = {}
+        self._differ = defaultdict[tuple[str, str], list[float]](lambda: [0.0, 0])
         self._before: Mapping[str, Packed] = {}
 
     def add(self, result: FrameResult) -> tuple[Doubt, ...]:

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.config import AS_IT_IS
-from roadeval.data import BASELINE, FINAL_STAGE, TUNED, Role
+from roadeval.data import BASELINE, FINAL_STAGE, TUNED, Role, as_tree
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import (
     Scoreboard,
@@ -110,10 +110,8 @@ def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
     if sign is not None:
         apart = scene_ns(own["stamp_ns"])
         look_at = worst(rows, first, LOOKED_AT, apart, by=sign)["frame"].tolist()
-    differing: defaultdict[str, dict[str, float]] = defaultdict(dict)
-    for (one, other), share in frames.differing().items():
-        differing[one][other] = share
-    return UnlabelledFacts(len(own), first, sign, look_at, dict(differing))
+    differing = as_tree(frames.differing().items())
+    return UnlabelledFacts(len(own), first, sign, look_at, differing)
 
 
 def _estimate(run: Run) -> EstimateFacts | None:
@@ -183,9 +181,7 @@ def of_cameras(
         for variant, stages in own.totals.items():
             for stage, total in stages.items():
                 by_mask[variant, stage].append(total)
-    totals: dict[str, dict[str, Any]] = {}
-    for (variant, stage), sums in by_mask.items():
-        totals.setdefault(variant, {})[stage] = over_cameras(sums)
+    totals = as_tree((mask, over_cameras(sums)) for mask, sums in by_mask.items())
     settings = first.evaluation
     effects = drive_effects([board.masks() for board in boards], settings)
     claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
