@@ -75,13 +75,11 @@ def codecs_of(layout: Layout) -> dict[str, Codec]:
 
 def codec(spec: LayerSpec, width: int, height: int) -> Codec:
     """Return the codec of a layer of ``width`` x ``height`` pixels."""
-    kinds = {
-        LayerKind.MASK: MaskCodec,
-        LayerKind.LABELS: LabelCodec,
-        LayerKind.SCALAR: ScalarCodec,
-        LayerKind.RGB: ImageCodec,
-    }
-    return kinds[spec.kind](width, height, spec)
+    kinds = {LayerKind.MASK: MaskCodec, LayerKind.LABELS: LabelCodec, LayerKind.SCALAR: ScalarCodec}
+    return kinds.get(spec.kind, ImageCodec)(width, height, spec)
+
+
+_CAMERA: Final = LayerSpec("camera", LayerKind.RGB, "Camera")
 
 
 @dataclass(frozen=True)
@@ -93,6 +91,7 @@ class Codec:
 
     width: int
     height: int
+    spec: LayerSpec = _CAMERA
     component: ClassVar = "EncodedImage:blob"
     """The archetype and its component that hold the bytes."""
 
@@ -118,14 +117,7 @@ class Codec:
         return images.to_rgb(payload, limits_for(self.width, self.height))
 
 
-@dataclass(frozen=True)
-class _LayerCodec(Codec):
-    """A codec of a layer that a stage made."""
-
-    spec: LayerSpec
-
-
-class ImageCodec(_LayerCodec):
+class ImageCodec(Codec):
     """A colour image: a PNG, or a small JPEG."""
 
     def encode(self, array: Array) -> bytes:
@@ -137,23 +129,16 @@ class ImageCodec(_LayerCodec):
         return _restore(super().decode(payload), self.width, self.height)
 
 
-class MaskCodec(_LayerCodec):
+class MaskCodec(Codec):
     """A mask: a PNG of a few bits a pixel whose palette holds the classes' colours."""
 
     @cached_property
-    def _values(self) -> Array:
-        """The classes' values by their place in the palette."""
-        return np.array([c.value for c in self.spec.classes], np.uint8)
-
-    @cached_property
-    def _places(self) -> Array | None:
-        """The classes' places in the palette by their values; None if they are the same."""
-        in_order = np.arange(len(self._values))
-        if (self._values == in_order).all():
-            return None
-        places = np.zeros(256, np.uint8)
-        places[self._values] = in_order
-        return places
+    def _tables(self) -> tuple[Array, Array]:
+        """The classes' places in the palette by their values, and the reverse, ``(256,)`` each."""
+        places, values = np.zeros((2, 256), np.uint8)
+        for place, each in enumerate(self.spec.classes):
+            places[each.value], values[place] = place, each.value
+        return places, values
 
     def style(self) -> Sequence[Any]:
         """Draw it above the camera's image."""
@@ -163,17 +148,17 @@ class MaskCodec(_LayerCodec):
 
     def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
         """Return a PNG file of ``(H, W)`` uint8 class values, or of the bits of two classes."""
-        if self._places is not None and not isinstance(array, Packed):
-            array = np.asarray(cv2.LUT(array, self._places), np.uint8)
+        if not isinstance(array, Packed):
+            array = np.asarray(cv2.LUT(array, self._tables[0]), np.uint8)
         return encode_labels(array, [c.rgba for c in self.spec.classes])
 
     def decode(self, payload: bytes) -> Array:
         """Return the same array."""
         labels = images.palette_indices(payload, limits_for(self.width, self.height))
-        return labels if self._places is None else np.asarray(self._values[labels])
+        return np.asarray(cv2.LUT(labels, self._tables[1]))
 
 
-class LabelCodec(_LayerCodec):
+class LabelCodec(Codec):
     """A label image: raw bytes, so that the viewer can name the class under the mouse."""
 
     component = "SegmentationImage:buffer"
@@ -199,7 +184,7 @@ class LabelCodec(_LayerCodec):
         return np.frombuffer(payload, np.uint8).reshape(self.height, self.width)
 
 
-class ScalarCodec(_LayerCodec):
+class ScalarCodec(Codec):
     """A map of numbers: a grey PNG whose levels span the range, coloured by the viewer."""
 
     component = "EncodedDepthImage:blob"

@@ -289,11 +289,9 @@ class Facts(Document):
         for stage, rates in self.difference.items():
             final = finals[FILTERED] == stage
             found.append(Effect(UNFILTERED, FILTERED, stage, final, rates))
-        for base, own in (
-            (UNFILTERED, self.against_unfiltered),
-            (BASELINE, self.against_blind),
-            (None, self.against_method),
-        ):
+        against = {UNFILTERED: self.against_unfiltered, BASELINE: self.against_blind}
+        against |= {"": self.against_method}
+        for base, own in against.items():
             for name, rates in own.items():
                 of = base or name.removesuffix(TUNED)
                 found.append(Effect(of, name, finals[name], final=True, rates=rates))
@@ -316,14 +314,14 @@ def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
         part: {} for part in ("difference", "against_unfiltered", "against_blind", "against_method")
     }
     for each in effects:
+        part, key = "against_unfiltered", each.variant
         if each.base == BASELINE:
-            parts["against_blind"][each.variant] = dict(each.rates)
+            part = "against_blind"
         elif each.variant == each.base + TUNED:
-            parts["against_method"][each.variant] = dict(each.rates)
+            part = "against_method"
         elif each.variant == FILTERED:
-            parts["difference"][each.stage] = dict(each.rates)
-        else:
-            parts["against_unfiltered"][each.variant] = dict(each.rates)
+            part, key = "difference", each.stage
+        parts[part][key] = dict(each.rates)
     return parts
 
 

@@ -64,7 +64,7 @@ OVER = Difference(
         (
             replace(OVER, groups=2, low=None, high=None, p=None, needed=6),
             "Over 8 drives in 2 groups the filter lowers ERR by 1.0 pp (worse on 1, better on 7); "
-            "2 groups of drives are too few for an interval (6 are needed).",
+            "2 groups are too few for an interval (6 are needed).",
         ),
     ],
 )

@@ -42,6 +42,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator
 
+from roadeval.data.words import counted
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.runtime.imports import special
 
@@ -259,11 +260,9 @@ class Difference:
         if not self.units:
             return f"undefined on every {self.unit[:-1]}"
         count = self.units if self.groups is None else self.groups
-        noun = self.unit[:-1] if count == self.units else "group of drives"
-        if count != 1:
-            noun = noun.replace("group", "groups") if " " in noun else f"{noun}s"
+        what = counted(count, self.unit[:-1] if count == self.units else "group")
         verb = "is" if count == 1 else "are"
-        return f"{count} {noun} {verb} too few for an interval ({self.needed} are needed)"
+        return f"{what} {verb} too few for an interval ({self.needed} are needed)"
 
 
 class CameraRates(NamedTuple):

@@ -22,7 +22,7 @@ def texts(findings):
 
 def test_where_there_is_no_interval_the_reason_is_given():
     found = some_findings(difference={"post": by_rate(err=a_difference(-0.02))})
-    assert any("No interval for ERR: 1200 frames are too few" in text for text in texts(found))
+    assert any("No interval for ERR: 1,200 frames are too few" in text for text in texts(found))
 
 
 # --- Over thresholds ------------------------------------------------------------------------------
