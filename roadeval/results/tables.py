@@ -196,17 +196,7 @@ def _arrays(table: pa.Table, columns: Iterable[Column]) -> Rows:
 
 def _words(column: pa.ChunkedArray) -> Cells:
     """Return a column of words as an array of text; a missing one is empty."""
-    import pyarrow as pa
-
-    if not pa.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
-    chunks = column.unify_dictionaries().chunks
-    if not chunks:
-        return np.zeros(0, str)
-    words = np.array([*chunks[0].dictionary.to_pylist(), ""], str)
-    # Arrow's own way to NumPy imports pandas.
-    places: Cells = np.concatenate([_filled(each.indices, -1) for each in chunks])
-    return np.asarray(words[places])
+    return np.array([word or "" for word in column.to_pylist()], str)
 
 
 def _numbers(column: pa.ChunkedArray) -> Cells:

@@ -63,14 +63,14 @@ def test_frames_with_truth_and_training_frames_have_no_doubt():
 
 
 def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
-    board = a_board("sure", "plain")
-    codes = np.full((1, 4), 20000, np.uint16)
-    for number in range(2):
-        seen(
-            board, number, variant("sure", pixels("#..."), codes), variant("plain", pixels("...."))
-        )
-    rows = board.unlabelled.rows()
-    assert (sign_of(rows, "sure"), sign_of(rows, "plain")) == ("entropy", "disagreement")
+    found = {}
+    for names in (("sure", "plain"), ("plain", "sure")):
+        board, codes = a_board(*names), {"sure": np.full((1, 4), 20000, np.uint16)}
+        for number in range(2):
+            masks = {"sure": pixels("#..."), "plain": pixels("....")}
+            seen(board, number, *(variant(name, masks[name], codes.get(name)) for name in names))
+        found[names[0]] = sign_of(board.unlabelled.rows(), names[0])
+    assert found == {"sure": "entropy", "plain": "disagreement"}
     assert sign_of(Unlabelled().rows(), "nobody") is None
 
 

@@ -72,9 +72,9 @@ class Unlabelled:
     """Collects the doubts on a drive's frames, and adds their flicker."""
 
     def __init__(self) -> None:
-        self._numbers = defaultdict[str, "array[float]"](lambda: array("d"))
-        self._stamps = defaultdict[str, "array[int]"](lambda: array("q"))
         self._stages: dict[str, str] = {}
+        self._stamps, self._signs = array("q"), array("d")
+        """Of the first variant, whose frames are ranked: numbers and stamps, and `SIGNS`."""
         self._differ = defaultdict[tuple[str, str], list[float]](lambda: [0.0, 0])
         self._before: Mapping[str, Packed] = {}
 
@@ -91,8 +91,9 @@ class Unlabelled:
             doubt = replace(each, flicker=changed)
             found.append(doubt)
             self._stages[name] = doubt.stage
-            self._stamps[name].extend((result.frame.number, result.frame.stamp_ns))
-            self._numbers[name].extend(getattr(doubt, sign) for sign in SIGNS)
+            if name == next(iter(self._stages)):
+                self._stamps.extend((result.frame.number, result.frame.stamp_ns))
+                self._signs.extend(getattr(doubt, sign) for sign in SIGNS)
             for other, share in doubt.differs.items():
                 pair = self._differ[name, other]
                 pair[0] += share
@@ -104,32 +105,21 @@ class Unlabelled:
         self._before = {}
 
     def rows(self) -> Rows:
-        """Return a row per variant and frame, as in ``unlabelled.csv``, variant by variant."""
-        names = [*self._stages]
-        when = [np.array(self._stamps[name], np.int64).reshape(-1, 2) for name in names]
-        values = [np.array(self._numbers[name]).reshape(-1, len(SIGNS)) for name in names]
-        counts = [len(each) for each in when]
-        both, numbers = (
-            np.concatenate([np.zeros((0, 2), np.int64), *when]),
-            np.concatenate([np.zeros((0, len(SIGNS))), *values]),
-        )
-        return Rows(
-            {
-                "frame": both[:, 0],
-                "stamp_ns": both[:, 1],
-                "variant": np.repeat(np.array(names, str), counts),
-                "stage": np.repeat(np.array([*self._stages.values()], str), counts),
-                **dict(zip(SIGNS, numbers.T, strict=True)),
-            }
-        )
+        """Return the rows of ``unlabelled.csv`` of the first variant."""
+        when = np.array(self._stamps, np.int64).reshape(-1, 2)
+        signs = np.array(self._signs).reshape(-1, len(SIGNS))
+        mask = next(iter(self._stages.items()), ("", ""))
+        variant, stage = (np.full(len(when), name) for name in mask)
+        columns = {"frame": when[:, 0], "stamp_ns": when[:, 1], "variant": variant, "stage": stage}
+        return Rows({**columns, **dict(zip(SIGNS, signs.T, strict=True))})
 
     def differing(self) -> dict[tuple[str, str], float]:
         """Return the mean share of pixels on which two variants differ, by pair, once each."""
-        order = [*self._stages]
         return {
-            (one, other): total / frames
-            for (one, other), (total, frames) in self._differ.items()
-            if order.index(one) < order.index(other)
+            pair: total / frames
+            for pair in combinations(self._stages, 2)
+            for total, frames in [self._differ[pair]]
+            if frames
         }
 
 

@@ -105,13 +105,12 @@ def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
     if not len(rows):
         return None
     first = str(rows["variant"][0])
-    own = rows.of_variant(first)
     sign, look_at = sign_of(rows, first), []
     if sign is not None:
-        apart = scene_ns(own["stamp_ns"])
+        apart = scene_ns(rows["stamp_ns"])
         look_at = worst(rows, first, LOOKED_AT, apart, by=sign)["frame"].tolist()
     differing = as_tree(frames.differing().items())
-    return UnlabelledFacts(len(own), first, sign, look_at, differing)
+    return UnlabelledFacts(len(rows), first, sign, look_at, differing)
 
 
 def _estimate(run: Run) -> EstimateFacts | None:
