@@ -3,7 +3,7 @@
 import pytest
 from rich.table import Table
 
-from roadeval.cli import console, messages
+from roadeval.cli import console
 
 
 @pytest.fixture
@@ -32,11 +32,3 @@ def test_text_from_elsewhere_is_escaped_wherever_it_stands(shown, monkeypatch):
     assert ESCAPED in shown(HOSTILE)
     assert shown(console.wrapped(f"one {HOSTILE}", 80, 2)) == [f"  one {ESCAPED}", ""]
     assert all(line.isprintable() for line in lines)
-
-
-@pytest.mark.parametrize("columns", ["0", "1", "-5", "abc", "999999999999"])
-def test_a_width_that_no_terminal_has_is_no_width(columns, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", columns)
-    messages.warning("beware")
-    console.results().print("a line of some words")
-    assert capsys.readouterr() == ("a line of some words\n", "roadeval: warning: beware\n")

@@ -9,7 +9,6 @@ import sys
 import pytest
 import typer
 
-from roadeval.cli import app as cli
 from roadeval.cli.app import explain, main
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.signals import Stopped
@@ -101,15 +100,6 @@ def test_too_little_memory_is_a_known_problem(error, capsys):
         "roadeval: error: not enough memory: give it more, or let it take less, by fewer --jobs "
         "or a smaller --scale"
     ]
-
-
-def test_what_is_no_exception_to_python_is_explained_too(capsys, monkeypatch):
-    def panics(**_):
-        raise type("PanicException", (BaseException,), {})("index out of bounds")
-
-    monkeypatch.setattr(cli, "app", panics)
-    assert main([]) == 70
-    assert lines(capsys)[0].startswith("roadeval: error: PanicException: index out of bounds (a")
 
 
 @pytest.mark.parametrize(("call", "ours"), [("main()", True), ("main(['--version'])", False)])

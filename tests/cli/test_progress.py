@@ -51,12 +51,6 @@ def test_a_line_comes_now_and_then_with_rate_and_time_left(monkeypatch):
     ]
 
 
-def test_without_a_terminal_the_lines_go_to_stderr(capsys):
-    with progress.watched() as watch:
-        watch(step(1, 10))
-    assert capsys.readouterr() == ("", "replaying: 1 of 10 frames\n")
-
-
 def test_at_a_terminal_there_is_a_bar(monkeypatch):
     screen = Console(file=io.StringIO(), force_terminal=True, width=80)
     monkeypatch.setattr(console, "diagnostics", lambda: screen)

@@ -68,12 +68,6 @@ def test_every_option_arrives(asked, tmp_path):
     )
 
 
-def test_an_option_overrides_the_file(asked, tmp_path):
-    (tmp_path / "c.toml").write_text("[frames]\nevery = 2\nmax_frames = 9\n")
-    assert main(["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--every", "3"]) == 0
-    assert (asked["config"].frames.every, asked["config"].frames.max_frames) == (3, 9)
-
-
 def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
     (tmp_path / "c.toml").write_text('preset = "gated"\n')
     words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--preset"]

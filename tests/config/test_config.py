@@ -131,17 +131,6 @@ def test_a_path_with_a_zero_byte_is_refused(tables):
         configure(tables)
 
 
-def test_a_chain_without_a_filter_is_one_variant():
-    assert [v.name for v in configure({"preset": "robust"}).variants()] == ["unfiltered"]
-
-
-def test_extra_variants_come_last_and_a_later_one_of_a_name_replaces_it():
-    config = configure({"variants": {"wide": {"shadow": {"ring_width": 3}}, "gated": {}}})
-    assert [v.name for v in config.variants()] == ["filtered", "unfiltered", "wide", "gated"]
-    (wide, _) = config.override({"variants": {"wide": {"shadow": {"ring_width": 5}}}}).extra
-    assert wide.pipeline.settings["shadow"].ring_width == 5
-
-
 @pytest.mark.parametrize("name", sorted(RESERVED))
 def test_reserved_names_are_refused(name):
     with pytest.raises(ConfigError, match="reserved"):

@@ -11,13 +11,6 @@ def flowing(text):
     return " ".join(text.split())
 
 
-def test_outputs_land_in_recordings_and_reports_of_the_current_folder(at_home):
-    run, folder = at_home
-    assert run.returncode == 0, run.stderr
-    assert (folder / "recordings" / "street.rrd").is_file()
-    assert (folder / "reports" / "street" / "summary.json").is_file()
-
-
 def test_json_prints_the_summary_and_nothing_else(at_home):
     run, folder = at_home
     assert run.stdout == (folder / "reports" / "street" / "summary.json").read_text()

@@ -125,11 +125,3 @@ def test_a_worse_fleet_ends_with_4_and_the_sentence_that_says_why(fleets):
     assert max(map(len, run.stdout.splitlines())) <= 80
     assert "post.filtered.ERR of new changed by" in run.stderr
     assert "warning: 2 drives are left out of base" in run.stderr
-
-
-@pytest.mark.parametrize("words", [["post.net.ERR > 1pp"], ["post.filtered.ERR > 99pp surely"]])
-def test_what_cannot_be_judged_over_drives_is_one_line(words, fleets, tmp_path):
-    few = fleet_of(tmp_path / "few", 2)
-    run = here("compare", few, few, "--fail-if", *words)
-    assert run.returncode == 1
-    assert len(run.stderr.splitlines()) == 1

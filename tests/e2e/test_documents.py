@@ -30,7 +30,6 @@ BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.DOTALL | re.
 FILE = re.compile(r"# ([\w./-]+\.(?:csv|py|toml|yml))\n")
 BY_CI = "python3 -m venv .venv"
 """Begins the two commands of README.md, which `.ci/run` runs."""
-HOLDS = "post.filtered.ERR > 0%"
 
 
 def write_drive(path: Path, first: int = 0) -> None:

@@ -145,12 +145,6 @@ def test_what_cannot_be_done_is_one_line(words, code, said, demo):
     assert len(run.stderr.splitlines()) == 1
 
 
-def test_a_results_folder_has_nothing_to_open(demo):
-    run = here("inspect", demo.reports, "--frame", 12)
-    assert run.returncode == 1
-    assert "give the recording (.rrd)" in run.stderr
-
-
 def test_without_a_screen_the_way_out_is_told(demo, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -169,17 +169,6 @@ def test_the_address_names_the_frame_and_back_goes_to_the_last_one(drive, watche
     assert frame(watched(f"{drive.as_uri()}#frame-{two}").tab) == two
 
 
-def test_a_page_opens_on_six_screens_at_most(drive, fleet, watched):
-    height = "document.documentElement.scrollHeight"
-    assert watched(fleet.as_uri()).tab.evaluate(height) <= 6 * 900
-    tab = watched(drive.as_uri()).tab
-    assert tab.evaluate(height) <= 6 * 900
-    tab.locator("summary", has_text="figures 2, 3a and 3b").click()
-    chart = tab.locator("#over-the-drive .along").first
-    ticks = chart.locator(".xs text").all_inner_texts()
-    assert len(ticks) > 4
-
-
 def test_a_slider_lies_between_two_variants(drive, watched):
     tab = watched(drive.as_uri()).tab
     assert tab.locator("select.left").input_value() == "filtered: errors"

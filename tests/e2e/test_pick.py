@@ -185,12 +185,6 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert Picks.read(work / "at_once").stamps_of(Why.RANDOM) == after.stamps_of(Why.RANDOM)
 
 
-def test_of_results_the_recording_is_taken(work):
-    done = here("pick", "reports", "-n", 1, "-o", "one", cwd=work)
-    assert "one: 1 frame to label: 1 drawn at random of" in done.stdout + done.stderr
-    assert Picks.read(work / "one").log == Picks.read(work / "to_label").log
-
-
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
     shutil.copy(work / "street.mcap", work / "second.mcap")
     words = ("-n", 6, "-o", "both", "--truth-topic", "", "--max-frames", 20)

@@ -16,7 +16,6 @@ from pypdf import PdfReader
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs import LogWriter
 from tests.e2e.commands import here, roadeval
-from tests.report.making import text
 
 
 @pytest.fixture(scope="module")
@@ -28,11 +27,6 @@ def made(demo, tmp_path_factory):
     assert run.returncode == 0, run.stderr
     assert run.stdout == "report.pdf\n"
     return (folder / "report.pdf").read_bytes()
-
-
-@pytest.fixture(scope="module")
-def words(made):
-    return text(made)
 
 
 def test_a_drive_has_eight_pages_at_most_and_no_frame_twice(made):

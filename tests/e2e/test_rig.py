@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval.data import FrameResult
 from roadeval.logs import LogWriter, open_log
 from tests.e2e.commands import DEMO, here
 from tests.e2e.test_fleet import Here
@@ -219,26 +218,3 @@ def test_a_command_that_looks_at_one_camera_takes_no_second(rig: Path):
     run = here("info", rig / "rig.mcap", *topics("front", "rear"))
     assert run.returncode == 2
     assert "one camera at a time" in run.stderr
-
-
-def test_an_interrupted_run_of_a_rig_is_read_camera_by_camera(rig, tmp_path):
-    seen = []
-
-    def stop(result: FrameResult) -> None:
-        seen.append(result.frame.camera)
-        if len(seen) == 40:
-            raise KeyboardInterrupt
-
-    cameras = [{"image": f"/{name}{IMAGE}"} for name in ("front", "copy")]
-    config = roadeval.configure({"cameras": cameras})
-    with pytest.raises(KeyboardInterrupt):
-        roadeval.replay(
-            rig / "rig.mcap", config, save=tmp_path / "o.rrd", reports=tmp_path, on_frame=stop
-        )
-    (partial,) = tmp_path.glob("*.partial*")
-    result = roadeval.Result(partial)
-    assert not result.complete
-    counted = result.frames.query("variant == 'filtered' and stage == 'post'")
-    assert counted.groupby("camera").size().between(5, 20).all()
-    run = here("inspect", partial, "--list", "--camera", "front", "--json")
-    assert {each["camera"] for each in json.loads(run.stdout)} == {f"/front{IMAGE}"}

@@ -37,11 +37,6 @@ def unjudged(found, text):
     return judged.why
 
 
-def a_street(**errors):
-    """A result of one drive with these variants."""
-    return Side("street", [a_part({(name, "post"): own for name, own in errors.items()})])
-
-
 def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     base, new = a_side("base", [10, 10, 10, 10]), a_side("new", [12, 14])
     found = compare([base, new], SETTINGS)
@@ -65,15 +60,6 @@ def test_a_result_that_does_not_know_its_log_is_not_compared():
     sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
     with pytest.raises(ComparisonError, match="b does not say which log it is of"):
         compare(sides, SETTINGS)
-
-
-def test_another_truth_is_told():
-    base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
-    found = compare([base, altered(new, TN=lambda pixels: pixels - 1)], SETTINGS)
-    assert found.warnings == (
-        "the truth differs on 2 frames between base and new (other labels or topics?): part of the "
-        "change may be the truth's",
-    )
 
 
 def test_settings_that_differ_are_named_with_both_values():
@@ -111,19 +97,6 @@ def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_sa
     sides = variants_as_sides(street, ["filtered", "unfiltered"])
     found = compare(sides, SETTINGS, across_variants=True)
     assert found.changes[0].difference["ERR"].mean == pytest.approx(-0.02)
-
-
-def test_chosen_variants_keep_their_order_and_must_be_there():
-    street, there = a_street(filtered=[1], unfiltered=[2]), ["filtered", "unfiltered"]
-    assert [side.label for side in variants_as_sides(street, there, there)] == there
-    with pytest.raises(ComparisonError, match="no variant net; there are filtered, unfiltered"):
-        variants_as_sides(street, there, ["net", "filtered"])
-    with pytest.raises(
-        ComparisonError,
-        match=r"^street: filtered alone cannot be compared; name two of its variants with "
-        r"--variant \(filtered, unfiltered\), or a second result$",
-    ):
-        variants_as_sides(street, there, ["filtered"])
 
 
 def test_final_masks_of_all_results_are_one_family_and_the_baseline_is_not_of_it():

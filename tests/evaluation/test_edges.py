@@ -233,10 +233,6 @@ def flicker_of(*frames):
     return {name: found[name] for name in ("flicker", "truth_flicker", "pairs")}
 
 
-def test_nothing_is_compared_across_a_change_of_size():
-    assert flicker_of((TRUTH, TRUTH), (pixels("#"), pixels("#")))["pairs"] == 0
-
-
 def test_equals_a_plain_loop():
     draw = np.random.default_rng(0)
     truths = draw.choice(np.array([0, 1, IGNORE], np.uint8), (4, 9, 11))
@@ -260,13 +256,6 @@ def test_boundary_f_is_averaged_over_the_frames_that_have_one():
     found = told(*(shown(TRUTH, TRUTH % 2, score) for score in (0.5, float("nan"), 1.0)))
     assert found["boundary_F"] == pytest.approx(0.75)
     assert (found["frames"], found["width"], found["pairs"]) == (2, 5, 2)
-
-
-def test_boundary_iou_is_averaged_over_its_own_frames():
-    scores = [(0.5, float("nan")), (float("nan"), 0.25), (float("nan"), 0.75), (0.7, 0.5)]
-    found = told(*(shown(TRUTH, TRUTH % 2, f, overlap=each) for f, each in scores))
-    assert found["boundary_IoU"] == pytest.approx(0.5)
-    assert found["boundary_F"] == pytest.approx(0.6)
 
 
 def test_each_width_of_the_trimap_sums_up_the_pixels_of_all_frames():

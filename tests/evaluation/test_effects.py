@@ -41,16 +41,6 @@ def test_the_filter_is_told_stage_by_stage_and_other_variants_by_their_final_mas
     ]
 
 
-def test_final_masks_are_subtracted_whatever_their_stages_are_called():
-    assert of(("net", "scores"), ("unfiltered", "svm"), ("unfiltered", "post")) == [
-        ("unfiltered", "net", "scores", True)
-    ]
-
-
-def test_without_a_base_there_is_no_difference():
-    assert of(("filtered", "post"), ("net", "post")) == []
-
-
 def test_a_difference_is_the_variant_minus_the_base_on_the_frames_that_both_have():
     pair = a_mask("filtered", "post", [10, 10, 90]), a_mask("unfiltered", "post", [7, 9], [0, 1])
     (effect,) = effects_of(pair)

@@ -90,14 +90,6 @@ def test_an_edge_that_is_shifted_is_as_far_off_as_it_was_shifted(shift: float):
         assert difference(found, RIGHT, at) == pytest.approx(-shift, abs=across)
 
 
-def test_an_edge_beside_what_the_truth_does_not_know_is_none():
-    truth = road(3, 3)
-    truth[(LEFTWARDS > 3) & (AHEAD < 80)] = 255
-    found = measured(road(3, 3), truth)
-    assert np.isnan(difference(found, LEFT, 20))
-    assert difference(found, RIGHT, 20) == 0
-
-
 def test_a_mask_without_an_edge_is_missing_and_not_wrong_by_nothing():
     truth = road(3, 3)
     sums = MetreSums()
@@ -133,14 +125,6 @@ def test_what_the_truth_does_not_know_ahead_is_not_counted():
     truth[AHEAD > 25] = 255
     assert difference(measured(road(3, 3, 60), truth), FREE, 0) == 0
     assert difference(measured(road(3, 3, 15), truth), FREE, 0) < -8
-
-
-def test_a_mask_that_is_no_road_from_the_start_leaves_no_room():
-    blocked = road(3, 3)
-    blocked[AHEAD < 8] = 0
-    found = measured(blocked, road(3, 3))
-    nearest = np.nanmin(AHEAD[:, SIZE[0] // 2])
-    assert found.ends[0, -1, 0] == pytest.approx(nearest, abs=0.2)
 
 
 def test_a_camera_that_stands_otherwise_sees_other_numbers():
@@ -287,14 +271,3 @@ def test_what_is_summed_up_is_numpys_quantile_of_all_frames_differences():
 def test_settings_without_sense_are_refused(settings: dict[str, Any], said: str):
     with pytest.raises(ValueError, match=said):
         EvaluationSettings(**settings)
-
-
-def test_a_camera_that_sees_only_far_ground_has_no_ends_nearby():
-    far, _ = ground_of(None, GroundSettings(height=1.3, pitch=-8, fov=20), (64, 48))
-    assert far is None
-    up, _ = ground_of(None, GroundSettings(height=30, pitch=2, fov=30), (64, 48))
-    assert up is not None
-    survey = Survey(up, EvaluationSettings())
-    found = measured(np.ones((48, 64), np.uint8), np.ones((48, 64), np.uint8), survey)
-    assert np.isnan(found.ends).all()
-    assert not found.counts[0, -1].any()

@@ -48,12 +48,6 @@ def test_every_mask_of_every_variant_is_tallied_and_blind_comes_last() -> None:
     assert result.tallies[4].counts == Counts(tp=2, tn=3, fp=0, fn=2)
 
 
-def test_all_masks_are_counted_in_the_regions_that_the_filter_found() -> None:
-    result = a_board().score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
-    for tally in result.tallies:
-        assert list(tally.regions) == ["lit", "boundary", "interior", "band_0", "band_1"]
-
-
 @pytest.mark.parametrize("role", [Role.TRAINING, Role.GAP, Role.UNLABELLED])
 def test_only_evaluated_frames_are_counted(role: Role) -> None:
     board = a_board()
@@ -70,21 +64,6 @@ def test_health_is_judged_and_counted_by_final_masks() -> None:
     result = board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
     assert result.health == {"filtered": Health.OK, "unfiltered": Health.OK}
     assert board.summary()["health"] == {"filtered": {"ok": 3}, "unfiltered": {"ok": 3}}
-
-
-def test_totals_and_windows_follow_the_order_of_the_variants() -> None:
-    board = a_drive(3, a_board(BlindPrior.of_truths([TRUTH]), window=2))
-    assert list(board.totals()) == ["filtered", "unfiltered", "blind"]
-    assert list(board.totals()["filtered"]) == ["svm", "post"]
-    assert board.totals()["filtered"]["post"]["FN"] == 3
-    assert [(row["window"], row["variant"], row["stage"]) for row in board.windows()[:5]] == [
-        (0, "filtered", "svm"),
-        (0, "filtered", "post"),
-        (0, "unfiltered", "svm"),
-        (0, "unfiltered", "post"),
-        (0, "blind", "post"),
-    ]
-    assert board.summary()["windows"] == 2
 
 
 def test_a_frame_that_ignores_every_pixel_has_undefined_rates_and_is_counted_so() -> None:
@@ -109,11 +88,6 @@ def test_the_prior_is_the_mean_truth() -> None:
 def test_ignored_pixels_are_left_out_of_the_mean() -> None:
     prior = BlindPrior.of_truths([pixels("?#?"), pixels("##?")])
     assert prior.road.tolist() == [[1, 1, 0]]
-
-
-def test_road_is_where_at_least_half_of_the_frames_had_it() -> None:
-    prior = BlindPrior(np.array([[0.0, 0.49, 0.5, 1.0]], np.float32))
-    assert (prior.mask((1, 4)).pixels() == pixels("..##")).all()
 
 
 def test_the_mask_fits_a_frame_of_another_size() -> None:
@@ -155,10 +129,3 @@ def test_the_rates_stand_in_the_order_of_the_seeds_the_run_s_own_first():
     assert found["totals"]["filtered"]["post"]["pooled_FPR"] == [0, 1 / 4, 2 / 4]
     assert found["totals"]["unfiltered"]["post"]["ERR"] == [1 / 8, 1 / 8, 0]
     assert found["difference"]["post"]["ERR"] == [-1 / 8, 0, 2 / 8]
-
-
-def test_a_frame_that_is_not_evaluated_counts_with_no_seed():
-    board = a_board_of((with_seeds("filtered", RIGHT, seed_1=RIGHT),))
-    training = (with_seeds("filtered", TWO_WRONG, seed_1=TWO_WRONG),)
-    board.add(board.score(a_frame(FRAME_TRUTH, 1), Role.TRAINING, training))
-    assert board.repeats()["totals"]["filtered"]["post"]["ERR"] == [0, 0]

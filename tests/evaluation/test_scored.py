@@ -61,11 +61,6 @@ def test_the_causes_of_an_error_add_up_to_it():
     assert unfiltered == pytest.approx({"svm": 0.20, "post": -0.05})
 
 
-def test_the_mean_of_a_cause_is_that_of_the_frames_on_which_it_is_known():
-    frames = rows_of(a_table({("mine", "net"): [10, 20, 30], ("mine", "post"): [10, 10]}))
-    assert score.causes(frames, "mine").means() == pytest.approx({"net": 0.2, "post": -0.05})
-
-
 def test_neighbours_are_a_thirtieth_of_the_drive_apart_and_at_most_a_second():
     errors = [40, 50, 45, *[0] * 57, 30]
     short, long = (rows_of(a_table({POST: errors}, hertz=hertz)) for hertz in (10, 0.1))
@@ -88,10 +83,6 @@ def test_frames_that_changed_most_are_those_that_changed_at_all(harmed, places):
 def with_error(percent: int, road: int = 50) -> dict[str, float]:
     """Rates of a frame of 100 pixels, of which ``percent`` are called road wrongly."""
     return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
-
-
-def test_few_errors_are_fine() -> None:
-    assert judge(with_error(14), None) is Health.OK
 
 
 @pytest.mark.parametrize(("percent", "health"), [(15, Health.DEGRADED), (25, Health.FAILED)])

@@ -64,14 +64,6 @@ def test_a_perfect_probability():
     assert (found.average_precision, found.max_f()["MaxF"]) == (1, 1)
 
 
-def test_one_probability_for_all_pixels_knows_nothing():
-    truth = np.array([[0, 0, 0, 1]], np.uint8)
-    counts = histogram(np.full((1, 4), 30_000, np.uint16), truth)
-    found = Thresholds.of(counts)
-    assert found.average_precision == 0.25
-    assert found.max_f()["recall"] == 1
-
-
 @pytest.mark.parametrize("value", [0, 1, 255])
 def test_what_has_no_road_or_nothing_else_is_undefined(value):
     counts = histogram(np.full((2, 2), 30_000, np.uint16), np.full((2, 2), value, np.uint8))

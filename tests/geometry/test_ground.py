@@ -162,10 +162,6 @@ def test_what_is_missing_is_said(known: Calibration | None, given: dict[str, flo
     assert said in why
 
 
-def test_of_a_camera_of_which_nothing_is_known_nothing_is_said():
-    assert ground_of(None, GroundSettings(), SIZE) == (None, "")
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -49,12 +49,11 @@ def write_log(
     broken: int = -1,
     codes: tuple[int, int] = (0, 255),
     numbers: Sequence[int] = range(FRAMES),
-    tail: bytes = b"",
 ) -> Path:
     """Write a log of small frames; some have no truth, one may be broken.
 
-    ``codes`` are the values of non-road and road in the truth, ``numbers`` the frames that are
-    written, and ``tail`` are bytes after each image file.
+    ``codes`` are the values of non-road and road in the truth, and ``numbers`` the frames
+    that are written.
     """
     with LogWriter(path) as writer:
         for number in numbers:
@@ -63,7 +62,7 @@ def write_log(
             made.image[12 : 12 + number // 8] = made.image[0]
             made.truth[12 : 12 + number // 8] = 0
             _, png = cv2.imencode(".png", made.image[..., ::-1])
-            data = b"no image" if number == broken else png.tobytes() + tail
+            data = b"no image" if number == broken else png.tobytes()
             writer.image("/camera/image", stamp, data, "png")
             if truth and number != 20:
                 writer.mask("/truth/road", stamp, np.array(codes, np.uint8)[made.truth])

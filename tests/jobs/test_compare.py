@@ -1,7 +1,6 @@
 """Results compared: from fleets' folders and from what single drives left."""
 
 import importlib
-import json
 import re
 import shutil
 import sys
@@ -10,7 +9,6 @@ import pytest
 
 from roadeval import compare, replay, replay_fleet
 from roadeval.errors import RoadevalError
-from roadeval.jobs.results.result import asked
 from roadeval.pipeline import stages
 from roadeval.results.fleet import FleetFolder, frames_path
 from tests.e2e.test_fleet import Here
@@ -41,29 +39,6 @@ def test_the_drives_that_are_worse_are_found_and_no_others(compared):
     assert compared.sides == ()
 
 
-def test_drives_that_have_moved_are_known_by_their_logs(fleets, tmp_path):
-    base, new = fleets
-    moved = shutil.copytree(new, tmp_path / "moved")
-    for path in moved.rglob("*-0000000*"):
-        if path.exists():
-            path.rename(path.with_name(path.name.replace("-0", "-f")))
-    content = json.loads((moved / "fleet.json").read_text().replace("-0000000", "-f000000"))
-    (moved / "fleet.json").write_text(json.dumps(content))
-    _rename_drives(moved / "drives.parquet")
-    found = compare([base, moved])
-    assert {change.drives for change in found.comparison.changes} == {8}
-
-
-def _rename_drives(path):
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    table = parquet.ParquetFile(path).read()
-    names = [name.replace("-0", "-f") for name in table["drive"].to_pylist()]
-    place = table.column_names.index("drive")
-    parquet.write_table(table.set_column(place, "drive", pa.array(names)), path)
-
-
 def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     drive = write_log(tmp_path / "drive.mcap")
@@ -80,12 +55,6 @@ def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
         (changed,) = compare([tmp_path / base, tmp_path / new]).content["changed"]
         said = r"Changed settings: code of grey \(greyroad:road\) \w{8} to \w{8}\."
         assert re.fullmatch(said, changed)
-
-
-def test_settings_that_change_no_number_are_left_aside():
-    run = {"preset": "paper", "svm": {"c": 1}, "output": {"save": "a"}, "fleet": {"folds": 2}}
-    assert asked(run) == {"preset": "paper", "svm.c": 1}
-    assert asked({}) == {}
 
 
 def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):

@@ -3,7 +3,6 @@
 import os
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -115,9 +114,6 @@ def test_a_model_that_changes_while_the_fleet_runs_ends_it(logs, tmp_path):
         roadeval.replay_fleet(logs, tmp_path / "f", config, executor=Meanwhile())
 
 
-# --- What a command that was killed has left ------------------------------------------------------
-
-
 def test_what_a_killed_worker_has_left_is_in_no_table_and_goes(logs, ran, folder):
     own = drive(folder)
     (folder / "records" / f"{own}.json").unlink()
@@ -135,6 +131,9 @@ def test_what_a_killed_worker_has_left_is_in_no_table_and_goes(logs, ran, folder
     assert tables(folder) == tables(ran)
 
 
+# --- What a command that was killed has left ------------------------------------------------------
+
+
 @pytest.mark.parametrize("lost", [True, False])
 def test_the_worst_drives_recording_alone_is_kept_whatever_was_left(lost, logs, ran, folder):
     (kept,) = (folder / "recordings").iterdir()
@@ -148,18 +147,3 @@ def test_the_worst_drives_recording_alone_is_kept_whatever_was_left(lost, logs, 
 
 
 # --- A full disk ----------------------------------------------------------------------------------
-
-
-def test_a_nearly_full_disk_ends_the_run_and_the_same_command_goes_on(logs, tmp_path, monkeypatch):
-    with monkeypatch.context() as nearly_full:
-        nearly_full.setattr(
-            "roadeval.recording.recorder.shutil.disk_usage",
-            lambda folder: SimpleNamespace(total=1 << 40, free=1 << 20),
-        )
-        said = r"the disk is full \(64 MiB must stay free\); what is done is kept"
-        with pytest.raises(RoadevalError, match=said):
-            run(logs, tmp_path / "f", keep="all")
-    assert run(logs, tmp_path / "f", keep="all")[0].counts == {"scored": 2}
-    run(logs, tmp_path / "g", keep="all")
-    assert files(tmp_path / "f") == files(tmp_path / "g")
-    assert tables(tmp_path / "f") == tables(tmp_path / "g")

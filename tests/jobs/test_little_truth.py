@@ -13,7 +13,6 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.jobs.progress import Progress
 from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
 from roadeval.training import TrainingError
 from tests.e2e.commands import here
@@ -89,35 +88,12 @@ def test_six_labels_that_must_train_are_refused_with_what_would_do(places, tmp_p
     assert (done.summary["frames"]["trained_on"], done.summary["frames"]["evaluated"]) == (3, 3)
 
 
-def test_of_twenty_one_labels_ten_train_what_must_learn(places, tmp_path):
-    done = replay(places, tmp_path, "21")
-    assert (done.summary["frames"]["trained_on"], done.summary["frames"]["evaluated"]) == (10, 11)
-    alone = replay(places, tmp_path / "alone", "21", ("net",))
-    assert alone.summary["frames"]["evaluated"] == 21
-
-
 def test_no_frames_for_training_are_enough_for_what_learns_nothing(places, tmp_path):
     done = replay(places, tmp_path, "6", ("net",), training={"frames": 0})
     assert done.summary["frames"]["evaluated"] == 6
     with pytest.raises(RoadevalError) as caught:
         replay(places, tmp_path, "6", training={"frames": 0})
     assert "`training.frames` is 0, and filtered, unfiltered must learn" in str(caught.value)
-
-
-@pytest.mark.parametrize(("labels", "noted"), [(5, True), (6, False)])
-def test_a_run_with_few_labels_says_so_at_its_start(places, tmp_path, labels, noted):
-    few = tmp_path / "few"
-    few.mkdir()
-    for label in sorted((places / "6").iterdir())[:labels]:
-        shutil.copy(label, few)
-    tables = {"truth": {"path": str(few)}, "masks": {"net": {"path": str(places / "net")}}}
-    config = roadeval.configure({**tables, "only": ["net"], "output": {"record": "none"}})
-    seen: list[Progress] = []
-    roadeval.replay(places / "drive.mcap", config, reports=tmp_path, on_progress=seen.append)
-    notes = [each.note for each in seen if each.note]
-    said = f"at most {labels} of {FRAMES} frames have road truth: `frames.labelled` reads these"
-    assert [each.startswith(said) for each in notes] == [True] * noted
-    assert bool(seen[0].note) is noted
 
 
 @pytest.mark.parametrize(("truth", "only"), [("6", ("net",)), ("21", ())])

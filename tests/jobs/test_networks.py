@@ -1,7 +1,6 @@
 """A network as a variant: in the tables, the recording, the report, a fleet and a notebook."""
 
 import re
-import shutil
 
 import numpy as np
 import pandas as pd
@@ -9,8 +8,6 @@ import pytest
 
 import roadeval
 from roadeval.config import network_variant
-from roadeval.jobs.run import prepared
-from roadeval.logs import open_log
 from tests.jobs.making import settings, write_log
 from tests.networks.making import network, red_network
 
@@ -84,16 +81,6 @@ def test_a_network_that_has_changed_since_is_refused(once, folder, tmp_path):
     again = roadeval.load_config(tmp_path / "run.toml")
     with pytest.raises(roadeval.RoadevalError, match="another network than was asked for"):
         run(folder / "drive.mcap", tmp_path, again)
-
-
-def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder, tmp_path):
-    def known_by(path):
-        with open_log(folder / "drive.mcap") as log:
-            return prepared.identity(log, with_network(path).resolved())
-
-    moved = shutil.copy(folder / "red.onnx", tmp_path / "moved.onnx")
-    other = red_network(tmp_path / "other.onnx", bias=-120)
-    assert known_by(folder / "red.onnx") == known_by(moved) != known_by(other)
 
 
 # --- Nothing to learn -----------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -86,6 +87,16 @@ def test_what_killed_runs_left_goes_when_a_run_has_ended(to, tmp_path):
     with to.holding(()):
         assert "out.00000002.partial.rrd" in names(tmp_path)
     assert names(tmp_path) == []
+
+
+def test_without_locks_nothing_that_may_be_another_run_s_is_removed(to, tmp_path, monkeypatch):
+    left = [".out.0123abcd.partial.mcap", ".reports.0123abcd.partial", "out.00000001.partial.rrd"]
+    for name in left:
+        (tmp_path / name).touch()
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    with to.holding(()), to.holding(()):
+        pass
+    assert names(tmp_path) == left
 
 
 @pytest.mark.parametrize(

@@ -60,16 +60,6 @@ def test_a_frame_on_which_it_fails_is_lost_and_the_rest_is_scored(drive, tmp_pat
     assert "somebody.py" in outcome.tracebacks[0]
 
 
-def test_frames_that_fail_in_the_same_way_are_one_sentence(drive, tmp_path):
-    outcome = run(drive, tmp_path, variants={"mine": somebodys("fails_early")})
-    assert outcome.losses == (
-        "12 frames (0, 1, 2, 3, 4 and 7 more): variant mine: stage fails_early failed: IndexError: "
-        f"list index out of range (somebody.py:{line_of('[moment.number]')})",
-    )
-    assert outcome.summary["frames"]["skipped"]["failed in a stage"] == 12
-    assert len(outcome.tracebacks) == 1
-
-
 def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
     variants = {"mine": somebodys("always_fails"), "fine": somebodys("lower_half")}
     with pytest.raises(roadeval.RoadevalError) as caught:
@@ -80,6 +70,11 @@ def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
         "or leave the variant out with `only` filtered `only` unfiltered `only` fine"
     )
     assert "in always_fails" in str(caught.value.__cause__)
+
+
+def test_one_that_cannot_learn_is_named(drive, tmp_path):
+    with pytest.raises(roadeval.RoadevalError, match="stage unfit cannot learn: ValueError"):
+        run(drive, tmp_path, variants={"mine": somebodys("UNFIT")})
 
 
 def test_what_it_learns_stands_in_a_model_file(drive, tmp_path):

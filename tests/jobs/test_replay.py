@@ -225,17 +225,6 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
     assert recording.layer("filtered", "post", number).shape == (small["height"], small["width"])
 
 
-def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
-    roadeval.train([drive], tmp_path / "m.model", settings(scale=0.5))
-    warnings = " ".join(run(drive, tmp_path, model=tmp_path / "m.model").warnings)
-    assert "the model learnt from frames of" in warnings
-    assert "are reduced to" not in warnings
-    same = run(drive, tmp_path, model=tmp_path / "m.model", scale=0.5)
-    warnings = " ".join(same.summary["warnings"])
-    assert "in the log, are reduced to 0.5 of it" in warnings
-    assert "the model learnt from frames of" not in warnings
-
-
 def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
     common = {"record": "none", "train_frames": 3, "max_frames": 12, "seed": 4}
     alone, other, both = (

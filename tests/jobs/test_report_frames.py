@@ -3,9 +3,8 @@
 import pytest
 
 import roadeval
-from roadeval.jobs.results.frames import BYTES, bytes_of, strips_of
 from roadeval.jobs.results.report import page_of
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import Result
 from roadeval.report.findings import Findings
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.rows import as_arrays
@@ -43,14 +42,6 @@ def test_every_variants_errors_and_layers_are_shown(recording):
         assert layered(strip) == ["filtered", "unfiltered", "third", "fourth"]
         names = [picture.name for picture in strip.rows[0]]
         assert names[2:] == [f"{each}: errors" for each in layered(strip)]
-
-
-def test_a_page_has_as_many_pictures_as_keep_it_small(recording):
-    whole = strips_of(DriveResult(recording), BYTES)
-    room = sum(map(bytes_of, whole)) - 1
-    strips = strips_of(DriveResult(recording), room)
-    assert len(strips) == len(whole) - 1
-    assert sum(map(bytes_of, strips)) <= room
 
 
 # --- What a report of a long drive shows of its windows -------------------------------------------

@@ -53,8 +53,3 @@ def test_several_results_are_one_table_with_their_drives(made):
     assert len({*both.scores["drive"]}) == len(both.parts) == len(both.drives) == 2
     one, other = both.frames.groupby("drive").ERR.mean()
     assert one == other
-
-
-def test_what_is_no_result_is_refused_in_one_line(tmp_path):
-    with pytest.raises(roadeval.RoadevalError, match="no results here"):
-        roadeval.Result(tmp_path)

@@ -42,13 +42,6 @@ def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
         train([wrong, drives[1]], tmp_path, road=[3])
 
 
-def test_a_drive_may_have_a_range_of_its_own(drives, tmp_path):
-    # Both drives show the same pictures: frames 0, 8 and 17 of each, or 0 and 1 of the second.
-    assert len(train([drives[0], described(drives[1], CODES)], tmp_path).digests) == 3
-    few = described(drives[1], f"{CODES}\nframes = {{ max_frames = 2 }}")
-    assert len(train([drives[0], few], tmp_path).digests) == 4
-
-
 def test_frames_that_cannot_be_decoded_are_named_and_counted(drives, tmp_path):
     broken = write_log(tmp_path / "broken.mcap", broken=8)  # frames 0, 8 and 16 train
     model = train([broken], tmp_path)

@@ -35,26 +35,6 @@ def dijkstra(cost, seeds):
     return found
 
 
-def test_a_step_costs_both_its_pixels_times_five_or_seven():
-    cost = np.array([[1, 2, 4], [8, 1, 32]], np.uint16)
-    found = KERNELS.geodesics(cost, seeds_of(cost.shape, (0, 0)), 1)
-    assert found.tolist() == [[0, 15, 45], [45, 14, 14 + 5 * 33]]
-
-
-def test_a_path_goes_around_a_wall_by_its_gap():
-    cost = np.ones((5, 5), np.uint16)
-    cost[1:, 2] = 1000
-    found = KERNELS.geodesics(cost, seeds_of(cost.shape, (4, 0)), 2)
-    # Two straight steps and two aslant to the gap at the top, and as many back.
-    assert found[4, 4] == 2 * (2 * 10 + 2 * 14)
-
-
-def test_the_nearest_of_several_seeds_counts():
-    cost = np.ones((1, 9), np.uint16)
-    found = KERNELS.geodesics(cost, seeds_of(cost.shape, (0, 0), (0, 8)), 1)
-    assert found.tolist() == [[0, 10, 20, 30, 40, 30, 20, 10, 0]]
-
-
 def test_without_seeds_everything_is_far():
     far = KERNELS.geodesics(np.ones((3, 4), np.uint16), np.zeros((3, 4), np.uint8), 3)
     np.testing.assert_array_equal(far, plain.FAR)

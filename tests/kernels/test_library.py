@@ -2,7 +2,6 @@
 
 import sys
 from importlib.util import find_spec
-from types import ModuleType
 
 import pytest
 
@@ -38,22 +37,6 @@ def test_a_library_that_was_built_is_used(monkeypatch):
 def test_without_the_library_the_twins_are_used(unbuilt):
     assert pick() is plain
     assert kernels.missing()
-
-
-@pytest.mark.skipif(not find_spec("roadeval.kernels._loops"), reason="the loops were not compiled")
-def test_loops_of_an_earlier_state_are_not_used(unbuilt, monkeypatch):
-    earlier = ModuleType("roadeval.kernels._loops")
-    earlier.count_bits = None
-    monkeypatch.setitem(sys.modules, "roadeval.kernels._loops", earlier)
-    monkeypatch.setattr(kernels, "_loops", earlier, raising=False)
-    assert pick() is plain
-    assert kernels.missing()
-
-
-def test_twins_that_were_asked_for_are_not_missed(unbuilt, monkeypatch):
-    monkeypatch.setenv("ROADEVAL_PLAIN", "1")
-    assert pick() is plain
-    assert not kernels.missing()
 
 
 def test_a_run_without_the_library_says_what_it_costs(unbuilt, tmp_path, capsys):

@@ -15,7 +15,7 @@ from roadeval.logs import (
     TopicSettings,
     open_log,
 )
-from tests.images.making import EXACT, LOSSY, jpeg_of_size, zeroed
+from tests.images.making import EXACT, LOSSY, zeroed
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 
 JPEG = LOSSY["JPEG"]
@@ -65,12 +65,6 @@ def test_a_log_of_damaged_images_is_refused(tmp_path: Path) -> None:
     path = ros2_log(tmp_path / "a.mcap", camera(BROKEN, BROKEN))
     with pytest.raises(LogError, match=r"nothing of /camera .*: a damaged JPEG"):
         read(path)
-
-
-def test_an_image_that_claims_to_be_too_large_is_left_out(tmp_path: Path) -> None:
-    path = ros2_log(tmp_path / "a.mcap", camera(JPEG, jpeg_of_size(30_000, 30_000)))
-    (_, second), _ = read(path)
-    assert "an image of 30000x30000, more than the 33554432 pixels that `frames.max_" in second
 
 
 def test_one_limit_holds_for_raw_and_compressed_images(tmp_path: Path) -> None:

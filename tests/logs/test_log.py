@@ -31,17 +31,6 @@ def numbers(path: Path, **asked: Any) -> list[int]:
         return [frame.number for frame in log.frames(log.select())]
 
 
-def test_frames_come_with_image_truth_and_times(tmp_path: Path) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
-    with open_log(path) as log:
-        frames = [frame.decode() for frame in log.frames(log.select())]
-    assert [frame.stamp_ns for frame in frames] == STAMPS
-    assert [round(float(frame.image.mean())) for frame in frames] == [20 * i for i in range(10)]
-    assert frames[0].image.shape == (6, 8, 3)
-    assert frames[0].truth is not None
-    assert frames[0].truth[:, 0].tolist() == [0, 0, 0, 1, 1, 1]
-
-
 def test_a_topic_is_not_scored_against_itself(tmp_path: Path) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
     for asked, reason in (
@@ -92,14 +81,6 @@ def test_without_any_time_images_and_labels_pair_in_their_order(tmp_path: Path) 
             few.image(topic, 0, mask, "png", log_time_ns=7)
     with open_log(tmp_path / "few.mcap") as log:
         assert [frame.labelled for frame in log.frames(log.select())] == [False] * 2
-
-
-def test_a_file_of_a_folder_that_is_no_log_costs_its_part_only(tmp_path: Path) -> None:
-    drive(tmp_path / "bag_0.mcap", STAMPS)
-    (tmp_path / "bag_1.mcap").touch()
-    with open_log(tmp_path) as log:
-        assert len(list(log.frames(log.select()))) == 10
-        assert "bag_1.mcap: the file is empty" in log.losses[0]
 
 
 @pytest.mark.parametrize("kind", list(CompressionType))

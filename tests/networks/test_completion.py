@@ -1,13 +1,10 @@
 """What is read from a network's file, and what is asked for."""
 
-import numpy as np
 import pytest
 from onnx import TensorProto
 
 from roadeval.networks import NetSettings, Network, NetworkError
-from tests.networks.making import SIZE, network
-
-IMAGE = np.zeros((24, 32, 3), np.uint8)
+from tests.networks.making import network
 
 
 def read(path, **settings) -> NetSettings:
@@ -88,12 +85,6 @@ def test_a_size_that_is_left_open(tmp_path):
     assert "`net.size`" in said
     assert "image float32 (?, 3, ?, ?)" in said
     assert read(path, size=(32, 24)).size == (32, 24)
-
-
-def test_an_order_of_lengths_that_is_left_open(tmp_path):
-    path = network(tmp_path / "n.onnx", input_shape=(1, "c", "h", "w"))
-    assert "`net.layout`" in asked(path)
-    assert read(path, layout="NCHW", size=SIZE).channels == "rgb"
 
 
 def test_no_file(tmp_path):

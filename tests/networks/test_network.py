@@ -96,6 +96,15 @@ def test_channels_can_come_last(last, tmp_path):
     assert opened(tail).settings.layout == "NHWC"
 
 
+def test_whole_numbers_are_handed_over_as_they_are(tmp_path):
+    values = balanced(IMAGE)
+    values["w1"] /= 255
+    path = network(tmp_path / "n.onnx", values=values, dtype=2)
+    road = opened(path).road(IMAGE)
+    plain = opened(network(tmp_path / "p.onnx", values=balanced(IMAGE))).road(IMAGE)
+    assert np.abs(road.codes.astype(int) - plain.codes).max() <= 2
+
+
 def test_a_letterbox_shows_the_whole_frame_and_no_more(tmp_path):
     path = network(tmp_path / "n.onnx", classes=1, values=_everywhere(1))
     tall = np.zeros((64, 20, 3), np.uint8)

@@ -66,9 +66,3 @@ def test_the_manifest_can_be_read(tmp_path):
     assert [each.group for each in monday] == ["2026-11-16"] * 2
     assert (tuesday.group, tuesday.tags) == (None, {"weather": "sun"})
     assert tuesday.settings["labels"]["road"] == [3]
-
-
-def test_the_folder_is_what_the_page_says(fleets):
-    listed = TEXT.partition("## What the folder holds")[2].partition("An ID is")[0]
-    for path in (fleets / "monday").iterdir():
-        assert re.search(rf"(^| ){re.escape(path.name)}[ /]", listed, re.MULTILINE), path.name

@@ -2,7 +2,6 @@
 
 import re
 
-import numpy as np
 import pytest
 
 from benchmarks.tables.__main__ import main
@@ -11,9 +10,6 @@ from benchmarks.tables.measure import REPLAYS, SEEDS
 from benchmarks.tables.text import DOCUMENTS, between_marks, faults, load, loose
 
 TEXTS = [path.read_text() for path in DOCUMENTS]
-MARK = "<!-- table order: the command -->"
-UNLABELLED = [0, 0, 0, 0, 0, 0]
-UNFILTERED = np.array([[5, 3, 2, 0, 4, 1], [4, 4, 1, 1, 4, 1], UNLABELLED])
 
 
 @pytest.fixture
@@ -64,13 +60,6 @@ def test_a_measured_number_in_a_sentence_is_found(number):
     assert loose(f"ERR is {number} there.")
     (fault,) = faults(f"ERR is {number} there.", load())
     assert "a measured number outside a table" in fault
-
-
-@pytest.mark.parametrize(
-    "text", ["0 road, 255 ignored", "`--scale 0.5`", "```sh\nx > 20%\n```\n", "Python 3.11"]
-)
-def test_what_is_no_measured_number_is_left_alone(text):
-    assert loose(text) == []
 
 
 def test_every_drive_has_every_replay_with_every_seed():

@@ -2,10 +2,8 @@
 
 import subprocess
 import sys
-import threading
 
 import roadeval
-from roadeval.cli.app import main
 from tests.jobs.making import write_log
 
 IMPORTS = """
@@ -61,15 +59,6 @@ def test_no_module_needs_posix_to_be_imported():
     )
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) > 100
-
-
-def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
-    codes = []
-    thread = threading.Thread(target=lambda: codes.append(main(["--version"])))
-    thread.start()
-    thread.join()
-    assert codes == [0]
-    assert capsys.readouterr().out.startswith("roadeval ")
 
 
 def test_a_second_run_on_an_output_needs_nothing_of_posix(monkeypatch, tmp_path):

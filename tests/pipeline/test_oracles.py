@@ -71,10 +71,6 @@ def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
         assert_same(told["shadow"][name], mask, name)
 
 
-def test_without_true_shadow_no_filter_is_replaced(chain):
-    assert list(oracles(chain, None)) == ["svm"]
-
-
 def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     names = ("exposure", *NAMES)
     settings = {step.stage.name: step.settings for step in chain.steps}
@@ -106,10 +102,6 @@ def of(*names: str) -> Chain:
     return chain_of(names, {name: SETTINGS["paper"][name] for name in names})
 
 
-def never(view):
-    pytest.fail("it ran again")
-
-
 def test_the_masks_are_those_of_the_chain_itself():
     chain = of(*NAMES)
     results = list(chain.run(PICTURE))
@@ -118,14 +110,6 @@ def test_the_masks_are_those_of_the_chain_itself():
     for name, output in results:
         if output.mask is not None:
             np.testing.assert_array_equal(masks[name].pixels(), output.mask.pixels())
-
-
-def test_a_filter_that_learns_nothing_does_not_run_again():
-    chain = of(*NAMES)
-    outputs = [output for _, output in chain.run(PICTURE)]
-    filter_, *rest = chain.steps
-    blocked = Chain((type(filter_)(filter_.stage, filter_.settings, never), *rest))
-    assert list(dict(blocked.repeated(PICTURE, outputs))) == ["similarity", "svm", "post"]
 
 
 def test_other_parameters_give_their_own_masks():

@@ -91,12 +91,6 @@ def test_its_settings_stand_in_a_table_of_its_own_name():
         configure({"chain": [somebodys("below"), "post"], "below": {"top": "high"}})
 
 
-def test_two_layers_of_one_name_are_refused():
-    chain = [somebodys("LEARNS"), somebodys("LAYERS"), "post"]
-    with pytest.raises(ConfigError, match="two layers are called bright"):
-        configure({"chain": chain})
-
-
 def test_a_pipeline_keeps_the_names_of_its_chain():
     pipeline = Pipeline.default(("shadow", somebodys("lower_half"), "post"))
     assert pipeline.without_filter().chain == (somebodys("lower_half"), "post")
@@ -106,19 +100,6 @@ def test_a_pipeline_keeps_the_names_of_its_chain():
 # --- What a stage sees: the image and its channels, which stages share until a filter changes it --
 
 MASK = Packed.of(np.zeros((6, 8), np.uint8))
-
-
-def test_the_channels_are_those_of_the_image():
-    image = noise(6, 8)
-    for channel, plane in enumerate(View.of(image).planes):
-        np.testing.assert_array_equal(plane, image[..., channel])
-
-
-def test_an_image_may_have_any_layout():
-    image = noise(6, 8)[:, ::-1]
-    view = View.of(image)
-    assert view.image.flags.c_contiguous
-    np.testing.assert_array_equal(view.image, image)
 
 
 def test_after_an_image_the_channels_are_its_own():

@@ -1,7 +1,6 @@
 """What comes back of a layer of each kind."""
 
 import io
-import zlib
 from io import BytesIO
 
 import cv2
@@ -141,19 +140,3 @@ def test_a_noisy_map_takes_hardly_more_than_in_the_smallest_file_of_opencv(noise
     )
     least = len(cv2.imencode(".png", levels, how)[1])
     assert len(pngs.encode_levels(levels)) < 1.05 * least
-
-
-def test_rows_with_another_filter_are_read_as_earlier_recordings_have_them():
-    labels = np.random.default_rng(0).integers(0, 2, (5, 16)).astype(np.uint8)
-    packed = np.packbits(labels, axis=1)
-    above = np.vstack([packed[:1], np.diff(packed, axis=0)])
-    rows = b"".join(b"\2" + row.tobytes() for row in above)
-    np.testing.assert_array_equal(decode(_with_rows(labels, rows)), labels)
-
-
-def _with_rows(labels, rows):
-    """Encode labels, and put other rows in the place of theirs."""
-    png, data = pngs.encode_labels(labels, ROAD), b"IDAT" + zlib.compress(rows)
-    start, end = png.index(b"IDAT") - 4, png.index(b"IEND") - 4
-    length, checksum = (len(data) - 4).to_bytes(4, "big"), zlib.crc32(data).to_bytes(4, "big")
-    return png[:start] + length + data + checksum + png[end:]

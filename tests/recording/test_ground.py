@@ -2,19 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
-from mcap.writer import Writer
 
 from roadeval.data import Calibration, VariantLayout, mask_spec
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
-from roadeval.logs import LogConfig, open_log
 from roadeval.recording.layout import GROUND, Layout
 from roadeval.recording.views import arrange, before_the_first_frame
 
@@ -74,19 +71,3 @@ def test_the_space_shows_camera_ground_and_the_logs_point_clouds(prefix: str):
     paths = [f"{prefix}{path}" for path in ("/ground", "/ground/filtered", "/camera")]
     assert space.contents == [*paths, "/lidar/points"]
     assert [*space.visualizer_overrides] == [f"{prefix}/camera", f"{prefix}/ground"]
-
-
-def test_point_clouds_are_known_by_their_schema(tmp_path: Path):
-    with (tmp_path / "a.mcap").open("wb") as file:
-        writer = Writer(file)
-        writer.start()
-        for topic, name in (
-            ("/points", "sensor_msgs/msg/PointCloud2"),
-            ("/imu", "sensor_msgs/Imu"),
-        ):
-            schema = writer.register_schema(name, "ros2msg", b"")
-            channel = writer.register_channel(topic, "cdr", schema)
-            writer.add_message(channel, 1, b"", 1)
-        writer.finish()
-    with open_log(tmp_path / "a.mcap", LogConfig()) as log:
-        assert [topic.name for topic in log.topics if topic.is_cloud] == ["/points"]

@@ -3,7 +3,6 @@
 import errno
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,44 +13,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, views
-from roadeval.recording.rows import PendingRows
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording.recorder import LEAST_FREE
 from tests.recording.making import (
-    RESULTS,
     layout,
     rerun,
     result,
-    rows_of,
 )
 from tests.results.making import lines
-
-
-def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
-    with Recorder(tmp_path / "new" / "out.rrd", layout()) as recorder:
-        recorder.write(recorder.encode(drive[0], 0), lines(drive[0]))
-        assert not recorder.path.exists()
-        assert recorder.partial.parent == recorder.path.parent
-        recorder.finish(RESULTS)
-        assert not recorder.path.exists()
-    assert recorder.path.exists()
-    assert not recorder.partial.exists()
 
 
 def test_a_recording_without_its_results_does_not_take_its_name(drive, tmp_path):
     with Recorder(tmp_path / "out.rrd", layout()) as recorder:
         recorder.write(recorder.encode(drive[0], 0), lines(drive[0]))
     assert [path.name for path in tmp_path.iterdir()] == [recorder.partial.name]
-
-
-@pytest.mark.parametrize("place", ["arrange", "before_the_first_frame"])
-def test_an_interrupt_before_the_first_frame_leaves_nothing(place, tmp_path, monkeypatch):
-    def stop(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(views, place, stop)
-    with pytest.raises(KeyboardInterrupt), Recorder(tmp_path / "out.rrd", layout()):
-        pass
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("stop", [RuntimeError, KeyboardInterrupt, SystemExit])
@@ -73,29 +48,6 @@ def _record_and_stop(recorder, results, stop):
         for each in results:
             recorder.write(recorder.encode(each, 0), lines(each))
         raise stop
-
-
-@pytest.mark.parametrize("at", [1, 5])
-def test_who_stops_a_run_while_a_chunk_is_made_loses_no_frame_of_it(
-    at, drive, tmp_path, monkeypatch
-):
-    calls, usual = [], PendingRows.chunk
-
-    def interrupted(track):
-        calls.append(track)
-        if len(calls) == at:
-            raise KeyboardInterrupt
-        return usual(track)
-
-    monkeypatch.setattr(PendingRows, "chunk", interrupted)
-    recorder = _recorder(tmp_path / "out.rrd")
-    with pytest.raises(KeyboardInterrupt):
-        _record_and_stop(recorder, drive, SystemExit)
-    partial = Recording(recorder.partial)
-    assert partial.frame_numbers == tuple(range(8))
-    for path in ("/camera", "/truth", "/filtered/post"):
-        assert rows_of(partial, path, "EncodedImage:blob") == dict.fromkeys(range(8), 1)
-    assert list(partial.frames.frame) == [2, 3, 4, 5, 6, 7]
 
 
 KILLED = """
@@ -158,6 +110,15 @@ def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_c
     assert 10 < len(given) < len(drive)
 
 
+def test_what_waits_has_its_room_on_the_disk_beside_the_least(drive, tmp_path, monkeypatch):
+    with _recorder(tmp_path / "out.rrd") as recorder:
+        leave_free(monkeypatch, LEAST_FREE + 1)
+        recorder.check_disk_space()
+        recorder.write(recorder.encode(drive[3], 0), lines(drive[3]))
+        with pytest.raises(RecordingError, match="the disk is full"):
+            recorder.check_disk_space()
+
+
 @pytest.mark.parametrize(("rule", "shown"), [("all", 1000), ("every:4", 250), ("worst:50", 50)])
 def test_the_size_of_a_recording_is_foretold_and_held_against_the_free_space(
     tmp_path, monkeypatch, rule, shown
@@ -214,23 +175,6 @@ def recorded_with_too_little_room(path, limit):
 def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording, tmp_path):
     limit = recording.path.stat().st_size * 9 // 10
     assert recorded_with_too_little_room(tmp_path / "out.rrd", limit) == os.strerror(errno.EIO)
-
-
-def test_a_disk_on_which_rerun_can_write_no_more_ends_the_run_and_is_told_as_full(
-    recording, tmp_path
-):
-    if not shutil.which("mount") or not hasattr(os, "geteuid") or os.geteuid():
-        pytest.skip("only root may mount a small disk")
-    size = f"size={recording.path.stat().st_size // 2}"
-    if subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", size, "tmpfs", tmp_path], check=False
-    ).returncode:
-        pytest.skip("no disk can be mounted here")
-    try:
-        found = recorded_with_too_little_room(tmp_path / "out.rrd", 1 << 30)
-    finally:
-        subprocess.run(["umount", tmp_path], check=True)
-    assert found == os.strerror(errno.ENOSPC)
 
 
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, rrd_file
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
 from tests.recording.making import (
     RESULTS,
     frame,
     layout,
     record,
-    rerun,
     rows_of,
     unscored,
 )
@@ -90,13 +89,6 @@ def test_a_recording_of_another_format_is_one_line(version, told, tmp_path, monk
     assert str(caught.value) == f"{path}: {told}"
 
 
-def test_a_recording_that_tells_no_format_is_of_an_earlier_version(recording, tmp_path):
-    words = ["--drop-entity", "/__properties/roadeval", recording.path, "-o", tmp_path / "out.rrd"]
-    assert rerun("filter", *words) == 0
-    with pytest.raises(RecordingError, match=r"made by an earlier version of roadeval, whose"):
-        Recording(tmp_path / "out.rrd")
-
-
 @pytest.mark.parametrize("content", [b"", b"RR", b"\x89MCAP0\r\n", b"frame,stamp_ns\n"])
 def test_a_file_that_is_no_recording_is_told(content, tmp_path):
     (tmp_path / "x.rrd").write_bytes(content)
@@ -132,18 +124,3 @@ def test_every_frame_comes_back_in_any_order(drive, recording, has_index, tmp_pa
     assert again.complete == has_index
     for each in (*drive[9:], *reversed(drive)):
         np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
-
-
-def test_a_picture_costs_the_chunk_that_holds_it(drive, recording, monkeypatch):
-    again, read, unpacked = Recording(recording.path), [], rrd_file.rows_of
-    monkeypatch.setattr(rrd_file, "rows_of", lambda m: read.append(m) or unpacked(m))
-    for each in drive:
-        again.layer("filtered", "post", each.frame.number)
-    chunks = [*read]
-    assert len({*chunks}) == len(chunks) > 1
-    read.clear()
-    again.layer("filtered", "post", drive[0].frame.number)
-    with pytest.raises(RecordingError, match="nothing on frame 99"):
-        again.layer("filtered", "post", 99)
-    assert read == chunks[:1]
-    assert again.frame_numbers == tuple(each.frame.number for each in drive)

@@ -28,17 +28,6 @@ def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine
         viewer.screenshot(tmp_path / "x.rrd", tmp_path / "x.png")
 
 
-@pytest.mark.parametrize("screen", ["DISPLAY", "WAYLAND_DISPLAY"])
-def test_a_screen_of_either_kind_will_do(screen, fake, tmp_path, monkeypatch):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    with pytest.raises(RecordingError, match="No screen to open a window on"):
-        viewer.show(tmp_path / "x.rrd")
-    monkeypatch.setenv(screen, ":0")
-    with pytest.raises(RecordingError, match="the viewer did not start"):
-        viewer.show(tmp_path / "x.rrd")
-
-
 def test_a_viewer_that_is_late_is_asked_again():
     answers = iter([TimeoutError("Deadline expired"), TimeoutError("Deadline expired"), "drawn"])
 
@@ -97,20 +86,12 @@ def windows(monkeypatch):
     return made
 
 
-def test_one_window_is_led_from_frame_to_frame(windows):
+def test_a_window_is_led_from_frame_to_frame_until_it_is_closed_or_another_recording_comes(windows):
     window = WindowViewer()
-    for frame in (84, 12):
-        window.show(Path("a.rrd"), frame)
-    (window,) = windows
-    assert window["frames"] == [84, 12]
-    assert not window["ended"]
-
-
-def test_another_recording_takes_the_place_of_the_first(windows):
-    window = WindowViewer()
-    window.show(Path("a.rrd"), 1)
-    window.show(Path("b.rrd"), 2)
-    assert [(each["recording"].name, each["ended"]) for each in windows] == [
-        ("a.rrd", True),
-        ("b.rrd", False),
-    ]
+    for name, frame in (("a.rrd", 84), ("a.rrd", 12), ("b.rrd", 2)):
+        window.show(Path(name), frame)
+    windows[1]["process"].code = 0
+    window.show(Path("b.rrd"), 3)
+    assert [each["recording"].name for each in windows] == ["a.rrd", "b.rrd", "b.rrd"]
+    assert [each["frames"] for each in windows] == [[84, 12], [2], [3]]
+    assert [each["ended"] for each in windows] == [True, True, False]

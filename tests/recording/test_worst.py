@@ -8,7 +8,7 @@ import pytest
 from roadeval.data import Doubt
 from roadeval.recording import Recorder, Recording, RecordRule
 from roadeval.recording import recorder as recorder_module
-from tests.recording.making import RESULTS, layout, result, rows_of
+from tests.recording.making import RESULTS, layout, result
 from tests.results.making import lines
 
 ERRORS = [0.1, 0.5, 0.3, 0.5, 0.2, 0.4, 0.0]
@@ -75,35 +75,6 @@ def test_a_run_that_is_stopped_keeps_the_worst_so_far(stop, tmp_path):
     partial = Recording(recorder.partial)
     assert not partial.complete
     assert partial.frame_numbers == (1, 3, 5)
-
-
-@pytest.mark.parametrize("at", [1, 2, 3])
-def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
-    at, tmp_path, monkeypatch
-):
-    calls = []
-    usual = Recorder._end_frame
-
-    def interrupted(*given):
-        calls.append(given)
-        if len(calls) == at:
-            raise KeyboardInterrupt
-        return usual(*given)
-
-    def stopped(recorder):
-        with recorder:
-            write(recorder)
-            monkeypatch.setattr(Recorder, "_end_frame", interrupted)
-            recorder.finish(RESULTS)
-
-    recorder = selective(tmp_path / "out.rrd", "worst:3")
-    with pytest.raises(KeyboardInterrupt):
-        stopped(recorder)
-    assert names(tmp_path) == [recorder.partial.name]
-    partial = Recording(recorder.partial)
-    assert partial.frame_numbers == (1, 3, 5)
-    shown = rows_of(partial, "/filtered/post", "EncodedImage:blob")
-    assert shown == {1: 1, 2: 0, 3: 1, 4: 0, 5: 1, 6: 0}
 
 
 def test_no_more_is_held_than_there_is_room_for_and_the_run_says_so(tmp_path, monkeypatch):

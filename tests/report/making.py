@@ -6,10 +6,8 @@ import re
 from dataclasses import fields, replace
 from functools import cached_property
 
-import numpy as np
 from pypdf import PdfReader
 
-from roadeval.data import Rows
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Details, Document
 from roadeval.report.findings import Findings
@@ -59,13 +57,6 @@ def a_difference(mean, low=None, high=None):
     needed = 2000 if low is None else None
     units, mean = (0, math.nan) if mean is None else (1200, mean)
     return Difference(mean, low, high, p, 0.95, "frames", units, needed=needed, **known)
-
-
-def pairs(changes, wrong):
-    """Filtered against unfiltered, by the frames' changes of ERR and of wrong pixels."""
-    places = np.arange(len(changes))
-    columns = {"ERR": np.array(changes, float), "wrong": np.array(wrong)}
-    return Rows({"frame": places, "stamp_ns": places, **columns})
 
 
 def by_rate(better=0, worse=0, err=None):
@@ -127,14 +118,3 @@ def column(table, title):
     """The cells below a title."""
     place = list(table.columns).index(title)
     return [row[place] for row in table.rows]
-
-
-def links_within(content):
-    """How many links of a PDF lead to a place in it; it has an outline and tagged structure."""
-    made = reader(content)
-    root = made.trailer["/Root"]
-    assert root["/MarkInfo"]["/Marked"]
-    assert "/StructTreeRoot" in root
-    assert made.outline
-    notes = [each.get_object() for page in made.pages for each in page.get("/Annots", [])]
-    return sum("/Dest" in note or note.get("/A", {}).get("/S") == "/GoTo" for note in notes)

@@ -31,7 +31,6 @@ from roadeval.report.images import ExampleFrame
 from tests.evaluation.making import rows_of
 from tests.report.making import NO_WINDOWS
 
-LONG = "trained_on_every_drive_of_the_summer_and_adapted_to_this_one_and_much_more_of_the_kind"
 BY_DEFAULT = ("filtered", "unfiltered", "blind")
 
 
@@ -101,11 +100,6 @@ def placed(figure: Figure) -> list[Picture]:
     return [each for each in figure.artists if isinstance(each, Picture)]
 
 
-def names(figure: Figure) -> list[str]:
-    """What stands beside the rows of figure 2 and above its columns."""
-    return [text.get_text() for text in figure.texts[2:]]
-
-
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
     ax = drawn(fp_fn_rate("drive", rows_of(table))).axes[1]
@@ -121,25 +115,6 @@ def test_a_long_drive_is_drawn_as_means_of_rows() -> None:
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
     assert line.get_ydata()[0] == pytest.approx(first.mean())
     assert "the mean of 24 rows of 10 frames" in texts(figure)
-
-
-def test_masks_are_tinted_and_the_rest_is_darker() -> None:
-    example = an_example()
-    ((camera, masked, _, _),) = pictures(masks_of([example]))
-    road = example.masks["filtered"] == 1
-    assert (camera == example.image).all()
-    assert (masked[~road] == 68).all()
-    assert masked[18, 20].tolist() == [25, 124, 97]
-
-
-def test_ignored_pixels_are_greyed() -> None:
-    example = an_example()
-    assert example.truth is not None
-    truth = example.truth.copy()
-    truth[:4] = 255
-    figure = masks_of([ExampleFrame(1, example.image, truth, example.masks)])
-    assert pictures(figure)[0][3][0, 0].tolist() == [105, 105, 105]
-    assert "ignored" in texts(figure)
 
 
 def test_a_frame_without_a_mask_is_faded_in_its_column() -> None:

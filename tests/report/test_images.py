@@ -11,10 +11,6 @@ from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, painted
 GREY = np.full((2, 4, 3), 100, np.uint8)
 
 
-def test_the_camera_alone_is_shown_as_it_is():
-    assert painted(LayerImage("", GREY)) is GREY
-
-
 def test_a_class_has_its_colour_over_the_darkened_image_and_a_clear_one_none():
     labels = np.array([[0, 1, 2, 3], [4, 0, 0, 0]], np.uint8)
     colours = painted(LayerImage("", GREY, ERRORS, labels))

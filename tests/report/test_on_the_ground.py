@@ -1,10 +1,9 @@
 """The tables of errors in metres: what they mark as unsure."""
 
-import math
 from typing import Any
 
 from roadeval.report.blocks import plain
-from roadeval.report.sections.ground import UNSURE, distance_table, edges_tables
+from roadeval.report.sections.ground import UNSURE, distance_table
 
 NAMES = ["filtered", "unfiltered"]
 
@@ -29,19 +28,3 @@ def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
     assert brief.columns == ["ERR, %", "0\N{EN DASH}10 m", "by area"]
     assert [plain(cell) for cell in brief.rows[0][1:]] == ["10.0", f"{UNSURE}10.0"]
     assert f"{UNSURE}: a camera that stands" in brief.caption
-
-
-def test_an_edge_that_a_wrong_camera_could_explain_is_marked():
-    rows = [
-        row("filtered", "left_edge", "10m", 0.30, 0.2),
-        row("filtered", "right_edge", "10m", -0.10, 0.2),
-        row("filtered", "free_distance", "ahead", 0.0, math.nan),
-    ]
-    edges, free = edges_tables(rows, NAMES)
-    cells = [plain(cell) for cell in edges.rows[0]]
-    assert cells[2] == "+0.30"
-    assert cells[6] == f"{UNSURE}\N{MINUS SIGN}0.10"
-    assert cells[5] == "1 of 9"
-    # Were the camera otherwise, no end would be seen: that is as unsure as can be.
-    assert plain(free.rows[0][1]) == f"{UNSURE}0.00"
-    assert plain(free.rows[0][2]) == "\N{EN DASH}"

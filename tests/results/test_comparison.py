@@ -16,14 +16,6 @@ from tests.evaluation.making import a_change, a_comparison, a_difference
 WORSE = a_difference(1.2, 0.5, 2)
 
 
-def test_of_several_variants_each_is_named():
-    found = a_comparison(a_change(WORSE), a_change(WORSE, "net"))
-    assert verdict(found).startswith("filtered: on these 12 frames new instead of base raises")
-    assert " net: on these 12 frames" in verdict(found)
-    variants = a_comparison(a_change(WORSE, "net", "net"), a_change(WORSE, "robust", "robust"))
-    assert verdict(variants).startswith("On these 12 frames net instead of base raises")
-
-
 def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
     same = a_difference(0, 0, 0)
     rows = a_change(WORSE), a_change(same, "net"), a_change(same, "wide")

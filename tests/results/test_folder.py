@@ -168,15 +168,6 @@ def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> No
         ResultsFolder(tmp_path).table(table)
 
 
-def test_a_table_of_which_the_summary_knows_nothing_is_refused(tmp_path: Path) -> None:
-    write(tmp_path)
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    del summary["tables"]["frames"]
-    (tmp_path / "summary.json").write_text(json.dumps(summary))
-    with pytest.raises(ResultsError, match=r"6 of 0 rows"):
-        ResultsFolder(tmp_path).table("frames")
-
-
 def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:
     write(tmp_path)
     stated = ResultsFolder(tmp_path).facts.tables

@@ -43,10 +43,6 @@ def test_a_table_without_rows_has_its_columns(text):
     assert kinds(table) == KINDS
 
 
-def test_a_file_that_is_not_there_has_no_rows(tmp_path):
-    assert read_table("oracles", tmp_path / "oracles.csv").empty
-
-
 @pytest.mark.parametrize("errs", [[], [math.nan], [0.5, math.nan]])
 def test_rows_of_arrays_are_those_that_their_text_would_make(errs):
     rows = [(1, "net", "svm", "post", 2, 4, 0, 0, 6, 0.5, e, 0.1, 0.2, 0.3, 0.25) for e in errs]

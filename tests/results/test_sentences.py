@@ -6,15 +6,16 @@ from dataclasses import replace
 import pytest
 
 from roadeval.data import Counts
+from roadeval.data.words import DASH, points
 from roadeval.evaluation import metrics
 from roadeval.evaluation.score import Effect
 from roadeval.evaluation.stats import Difference
-from roadeval.results.facts import FrameAccount
 from roadeval.results.sentences import (
-    account,
     correction,
+    levels,
     notes,
     sentence,
+    spread_in_words,
     verdict,
 )
 from tests.evaluation.making import a_difference
@@ -80,6 +81,11 @@ def test_what_does_not_stand_after_correction_is_unclear_and_the_family_is_named
     assert "corrected" not in sentence(alone, "the filter", "ERR")
 
 
+def test_rates_of_other_frames_than_the_difference_are_not_given():
+    assert levels(HARM, {"ERR": 0.062}, {"ERR": 0.154}) == (0.062, 0.154)
+    assert levels(HARM, {"ERR": 0.062}, {"ERR": 0.2}) is None
+
+
 @pytest.mark.parametrize(
     ("sizes", "told"),
     [
@@ -97,29 +103,6 @@ def test_the_mark_in_tables_is_explained_by_the_families(sizes, told):
     found = [replace(HARM, p_holm=size and 0.001, comparisons=size) for size in sizes]
     assert correction(found) == told
     assert correction(replace(each, p_holm=0.2) for each in found) == ""
-
-
-@pytest.mark.parametrize(
-    ("frames", "windows", "told"),
-    [
-        (
-            FrameAccount(1101, 40, evaluated=30, skipped={"outside the range": 1061, "gap": 10}),
-            3,
-            "30 of 1,101 frames were evaluated, in 3 windows. Left out: 1,061 outside the "
-            "range, 10 gap.",
-        ),
-        (
-            FrameAccount(3, 3, evaluated=1, skipped={"trained on": 1, "undecodable": 1}),
-            1,
-            "1 of 3 frames was evaluated, in 1 window. Left out: 1 to train on, 1 that cannot "
-            "be decoded.",
-        ),
-        (FrameAccount(5, 5, evaluated=5), None, "5 frames were evaluated."),
-        (FrameAccount(evaluated=38), None, "38 frames were evaluated."),
-    ],
-)
-def test_the_account_says_how_many_frames_were_evaluated_and_why_not_others(frames, windows, told):
-    assert account(frames, windows) == told
 
 
 # --- The verdict ----------------------------------------------------------------------------------
@@ -231,18 +214,6 @@ def with_error(percent: int, road: int = 50) -> dict[str, float]:
     return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
 
 
-@pytest.mark.parametrize(
-    ("filtered", "unfiltered", "note"),
-    [
-        (20, 8, "The filter raised ERR by 12.0 pp on this frame."),
-        (8, 20, "The filter lowered ERR by 12.0 pp on this frame."),
-    ],
-)
-def test_a_large_effect_of_the_filter_is_noted(filtered: int, unfiltered: int, note: str) -> None:
-    finals = {"filtered": with_error(filtered), "unfiltered": with_error(unfiltered)}
-    assert tuple(notes(finals, None)) == (note,)
-
-
 def test_a_failure_is_noted_with_its_reason() -> None:
     missed = metrics.of(Counts(tp=1, tn=80, fp=0, fn=19))
     assert tuple(notes({"net": missed}, None)) == ("net finds 5.0 % of the road.",)
@@ -250,7 +221,18 @@ def test_a_failure_is_noted_with_its_reason() -> None:
     assert wrong == ("net gets 30.0 % of the pixels wrong.",)
 
 
-def test_losing_to_blind_is_noted() -> None:
-    assert tuple(notes({"net": with_error(14)}, with_error(7))) == (
-        "net is 7.0 pp worse than blind (ERR 7.0 %).",
-    )
+# --- What several seeds come to -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ([0.03, 0.01, 0.02], "+2.00 (+1.00 to +3.00)"),
+        ([0.01, 0.02, 0.03, 0.1], "+2.50 (+1.00 to +10.00)"),
+        ([None, 0.02, math.nan], "+2.00 (+2.00 to +2.00)"),
+        ([None, math.nan], DASH),
+        ([], DASH),
+    ],
+)
+def test_a_spread_is_the_middle_the_least_and_the_greatest_of_what_is_defined(values, told):
+    assert spread_in_words(values, points) == told

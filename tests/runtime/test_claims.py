@@ -82,25 +82,6 @@ def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_
             claim(tmp_path)
 
 
-def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkeypatch):
-    (tmp_path / ".out.lock").write_text("process 1 on elsewhere, since long ago")
-    usual = os.open
-
-    def forbidden(path, flags, *rest):
-        if flags & os.O_RDWR:
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-        return usual(path, flags, *rest)
-
-    monkeypatch.setattr(os, "open", forbidden)
-    with claimed(tmp_path / "out", tmp_path) as certain:
-        assert certain
-        with pytest.raises(BlockingIOError, match="process 1 on elsewhere"):
-            claim(tmp_path)
-    assert names(tmp_path) == []
-    with pytest.raises(PermissionError):
-        claim(tmp_path)
-
-
 def no_locks_of_the_system(monkeypatch):
     monkeypatch.setitem(sys.modules, "fcntl", None)
 
@@ -120,6 +101,7 @@ def test_without_locks_nothing_is_certain(without, tmp_path, monkeypatch):
     assert names(tmp_path) == []
 
 
-def test_a_folder_that_cannot_be_written_to_is_an_os_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        claim(tmp_path / "missing")
+def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, monkeypatch):
+    monkeypatch.setattr("time.sleep", lambda _seconds: (other.kill(), other.wait()))
+    with claimed(tmp_path / "out", tmp_path, wait=True) as certain:
+        assert certain

@@ -88,9 +88,6 @@ def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
     files.check_output(tmp_path / "new", folder=True)
 
 
-OTHERS = ["out.rrd", "out.partial.rrd", "out.b.0123abcd.partial.rrd", ".out.0123abcd.partial.rrd"]
-
-
 def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
     for name in ("out.rrd", "drive", "a[1].b", ".hidden"):
         for hidden in (False, True):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from roadeval.runtime import files
-from roadeval.runtime.files import Content, NewFolder, claimed_folder
+from roadeval.runtime.files import Content, NewFolder
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux exchanges folders")
 
@@ -38,11 +38,6 @@ def begun(path, content):
 
 def write(path, **content):
     begun(path, content).publish()
-
-
-def recover(path):
-    with claimed_folder(path, CONTENT) as certain:
-        assert certain
 
 
 def read(path):
@@ -137,41 +132,9 @@ def test_a_folder_that_must_stay_where_it_is_stays(situation, tmp_path, monkeypa
     assert [each.name for each in tmp_path.iterdir()] == ["folder"]
 
 
-@pytest.mark.parametrize("situation", [_mounted, _parent_not_ours])
-def test_beside_such_a_folder_nothing_is_written(situation, tmp_path, monkeypatch):
-    write(tmp_path / "folder", table="old")
-    situation(tmp_path / "folder", monkeypatch)
-    new = begun(tmp_path / "folder", {"table": "new"})
-    assert new.partial.parent == tmp_path / "folder"
-    recover(tmp_path / "folder")
-    assert read(tmp_path / "folder") == {"table": "old"}
-
-
-@linux
-@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a second disk")
-def test_files_reach_a_folder_on_another_disk(tmp_path, monkeypatch):
-    """As where a folder is a mount that cannot be known for one."""
-    from tempfile import TemporaryDirectory
-
-    with TemporaryDirectory(dir="/dev/shm") as far:
-        write(Path(far, "folder"), table="old", only_old="old")
-        monkeypatch.setattr(files, "_home_of", lambda _target: tmp_path)
-        write(Path(far, "folder"), table="new")
-        assert read(Path(far, "folder")) == {"table": "new"}
-        assert not list(tmp_path.iterdir())
-
-
 def test_a_link_stays_and_the_folder_behind_it_is_replaced(folder):
     link = folder.parent / "link"
     link.symlink_to("folder")
     write(link, table="new")
     assert link.is_symlink()
     assert read(folder) == {"table": "new"}
-
-
-@pytest.mark.parametrize("path", ["file", "file/folder"])
-def test_what_cannot_be_a_folder_is_told_at_the_beginning(path, tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(OSError, match=r"not a folder|Not a directory"):
-        NewFolder(tmp_path / path, CONTENT).begin()
-    assert [each.name for each in tmp_path.iterdir()] == ["file"]

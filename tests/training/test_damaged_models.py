@@ -2,7 +2,6 @@
 
 import json
 import re
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,6 @@ SMALL = {"preset": "robust", "trees": {"trees": 10, "features": ["place"]}}
 """Boosted trees that learn at once: what takes long is to find bins for many features."""
 EXTRA = {"printed": {"preset": "printed"}, "gated": {"preset": "gated"}, "robust": SMALL}
 PIPELINES = configure({"variants": EXTRA}).pipelines()
-TWO = {name: PIPELINES[name] for name in ("filtered", "unfiltered")}
 
 
 def filled(value):
@@ -152,16 +150,3 @@ def test_a_header_that_is_none_is_refused(arrays, tmp_path, text):
 
 def as_bytes(text: str):
     return np.frombuffer(text.encode(errors="surrogateescape"), np.uint8)
-
-
-def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
-    path = tmp_path / "x.model"
-    save_model(fit([frame(n) for n in range(2)], TWO, TrainingSettings()), path)
-    whole, rng = path.read_bytes(), np.random.default_rng(0)
-    # The directory at the end, and places everywhere.
-    for place in [*rng.integers(0, len(whole), 200), *range(len(whole) - 120, len(whole))]:
-        spoilt = bytearray(whole)
-        spoilt[place] ^= 1 << rng.integers(8)
-        path.write_bytes(spoilt)
-        with suppress(RoadevalError):
-            from_file(path, TWO)

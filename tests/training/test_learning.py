@@ -88,13 +88,6 @@ def test_spread_frames_that_leave_nothing_to_evaluate_are_an_error():
         learn(log(6), frames=3, placement="spread", gap=1)
 
 
-def test_frames_right_after_training_can_be_left_out():
-    frames = log(8)
-    _, schedule = learn(frames, frames=2, gap=3)
-    assert roles(frames, schedule) == "ttgggeee"
-    assert schedule.first == 5
-
-
 def test_a_frame_that_cannot_be_decoded_is_replaced_by_the_next():
     frames = log(6, broken=(1,))
     model, schedule = learn(frames, frames=2)

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import tracemalloc
-from dataclasses import dataclass
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
@@ -13,7 +12,7 @@ import pytest
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
-from roadeval.training.model import GREATEST_SIZE, arrays_of, from_arrays
+from roadeval.training.model import GREATEST_SIZE
 from tests.training.making import frame, pipelines
 
 FEW = {"trees": {"trees": 10, "features": ["place"]}}
@@ -90,14 +89,6 @@ def test_another_file_is_refused(tmp_path, content):
         load_model(path)
 
 
-def test_every_cut_of_a_model_is_refused(path):
-    whole = path.read_bytes()
-    for length in range(0, len(whole), max(1, len(whole) // 50)):
-        path.write_bytes(whole[:length])
-        with pytest.raises(RoadevalError):
-            load_model(path)
-
-
 def test_an_array_that_hides_code_is_not_run(tmp_path):
     class Trap:
         def __reduce__(self):
@@ -156,71 +147,4 @@ def changed(path, values, *, without=""):
         np.savez(file, **arrays)
 
 
-def test_a_stage_that_learns_nothing_has_no_arrays(model, tmp_path):
-    parameters = {"filtered": {"context": model.parameters["filtered"]["svm"]}}
-    path = tmp_path / "other.model"
-    save_model(dataclasses.replace(model, parameters=parameters), path)
-    with pytest.raises(RoadevalError, match="filtered/context is no stage that learns"):
-        load_model(path)
-
-
-@pytest.mark.parametrize("end", [KeyboardInterrupt, MemoryError])
-def test_whatever_ends_the_writing_leaves_no_file(model, tmp_path, monkeypatch, end):
-    def torn(file, **given):
-        file.write(b"half")
-        raise end
-
-    monkeypatch.setattr(np, "savez_compressed", torn)
-    with pytest.raises(end):
-        save_model(model, tmp_path / "city.model")
-    assert list(tmp_path.iterdir()) == []
-
-
 # --- What a stage has learnt as named arrays, and back --------------------------------------------
-
-
-@dataclass(frozen=True)
-class Line:
-    slope: np.ndarray
-    start: float
-
-
-@dataclass(frozen=True)
-class Lines:
-    upper: Line
-    count: int
-    lower: Line | None = None
-
-
-LINE = Line(np.array([1.0, 2.0]), 0.5)
-
-
-@pytest.mark.parametrize("lower", [None, Line(np.array([3.0]), 7.0)])
-def test_they_come_back_as_they_were(lower):
-    found = from_arrays(Lines, arrays_of(Lines(LINE, 2, lower)))
-    np.testing.assert_array_equal(found.upper.slope, LINE.slope)
-    assert (found.upper.start, found.count, type(found.count)) == (0.5, 2, int)
-    assert (found.lower is None) == (lower is None)
-    if lower:
-        assert found.lower.start == 7
-
-
-@pytest.mark.parametrize(
-    ("changed", "named"),
-    [
-        ({"upper/slope": None}, "slope"),
-        ({"upper/slope": None, "upper/start": None}, "slope, start"),
-        ({"count": None}, "count"),
-        ({"lower/slope": np.zeros(2)}, "start"),
-        ({"lower": np.zeros(2)}, "lower"),
-        ({"upper/": np.zeros(2)}, ""),
-        ({"upper/end": np.zeros(2)}, "end"),
-        ({"count/x": np.zeros(2)}, "count/x"),
-        ({"middle/slope": np.zeros(2)}, "middle/slope"),
-    ],
-)
-def test_arrays_that_are_missing_or_unknown_are_named(changed, named):
-    arrays = arrays_of(Lines(LINE, 1)) | changed
-    arrays = {name: array for name, array in arrays.items() if array is not None}
-    with pytest.raises(ValueError, match=f"missing or unknown arrays: {named}$"):
-        from_arrays(Lines, arrays)

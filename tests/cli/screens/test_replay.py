@@ -1,7 +1,6 @@
 """What a replay came to, on a screen of 80 columns."""
 
 import io
-import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ from rich.console import Console
 from roadeval.cli.screens import replay as outcome
 from roadeval.evaluation.stats import Difference
 from roadeval.jobs.run.replay import Outcome
-from roadeval.results.facts import DriveFacts, Facts, FrameAccount, LogFacts
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 
 RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
 
@@ -82,17 +81,4 @@ def test_what_to_type_next_can_be_typed_here(display, first, monkeypatch, tmp_pa
     assert [first in " ".join(words[:2]) for words in programs] == [True, first == "inspect", False]
 
 
-def test_a_log_without_labels_is_told_how_to_get_them(tmp_path):
-    frames = FrameAccount(39, 39, labelled=0, skipped={"unlabelled": 39})
-    log = LogFacts("street.mcap", "0")
-    shown = screen(summary(frames=frames, totals={}, difference={}, windows=0, log=log), tmp_path)
-    assert re.search(r"\nnext       \S*roadeval replay street.mcap --truth LABELS\n", shown)
-
-
 # --- What other seeds come to, on a screen of 80 columns ------------------------------------------
-
-
-def rates(*errors):
-    """A final mask's rates with each seed; all but ERR are undefined."""
-    names = ("ACC", "ERR", "FNR", "FPR", "pooled_ERR")
-    return {"post": dict.fromkeys(names, [None] * len(errors)) | {"ERR": [*errors]}}

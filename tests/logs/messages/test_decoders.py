@@ -72,13 +72,6 @@ def test_big_endian_cdr_is_read() -> None:
     assert (picture.stamp_ns, picture.format, bytes(picture.data)) == (STAMP, "jpeg", b"file")
 
 
-def test_ros_1_is_read_with_its_header_count_and_without_alignment() -> None:
-    data = struct.pack("<IIII3sI4sI4s", 9, 1, 2, 3, b"cam", 4, b"jpeg", 4, b"file")
-    picture = read("ros1", schema("sensor_msgs/CompressedImage", ""), data)
-    assert isinstance(picture, CompressedPicture)
-    assert (picture.stamp_ns, picture.format, bytes(picture.data)) == (10**9 + 2, "jpeg", b"file")
-
-
 def test_a_message_compressed_by_rosbag2_is_unpacked() -> None:
     data = zstandard.ZstdCompressor().compress(PACKED)
     picture = read("cdr", schema(COMPRESSED_NAME, "ros2msg", COMPRESSED), data)

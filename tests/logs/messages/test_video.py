@@ -32,13 +32,6 @@ def test_its_size_is_known_before_the_first_frame(log: Path) -> None:
 
 
 @pytest.mark.parametrize("log", VIDEOS, indirect=True)
-def test_a_stride_gives_the_same_frames(log: Path) -> None:
-    whole, some = frames(log), frames(log, every=5)
-    assert [frame.number for frame in some] == [0, 5, 10]
-    assert all(np.array_equal(frame.image, whole[frame.number].image) for frame in some)
-
-
-@pytest.mark.parametrize("log", VIDEOS, indirect=True)
 def test_a_start_amid_the_video_begins_at_the_keyframe_before(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,8 +1,6 @@
 """The calibration of a camera and its mounting, in the messages of three kinds of writers."""
 
 import json
-import re
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +101,6 @@ def ros2(
     path: Path,
     infos: dict[str, dict[str, Any]],
     tree: list[Parts] = TREE,
-    clouds: tuple[str, ...] = (),
 ) -> Path:
     """A log of ROS 2 with one camera on /front/image/compressed."""
     with path.open("wb") as file:
@@ -117,9 +114,6 @@ def ros2(
         add("/tf_static", "tf2_msgs/msg/TFMessage", transforms(tree))
         for topic, message in infos.items():
             add(topic, "sensor_msgs/msg/CameraInfo", message)
-        for topic in clouds:
-            points = writer.register_msgdef("sensor_msgs/msg/PointCloud2", "uint8[] data\n")
-            writer.write_message(topic, points, {"data": b""}, log_time=5 * 10**9 + 7)
         picture = {"header": header("cam"), "format": "jpeg", "data": image()}
         add("/front/image/compressed", "sensor_msgs/msg/CompressedImage", picture)
         writer.finish()
@@ -143,41 +137,6 @@ def test_a_camera_of_ros_2_is_known_with_its_place_on_the_vehicle(tmp_path: Path
     assert known.mounting.translation == pytest.approx(np.array(mast_at) + mast_turn.apply(at))
     turned = Rotation.from_quat(known.mounting.rotation)
     assert (turned.inv() * (mast_turn * turn)).magnitude() == pytest.approx(0, abs=1e-12)
-
-
-def test_a_camera_of_ros_1_is_known(tmp_path: Path):
-    def text(words: str) -> bytes:
-        return struct.pack("<I", len(words)) + words.encode()
-
-    own = TEXTS["sensor_msgs/msg/CameraInfo"].partition(LINE)[0]
-    own = re.sub(r" ([dkrp])\n", lambda found: found[0].upper(), own)
-    head = f"{LINE}\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
-    stamped = struct.pack("<III", 0, 5, 0) + text("cam")
-    lens = struct.pack("<II", *SIZE[::-1]) + text("plumb_bob") + struct.pack("<I5d", 5, *D)
-    messages = {
-        "/front/camera_info": (
-            *("sensor_msgs/CameraInfo", own),
-            stamped + lens + struct.pack("<30d", *K, *[0.0] * 21),
-        ),
-        "/front/image/compressed": (
-            *(
-                "sensor_msgs/CompressedImage",
-                "std_msgs/Header header\nstring format\nuint8[] data\n",
-            ),
-            stamped + text("jpeg") + struct.pack("<I", len(image())) + image(),
-        ),
-    }
-    with (tmp_path / "a.mcap").open("wb") as file:
-        writer = Writer(file)
-        writer.start("ros1")
-        for topic, (name, fields, data) in messages.items():
-            schema = writer.register_schema(name, "ros1msg", (fields + head).encode())
-            channel = writer.register_channel(topic, "ros1", schema)
-            writer.add_message(channel, 5 * 10**9, data, 5 * 10**9)
-        writer.finish()
-    known, _ = found(tmp_path / "a.mcap")
-    assert known is not None
-    assert (known.matrix, known.distortion, known.mounting) == (tuple(K), tuple(D), None)
 
 
 Message = tuple[str, str, dict[str, Any]]

@@ -26,12 +26,6 @@ def truth_of(*labels: TopicInfo, image: str = "/front/image") -> str | None:
     return topic.name if topic else None
 
 
-def test_the_only_image_topic_is_picked() -> None:
-    topic, why = choose_image([camera("/cam"), other("/imu")], None)
-    assert topic.name == "/cam"
-    assert "only" in why
-
-
 def test_labels_and_masks_are_no_cameras() -> None:
     topics = [camera("/cam"), label("/labels/semantic"), label("/road_mask"), label("/shadowMask")]
     assert choose_image(topics, None)[0].name == "/cam"

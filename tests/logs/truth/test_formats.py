@@ -49,12 +49,6 @@ def painted(*shapes):
     return names
 
 
-def turned(name, points):
-    names = painted("car") if name == "road" else painted()
-    names[inside(points)] = name
-    return names
-
-
 WHOLE = {0: painted("road", "car", "ego"), 3: painted("car", "road")}
 FOREIGN = {
     "coco/datumaro.json": {**WHOLE, 1: painted("road", "blob")},
@@ -93,16 +87,6 @@ def test_a_file_of_the_formats_own_tool_gives_the_pixels_of_scikit_image(path):
         np.testing.assert_array_equal(found[number], expected)
 
 
-@pytest.mark.parametrize("path", FOREIGN)
-def test_the_folder_of_such_a_file_gives_the_same(path, tmp_path):
-    where = shutil.copytree(LABELS / path, tmp_path / "labels") if "." not in path else tmp_path
-    if where == tmp_path:
-        shutil.copy(LABELS / path, where)
-    found = names_of(where)
-    for number, expected in FOREIGN[path].items():
-        np.testing.assert_array_equal(found[number], expected)
-
-
 def test_rectangles_of_x_anylabeling_may_be_turned():
     found = names_of(LABELS / "x_anylabeling")
     np.testing.assert_array_equal(found[0], WHOLE[0])
@@ -127,12 +111,6 @@ def test_a_class_that_does_not_occur_is_refused_with_the_list():
         of_classes(LabelSettings(road=("road",), ignore=("sky",)), origin, "labels")
     with pytest.raises(LogError, match=r"labels has the classes .*: name those that mean road"):
         of_classes(LabelSettings(), origin, "labels")
-
-
-def test_the_other_classes_are_said_to_be_non_road():
-    origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
-    meaning = of_classes(LabelSettings(road=("road",)), origin, "labels")
-    assert meaning.words == "road is road; non-road is all else, car (3 labels), ego (1 label)"
 
 
 def test_a_lone_class_called_road_needs_no_naming():

@@ -208,12 +208,6 @@ def test_a_log_that_was_not_made_of_the_images_is_refused(masks, tmp_path, count
         paired(damaged(tmp_path, "ok"), settings)
 
 
-def test_names_pair_in_a_log_that_was_cut_off(masks, tmp_path):
-    settings = MaskSettings(path=str(masks), images=str(_images(tmp_path, FRAMES)))
-    own = {number: number for number in range(36)}
-    assert paired(damaged(tmp_path, "trunc_midchunk"), settings) == (own, 0)
-
-
 def _images(folder: Path, count: int) -> Path:
     images = folder / "images"
     images.mkdir()

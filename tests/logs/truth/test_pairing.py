@@ -103,18 +103,6 @@ def test_stamps_in_order_pair_the_same_however_few_are_read(images, labels, tole
         assert few.of(image) == all_around.of(image)
 
 
-def test_labels_far_apart_are_read_one_at_a_time():
-    images, labels = Stamps(range(0, 100_000, 10)), Stamps(range(0, 100_000, 200))
-    partners = Partners(Pairing(images, labels, 5, reach_ns=40), near=34)
-    assert partners.of(700) == 35
-    assert images.read == {699, 700}
-    assert labels.read <= {34, 35}
-    images.read.clear()
-    assert partners.of(705) is None
-    assert images.read == {705}
-    assert labels.read <= {34, 35, 36}
-
-
 # --- By what images and labels are paired ---------------------------------------------------------
 
 BAD = UNREADABLE

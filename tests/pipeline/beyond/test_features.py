@@ -83,12 +83,6 @@ def test_distance_to_the_patch_is_in_its_own_deviations_from_its_medians():
     close(distance[0, 5], np.sqrt(((9 - 3) / (1.48 * 1 + 0.06)) ** 2 + 8))
 
 
-def test_a_narrow_image_is_enlarged():
-    small = scene_of(picture(40, 30), WIDTH, PATCH)
-    assert small.image.shape == (48, 64, 3)
-    assert small.fine.shape == (96, 128, 3)
-
-
 # --- Groups ---------------------------------------------------------------------------------------
 
 
@@ -99,12 +93,6 @@ def test_every_group_gives_the_features_that_it_names(scene):
     assert found.shape == (len(names_of(ALL)), HEIGHT, WIDTH)
     assert np.isfinite(found).all()
     assert len(set(names_of(ALL))) == len(found)
-
-
-def test_features_come_in_the_order_that_is_asked_for(scene):
-    two = features(scene, ("place", "light"))
-    np.testing.assert_array_equal(two[:3], features(scene, ("place",)))
-    np.testing.assert_array_equal(two[3:], features(scene, ("light",)))
 
 
 def test_an_image_of_one_colour_has_no_feature_that_is_not_finite():
@@ -195,13 +183,6 @@ def test_paths_are_the_integrals_of_their_costs_along_the_cheapest_path(scene):
         expected, _ = MCP_Geometric(0.005 + cost).find_costs(np.argwhere(scene.patch))
         # A step aslant is 1 % shorter than the root of 2, and a cost is rounded to 1e-4.
         close(found, expected, 0.02)
-
-
-def street(kerb=74, height=48, width=96):
-    """A grey street, a bright kerb beside it from top to bottom, and a pavement of its grey."""
-    image = np.random.default_rng(0).integers(96, 100, (height, width, 1))
-    image[:, kerb : kerb + 2] = 220
-    return np.broadcast_to(image, (height, width, 3)).astype(np.uint8)
 
 
 def test_barriers_are_the_greatest_of_four_pixels(scene):

@@ -259,13 +259,6 @@ def test_a_wide_image_is_judged_as_the_reduced_one_and_compensated_at_its_own_si
     np.testing.assert_allclose(output.image[225:300, 165:315], 120, atol=1)
 
 
-def test_every_pixel_is_in_one_region():
-    output, layers = run(road(ROAD * SHADE))
-    np.testing.assert_array_equal(sum(m.pixels() for m in output.regions.values()), 1)
-    edge = cv2.dilate(layers["shadow"], np.ones((5, 5), np.uint8)) - layers["shadow"]
-    np.testing.assert_array_equal(output.regions["shadow_edge"].pixels(), edge)
-
-
 # --- Its oracle -----------------------------------------------------------------------------------
 
 

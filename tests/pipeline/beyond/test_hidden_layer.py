@@ -55,14 +55,6 @@ def test_ranks_are_even_and_codes_hold_the_range(network):
     np.testing.assert_allclose(np.square(ranks).mean(axis=1), 1 / 3, atol=0.01)
 
 
-def test_a_feature_that_never_varies_does_no_harm():
-    values, road = features_and_road()
-    values[:, 3] = 7
-    found = train(values, road, None, 0, **SMALL).sums(planes_of(values))
-    assert np.isfinite(found).all()
-    assert ((found > 0) == road).mean() > 0.9
-
-
 def test_a_blend_is_the_weighted_mean(network):
     values, road = features_and_road()
     forest = grow(values, road, None, TreesSettings(trees=10, leaves=8, least=5), 0)
@@ -108,10 +100,6 @@ def test_the_network_has_less_to_say_in_the_shade(light, weight):
     values = np.zeros((len(names), 1), np.float32)
     values[names.index("light.light_over_80th_percentile")] = light
     assert network_weight(values, TreesSettings()) == pytest.approx(weight)
-
-
-def test_without_a_feature_that_tells_light_the_weight_is_that_in_the_light():
-    assert network_weight(np.zeros((3, 1), np.float32), TreesSettings(features=("place",))) == 2 / 3
 
 
 @pytest.mark.parametrize(

@@ -111,19 +111,6 @@ def test_less_road_in_the_frames_makes_road_less_probable(sample):
     assert few.mean() < many.mean()
 
 
-def test_samples_are_seen_as_they_are_and_mirrored():
-    image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
-    where = np.array([0, 0]), np.array([23, 3]), np.array([31, 5])
-    sample = TrainingSet((image,), *where, np.array([True, False]))
-
-    def see(seen, _opinion):
-        return None, np.moveaxis(seen, 2, 0).astype(np.float32)
-
-    straight, mirrored = at_samples(sample, see)
-    np.testing.assert_array_equal(straight, image[[23, 3], [31, 5]])
-    np.testing.assert_array_equal(mirrored, straight)
-
-
 def test_the_mirrored_image_has_other_features_at_the_same_pixel():
     image = picture(9)[0].copy()
     image[:, :10] = 20
@@ -197,12 +184,6 @@ def test_trees_for_other_features_are_a_misfit(learnt):
     known = len(names_of(SMALL.features))
     with pytest.raises(MisfitError, match=f"grown on {known} features .* computes 3;"):
         trees.bind(replace(SMALL, features=("place",)), learnt)
-
-
-@pytest.mark.parametrize("names", [("nose",), ("place", "place"), ()])
-def test_groups_must_be_known_and_named_once(names):
-    with pytest.raises(ValueError, match=r"features"):
-        TreesSettings(features=names)
 
 
 VIEW = View.of(picture(9)[0])

@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.jobs.results.report import write_report
 from roadeval.jobs.results.result import Result
-from roadeval.report.blocks import Figure, Heading, ImageGrid, Table, Text
+from roadeval.report.blocks import Figure, ImageGrid, Table, Text
 from roadeval.report.sections import drive, drives, summary
 from roadeval.results.fleet import FleetFolder
 from tests.report.making import opened, plain_rows, text, the
@@ -57,27 +57,6 @@ def test_the_regions_of_all_drives_are_drawn(findings):
     for (region, variant), own in findings.regions.items():
         counted = sums.loc[(variant, region)]
         assert own["ERR"] == pytest.approx((counted.FP + counted.FN) / counted.N)
-
-
-def test_what_failed_was_lost_and_trained_on_itself_is_warned_of(findings):
-    said = " ".join(summary.fleet_warnings(findings))
-    assert "1 of 12 drives failed" in said
-    assert "1 drive was scored without what is lost" in said
-    assert "10 drives were scored by a model trained on the drive's own frames" in said
-
-
-def test_what_is_missing_has_its_reasons(findings):
-    failed, unscored, lost = (plain_rows(table) for table in tables(drives.missing, findings))
-    assert failed == [["1", "drive_0007", "no image topic; the log has: no topics at all"]]
-    assert unscored == [["1", "drive_0009", "no truth"]]
-    assert lost == [["1", "drive_0008", "frame 8 cannot be decoded"]]
-    headings = [b for b in blocks(drives.missing, findings) if isinstance(b, Heading)]
-    assert [(heading.text, heading.level) for heading in headings] == [
-        ("What is missing", 1),
-        ("Drives that failed: 1", 2),
-        ("Drives without a score: 1", 2),
-        ("Logs of which a part was lost: 1", 2),
-    ]
 
 
 def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, findings, tmp_path):

@@ -121,15 +121,6 @@ def test_a_page_asks_for_nothing_and_allows_its_own_script_and_style_alone():
     )
 
 
-def test_sections_are_linked_and_titles_of_one_text_have_names_of_their_own():
-    made = Reader(rendered(Heading("Frames"), Heading("Worst", 2), Heading("Frames")))
-    links = [own["href"] for own in made.all("a") if own["href"] != "#content"]
-    assert links == ["#frames", "#worst", "#frames-2"]
-    assert {own["id"] for tag, own in made.elements if tag in ("section", "h3")} >= {
-        *("frames", "worst", "frames-2")
-    }
-
-
 def test_tables_name_their_columns_and_rows_and_fill_in_what_a_row_takes_from_above():
     table = Table(["variant", "stage", "n"], [["a", "svm", "1"], ["", "post", "2"]], (0, 1))
     made = Reader(rendered(table))

@@ -1,9 +1,7 @@
 """From blocks to pages: text stays text, and the same document gives the same file."""
 
 import struct
-import tempfile
 import zlib
-from itertools import pairwise
 
 import pytest
 
@@ -19,7 +17,7 @@ from roadeval.report.blocks import (
     Text,
 )
 from roadeval.report.chart import Chart, ChartKind, Level, Series, looks
-from roadeval.report.pdf.typeset import ReportError, pdf
+from roadeval.report.pdf.typeset import pdf
 from tests.report.making import a_document, reader, text
 
 HOSTILE = '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw` [c] \\ // # = - "quoted" ${x}'
@@ -115,40 +113,3 @@ def parts(element):
     for each in inner if isinstance(inner, list) else [inner]:
         if hasattr(each.get_object(), "keys") and "/S" in each.get_object():
             yield from parts(each)
-
-
-LONG = "a_name_of_64_letters_" + 43 * "n"
-
-
-def places(content):
-    """Left edges in points of the first page's words, by the word."""
-    found = {}
-
-    def visit(said, matrix, in_text, *_):
-        if said.strip():
-            found[said.strip()] = matrix[0] * in_text[4] + matrix[4]
-
-    reader(content).pages[0].extract_text(visitor_text=visit)
-    return found
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        Table(["mask", "ERR", "FPR", "FNR"], [[LONG, "11.25", "22.50", "33.75"]]),
-        Table(["frames", LONG, "ERR", "FPR"], [["0-9", "11.25", "22.50", "33.75"]]),
-    ],
-    ids=["in a row", "above a column"],
-)
-def test_a_name_of_64_letters_leaves_numbers_their_room(table):
-    content = pdf(a_document(table))
-    edges = [places(content)[number] for number in ("11.25", "22.50", "33.75")]
-    assert min(right - left for left, right in pairwise(edges)) > 40
-    assert "".join(text(content).split()).count(LONG) == 1
-
-
-def test_where_no_temporary_folder_can_be_written_this_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", None)
-    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "gone")])
-    with pytest.raises(ReportError, match=r"no folder for temporary files: .*TMPDIR"):
-        pdf(a_document())

@@ -12,7 +12,6 @@ from tests.report.making import (
     by_rate,
     opened,
     some_findings,
-    the,
 )
 
 
@@ -77,10 +76,6 @@ def of_regions(*regions, variants=VARIANTS):
         for own, variant in enumerate(variants)
         for place, region in enumerate(regions)
     }
-
-
-def charts(findings):
-    return the(Figure, regions(findings)).charts
 
 
 def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near():

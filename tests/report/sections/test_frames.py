@@ -3,9 +3,11 @@
 import cv2
 import numpy as np
 
+from roadeval.data import ERRORS
 from roadeval.report.blocks import Command, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
-from roadeval.report.sections.frames import NO_COMMAND, worst_frames
+from roadeval.report.images import LayerImage
+from roadeval.report.sections.frames import NO_COMMAND, strip, worst_frames
 from tests.report.making import rates, some_findings, the
 
 
@@ -32,13 +34,14 @@ def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is
     assert NO_COMMAND in [block.text for block in blocks if isinstance(block, Text)]
 
 
-def test_where_no_frame_is_the_worst_that_is_told():
-    assert the(Text, worst_frames(some_findings())).text == (
-        "ERR of filtered is undefined on every frame, so no frame is the worst."
+def test_outcomes_are_at_most_640_pixels_across_and_layers_300():
+    image, mask = np.zeros((4, 700, 3), np.uint8), np.zeros((4, 700), np.uint8)
+    outcome, layer = (LayerImage(title, image, ERRORS, mask) for title in ("errors", "svm"))
+    frame = NotableFrame(
+        7, 0, "filtered", {"filtered": rates(0.4)}, images=[outcome], layers=[[layer]]
     )
-
-
-# --- A frame on a page ----------------------------------------------------------------------------
+    found = strip(frame, ["filtered"])
+    assert [[across(each) for each in row] for row in found.rows] == [[640], [300]]
 
 
 def across(picture):

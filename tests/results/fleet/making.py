@@ -34,25 +34,23 @@ RUN = {
 }
 
 
-def fleet_of(
-    folder, count, seed=0, *, frames=20, change=0.0, broken=True, pictures=0, grouped=True, run=None
-):
+def fleet_of(folder, count, seed=0, *, frames=20, change=0.0, pictures=0):
     """Write a fleet of drives, and return its folder.
 
     The same seed gives the same drives. Filtered's ERR is higher by ``change`` on every third of
-    them. Without ``broken`` every drive is scored; the first ``pictures`` have pictures. Without
-    ``frames`` no table of frames is there, and rows are as of 20.
+    them; the first ``pictures`` have pictures. Without ``frames`` no table of frames is there, and
+    rows are as of 20.
     """
     folder = Path(folder)
     writer = FleetWriter(folder)
     writer.begin()
-    members = [_member(i, grouped=grouped) for i in range(count)]
+    members = [_member(i) for i in range(count)]
     for i, member in enumerate(members):
         rng = np.random.default_rng((seed, i))
-        rows = _broken(i, member) if broken else None
+        rows = _broken(i, member)
         if rows is None:
             masks = _counts(i, rng, frames or 20, change)
-            rows = _scored(i, member.drive, masks, lost=broken and i % 10 == 8)
+            rows = _scored(i, member.drive, masks)
             if frames:
                 _write_frames(folder, member.drive, masks)
             if i < pictures:
@@ -60,13 +58,13 @@ def fleet_of(
         key = Key(member.drive, "/camera/image")
         tables = {name: cells(name, key, own) for name, own in rows.items()}
         Record(member.drive, "asked", None, tables).write(folder)
-    writer.finish(members, EvaluationSettings(), RUN if run is None else run, "")
+    writer.finish(members, EvaluationSettings(), RUN, "")
     return folder
 
 
-def _member(i, *, grouped):
+def _member(i):
     name = f"drive_{i:04}"
-    group = f"route_{i // 4}" if grouped and i % 4 < 2 else None
+    group = f"route_{i // 4}" if i % 4 < 2 else None
     tags = {"weather": ("sun", "rain", "fog")[i % 3]}
     tags |= {"place": ("city", "country")[i % 2]} if i % 5 else {}
     return Member(f"{name}-{i:08x}", name, f"/logs/{name}.mcap", group, tags)
@@ -90,8 +88,8 @@ def _broken(i, member):
     return {"drives": [own], "scores": [], "effects": [], "worst": []}
 
 
-def _scored(i, drive, masks, *, lost):
-    n = len(masks["blind", "post"])
+def _scored(i, drive, masks):
+    lost, n = i % 10 == 8, len(masks["blind", "post"])
     own = {
         "drive": drive,
         "status": "damaged" if lost else "scored",

@@ -98,16 +98,6 @@ def test_a_flipped_bit_in_a_table_s_page_is_damage(folder, table):
             FleetFolder(folder).table(table)
 
 
-def test_a_column_of_another_type_is_damage(folder):
-    path = folder / "scores.parquet"
-    table = parquet.read_table(path)
-    at = table.column_names.index("TP")
-    words = table.set_column(at, "TP", pa.array(["many"] * len(table)))
-    parquet.write_table(words, path)
-    with pytest.raises(ResultsError, match="column TP is not of type int64"):
-        FleetFolder(folder).table("scores")
-
-
 # --- The record of a drive: written and read back as it was ---------------------------------------
 
 
