@@ -123,7 +123,7 @@ def collect_rig(result: Result) -> Findings:
     return Findings(
         path=first.path,
         facts=facts,
-        complete=all(each.complete for each in own.values()),
+        complete=first.complete,
         again=first.again,
         pictured=sum(each.pictured for each in own.values()),
         thumbnails=[
