@@ -3,18 +3,36 @@
 The loops are in C, in the folder ``c``, and built when the package is installed. Here what they
 write is allocated, and shapes are checked, a `ValueError` if they do not fit together; an array of
 another type, dimension or order than a loop takes is a `TypeError`. Rows, columns and labels in
-runs are trusted: they are those of `components`, of an image of that size. Types are those of the
-twin, which is the definition.
+runs are trusted: they are those of `components`, of an image of that size.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from inspect import isfunction
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data.arrays import (
+    Bits,
+    CodeTable,
+    Costs,
+    Distances,
+    Image,
+    Indices,
+    Masks,
+    Matrix,
+    Plane,
+    Planes,
+    Reach,
+    Runs,
+    Sums,
+    Values,
+    Vector,
+    Words,
+)
 from roadeval.kernels import _loops, plain
 
 TABLED: Final = 256
@@ -41,7 +59,7 @@ def _require(array: npt.NDArray[Any], *shape: int) -> None:
         raise ValueError(f"an array of shape {array.shape}, not {shape}")
 
 
-def look_up_sum_min(planes, table):
+def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
     _require(table, 766, 256)
     height, width = _shape(*planes)
     codes, histogram = np.empty((height, width), np.uint8), np.empty(256, np.int64)
@@ -50,7 +68,9 @@ def look_up_sum_min(planes, table):
     return codes, histogram
 
 
-def mahalanobis(planes, mean, whitening, greatest):
+def mahalanobis(
+    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
+) -> tuple[Values, Plane]:
     _require(mean, 3)
     _require(whitening, 3, 3)
     shape = _shape(*planes)
@@ -59,7 +79,7 @@ def mahalanobis(planes, mean, whitening, greatest):
     return distance, near
 
 
-def look_up_colours(planes, road):
+def look_up_colours(planes: Planes, road: Words) -> Plane:
     _require(road, COLOUR_WORDS)
     height, width = _shape(*planes)
     result = np.empty((height, width), np.uint8)
@@ -68,7 +88,7 @@ def look_up_colours(planes, road):
     return result
 
 
-def run_sums(planes, runs, count):
+def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     _require(runs, len(runs), 4)
     _, width = _shape(*planes)
     sums = np.zeros((count, 7), np.int64)
@@ -76,7 +96,7 @@ def run_sums(planes, runs, count):
     return sums
 
 
-def ring_sums(planes, runs, ring, count, width):
+def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     _require(runs, len(runs), 4)
     height, columns = _shape(*planes)
     _require(ring, height, -(-columns // 64))
@@ -90,7 +110,7 @@ def ring_sums(planes, runs, ring, count, width):
     return sums
 
 
-def transfer(image, runs, source, target, gain):
+def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)
@@ -104,28 +124,28 @@ def transfer(image, runs, source, target, gain):
     return result
 
 
-def components(bits, width, connectivity):
+def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     room = _room_for_runs(bits, width)
     runs = np.empty((len(room[1]), 4), np.int32)
     count = _loops.components(bits, len(bits), width, connectivity == 8, *room, runs)
     return runs[: room[0][-1]].copy(), count
 
 
-def keep_region(bits, width):
+def keep_region(bits: Bits, width: int) -> Bits:
     room, kept = _room_for_runs(bits, width), np.zeros_like(bits)
     votes = np.zeros_like(room[3])
     _loops.keep_region(bits, len(bits), width, *room, votes, kept)
     return kept
 
 
-def fill_holes(bits, width):
+def fill_holes(bits: Bits, width: int) -> Bits:
     room, filled = _room_for_runs(bits, width), bits.copy()
     outside = np.zeros(len(room[3]), np.uint8)
     _loops.fill_holes(bits, len(bits), width, *room, outside, filled)
     return filled
 
 
-def _room_for_runs(bits, width):
+def _room_for_runs(bits: Bits, width: int) -> tuple[npt.NDArray[Any], ...]:
     """Return arrays for as many runs as a mask can have: see ``c/runs.c``."""
     _require(bits, len(bits), -(-width // 64))
     most = len(bits) * (width // 2 + 1)
@@ -137,7 +157,7 @@ def _room_for_runs(bits, width):
     )
 
 
-def count_bits(masks, classes, regions):
+def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     _, words = _shape(masks[:0], classes[:0], regions[:0])
     counts = np.empty((len(masks), len(classes), len(regions)), np.int64)
     sized = [given for each in (masks, classes, regions) for given in (each, len(each))]
@@ -145,15 +165,15 @@ def count_bits(masks, classes, regions):
     return counts
 
 
-def dilate(bits, reach, width):
+def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
     return _by_element(_loops.dilate, bits, reach, width)
 
 
-def erode(bits, reach, width):
+def erode(bits: Bits, reach: Reach, width: int) -> Bits:
     return _by_element(_loops.erode, bits, reach, width)
 
 
-def _by_element(loop, bits, reach, width):
+def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) -> Bits:
     _require(bits, len(bits), -(-width // 64))
     if not len(reach):
         raise ValueError("an element without rows")
@@ -164,14 +184,16 @@ def _by_element(loop, bits, reach, width):
     return result
 
 
-def geodesics(cost, seeds, rounds):
+def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
     shape = _shape(cost, seeds)
     distance = np.empty(shape, np.int32)
     _loops.geodesics(cost, seeds, *shape, rounds, distance)
     return distance
 
 
-def tree_sum(features, feature, threshold, kept, values):
+def tree_sum(
+    features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
+) -> Values:
     count, pixels = features.shape
     trees, nodes = _shape(feature, threshold, kept)
     _require(values, trees, plain.LEAVES)
@@ -181,14 +203,14 @@ def tree_sum(features, feature, threshold, kept, values):
     return result
 
 
-def filter_rows(rows, step):
+def filter_rows(rows: Plane, step: int) -> Plane:
     height, width = rows.shape
     lines = np.empty((height, 1 + width), np.uint8)
     _loops.filter_rows(rows, height, width, step, lines)
     return lines
 
 
-def label_rows(labels, bits):
+def label_rows(labels: Plane, bits: int) -> Plane:
     if bits not in plain.LABEL_BITS:
         raise ValueError(f"labels of {bits} bits")
     height, width = labels.shape
