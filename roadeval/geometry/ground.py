@@ -60,9 +60,8 @@ class Ground:
     def scaled(self, width: int, height: int) -> Ground:
         """Return the ground for the same images in another size."""
         factors = np.array([width / self.width, height / self.height, 1.0])
-        shift = np.array([factors[0] / 2 - 0.5, factors[1] / 2 - 0.5])
         matrix = np.reshape(self.matrix, (3, 3)) * factors[:, None]
-        matrix[:2] += shift[:, None] * matrix[2]
+        matrix += (factors / 2 - 0.5)[:, None] * matrix[2]
         return replace(self, width=width, height=height, matrix=_flat(matrix))
 
     def pixels(self, places: Matrix) -> Matrix:
@@ -70,9 +69,9 @@ class Ground:
 
         Pixels may lie outside the image.
         """
-        rays = _divided(_applied(self.plane, places))
+        rays = _mapped(self.plane, places)
         if not any(self.distortion):
-            return _divided(_applied(self.matrix, rays))
+            return _mapped(self.matrix, rays)
         found = np.full(rays.shape, np.nan)
         known = np.flatnonzero(np.isfinite(rays).all(axis=1))
         if len(known):
@@ -88,7 +87,7 @@ class Ground:
 
     def places_of(self, rays: Matrix) -> Matrix:
         """Return where on the ground some `rays` end, ``(n, 2)``; NaN from the horizon upwards."""
-        return _divided(_applied(_inverse(self.plane), rays))
+        return _mapped(_inverse(self.plane), rays)
 
     def pixel_at(self, ahead: float) -> tuple[float, float]:
         """Return how many metres a pixel covers straight ahead: along, and across; NaN unseen."""
@@ -109,46 +108,35 @@ class Ground:
         turn, origin = self.axes()
         at = -turn.T @ origin
         at[2] += height
-        turned = turn @ _pitched(math.radians(pitch)).T
-        return replace(self, plane=_plane(turned, at))
+        return replace(self, plane=_plane(turn @ _rotation(LEFT, pitch).T, at))
 
     def axes(self) -> tuple[Matrix, Floats]:
         """Return the rotation from ahead, left, up to the camera's axes, and the origin there."""
         first, second, third = np.reshape(self.plane, (3, 3)).T
         return np.stack([first, second, np.cross(first, second)], axis=1), third
 
-    @property
-    def pose(self) -> tuple[float, float, float]:
-        """Height in metres; pitch and roll in degrees, as of `GroundSettings`."""
-        turn, third = self.axes()
-        return float(-(turn.T @ third)[2]), *_angles_of(turn.T @ AXES)
-
     def _distorted(self, rays: Matrix) -> Matrix:
         import cv2
 
         matrix, distortion = np.reshape(self.matrix, (3, 3)), np.array(self.distortion)
         if self.model in FISHEYE:
-            found = cv2.fisheye.distortPoints(rays[:, None], matrix, distortion)
-            return np.asarray(found[:, 0])
-        points = np.column_stack([rays, np.ones(len(rays))])
-        zero = np.zeros(3)
-        return np.asarray(cv2.projectPoints(points, zero, zero, matrix, distortion)[0][:, 0])
+            return cv2.fisheye.distortPoints(rays[:, None], matrix, distortion)[:, 0]
+        points, zero = np.column_stack([rays, np.ones(len(rays))]), np.zeros(3)
+        return cv2.projectPoints(points, zero, zero, matrix, distortion)[0][:, 0]
 
     def rays(self, pixels: Matrix) -> Matrix:
         """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down."""
-        matrix = np.reshape(self.matrix, (3, 3))
         if any(self.distortion):
             import cv2
 
             # Of OpenCV's functions for it, one that both 4.10 and 5.0 let iterate to the end.
             ends = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12
             points = np.ascontiguousarray(pixels, np.float64)[:, None]
-            distortion = np.array(self.distortion)
+            lens = np.reshape(self.matrix, (3, 3)), np.array(self.distortion)
             if self.model in FISHEYE:
-                rays = cv2.fisheye.undistortPoints(points, matrix, distortion, criteria=ends)
-                return np.asarray(rays[:, 0])
-            pixels = cv2.undistortImagePoints(points, matrix, distortion, None, ends)[:, 0]
-        return _divided(_applied(_inverse(self.matrix), pixels))
+                return cv2.fisheye.undistortPoints(points, *lens, criteria=ends)[:, 0]
+            pixels = cv2.undistortImagePoints(points, *lens, None, ends)[:, 0]
+        return _mapped(_inverse(self.matrix), pixels)
 
 
 def ground_of(
@@ -165,22 +153,23 @@ def ground_of(
     lens, why = _lens(known, given, size)
     if given.homography:
         plane, is_posed, text = _of_homography(given, lens)
-        columns, rows = given.size or size
-        lens = lens or Calibration("", columns, rows, _flat(np.eye(3)))
+        width, height = given.size or size
+        lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     elif lens is None:
         return None, f"no metres: {why}"
     else:
-        pose = _pose(known.mounting if known else None, given)
-        if isinstance(pose, str):
-            return None, f"no metres: {pose}"
-        (height, pitch, roll), text = pose
-        turn = AXES @ (_pitched(math.radians(pitch)) @ _rolled(math.radians(roll))).T
-        plane, is_posed = _plane(turn, np.array([0.0, 0.0, height])), True
+        (above, pitch, roll), text = _pose(known.mounting if known else None, given)
+        if above is None or pitch is None:
+            return None, f"no metres: {text}"
+        turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
+        plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
     made = Ground(
         *(lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion),
         is_posed=is_posed,
     ).scaled(*size)
-    if not np.isfinite(made.places(_frame(*size))).any():
+    # Places all over the image, its edges included.
+    columns, rows = np.meshgrid(*(np.linspace(0, length - 1, 9) for length in size))
+    if not np.isfinite(made.places(np.column_stack([columns.ravel(), rows.ravel()]))).any():
         return None, "no metres: the camera sees no ground: it looks up"
     (near, _), (far, _) = (made.pixel_at(ahead) for ahead in STATED)
     covers = f"{near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
@@ -196,9 +185,8 @@ def _lens(
     if given.fov is not None:
         focal = (width / 2 / math.tan(math.radians(given.fov) / 2),)
     if focal:
-        across, down = focal[0], focal[-1]
         x, y = given.centre or ((width - 1) / 2, (height - 1) / 2)
-        matrix = (across, 0.0, x, 0.0, down, y, 0.0, 0.0, 1.0)
+        matrix = (focal[0], 0.0, x, 0.0, focal[-1], y, 0.0, 0.0, 1.0)
         known = Calibration("", width, height, matrix, given.model, given.distortion)
     elif known is not None and given.model:
         known = replace(known, model=given.model, distortion=given.distortion)
@@ -213,30 +201,27 @@ def _lens(
 
 def _pose(
     mounting: Mounting | None, given: GroundSettings
-) -> tuple[tuple[float, float, float], str] | str:
-    """Return height, pitch and roll, and where they come from, or what is missing."""
-    angles, height = (given.pitch, given.roll), given.height
+) -> tuple[tuple[float | None, float | None, float], str]:
+    """Return height, pitch and roll, and where they come from; or None, and what is missing."""
+    height, pitch, roll = given.height, given.pitch, given.roll
     if mounting is not None:
-        pitch, roll = _angles_of(_matrix_of(mounting.rotation) @ AXES)
-        angles = (
-            pitch if given.pitch is None else given.pitch,
-            roll if given.roll is None else given.roll,
-        )
+        angles = _angles_of(_matrix_of(mounting.rotation) @ AXES)
+        pitch = angles[0] if pitch is None else pitch
+        roll = angles[1] if roll is None else roll
         if height is None and mounting.parent in GROUND_FRAMES:
             height = mounting.translation[2]
     missing = []
     if height is None or height <= 0:
         above = f": the log has it above {mounting.parent} alone" if mounting else ""
         missing.append(f"the camera's height above the ground{above}")
-    if angles[0] is None:
+    if pitch is None:
         missing.append("its pitch")
-    if height is None or missing or angles[0] is None:
-        return f"missing: {', and '.join(missing)}; give it with `ground`"
+    if missing:
+        return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
     # Adding 0 makes 0.0 of what would be read as -0.0.
-    pitch, roll = (round(angle or 0.0, 1) + 0.0 for angle in angles)
-    text = [f"camera {height:.2f} m above it", f"pitch {pitch}\N{DEGREE SIGN} down"]
-    text.append(f"roll {roll}\N{DEGREE SIGN}" + " (not given)" * (angles[1] is None))
-    return (height, angles[0], angles[1] or 0.0), ", ".join(text)
+    shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (pitch, roll)]
+    text = f"camera {height:.2f} m above it, pitch {shown[0]} down, roll {shown[1]}"
+    return (height, pitch, roll or 0.0), text + " (not given)" * (roll is None)
 
 
 def _of_homography(
@@ -249,11 +234,9 @@ def _of_homography(
     plane = np.linalg.inv(to_ground @ matrix)
     # What is far ahead must lie before the camera, not behind it.
     plane = plane / np.linalg.norm(plane[:, 0]) * (1 if plane[2, 0] > 0 else -1)
-    across = plane[:, 1]
-    is_posed = lens is not None and bool(
-        abs(np.linalg.norm(across) - 1) < 0.05 > abs(plane[:, 0] @ across)
-    )
-    return _flat(plane), is_posed, "by a homography"
+    ahead, across, _ = plane.T
+    is_square = abs(np.linalg.norm(across) - 1) < 0.05 > abs(ahead @ across)
+    return _flat(plane), lens is not None and bool(is_square), "by a homography"
 
 
 def _plane(turn: Matrix, at: Floats) -> tuple[float, ...]:
@@ -261,16 +244,18 @@ def _plane(turn: Matrix, at: Floats) -> tuple[float, ...]:
     return _flat(np.column_stack([turn[:, 0], turn[:, 1], -turn @ at]))
 
 
-def _pitched(angle: float) -> Matrix:
-    """Return the rotation of ahead, left and up about left: ahead goes down."""
-    s, c = math.sin(angle), math.cos(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+AHEAD, LEFT = 0, 1
+"""Axes of ahead, left and up."""
 
 
-def _rolled(angle: float) -> Matrix:
-    """Return the rotation of ahead, left and up about ahead: left goes up."""
-    s, c = math.sin(angle), math.cos(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+def _rotation(axis: int, degrees: float) -> Matrix:
+    """Return the rotation of ahead, left and up about one: about left, ahead goes down."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.eye(3)
+    turn[first, first] = turn[second, second] = math.cos(math.radians(degrees))
+    turn[second, first] = math.sin(math.radians(degrees))
+    turn[first, second] = -turn[second, first]
+    return turn
 
 
 def _angles_of(body: Matrix) -> tuple[float, float]:
@@ -291,28 +276,16 @@ def _matrix_of(quaternion: Sequence[float]) -> Matrix:
     )
 
 
-def _applied(matrix: Sequence[float], points: Matrix) -> tuple[Floats, Floats, Floats]:
-    """Apply nine numbers to ``(n, 2)`` points and a 1: three arrays, ``(n,)``."""
+def _mapped(matrix: Sequence[float] | Matrix, points: Matrix) -> Matrix:
+    """Map ``(n, 2)`` points of a plane by nine numbers to another; NaN of what lies behind it."""
     x, y = points.T
     first, second, third = (a * x + b * y + c for a, b, c in np.reshape(matrix, (3, 3)))
-    return first, second, third
+    w = np.where(third > 0, third, np.nan)
+    return np.stack([first / w, second / w], axis=1)
 
 
-def _divided(applied: tuple[Floats, Floats, Floats]) -> Matrix:
-    """Return ``(n, 2)`` points of the plane; NaN of what lies behind it."""
-    x, y, w = applied
-    w = np.where(w > 0, w, np.nan)
-    return np.stack([x / w, y / w], axis=1)
-
-
-def _inverse(matrix: Sequence[float]) -> tuple[float, ...]:
-    return _flat(np.linalg.inv(np.reshape(matrix, (3, 3))))
-
-
-def _frame(width: int, height: int) -> Matrix:
-    """Return places all over an image, its edges included."""
-    columns, rows = np.meshgrid(np.linspace(0, width - 1, 9), np.linspace(0, height - 1, 9))
-    return np.column_stack([columns.ravel(), rows.ravel()])
+def _inverse(matrix: Sequence[float]) -> Matrix:
+    return np.linalg.inv(np.reshape(matrix, (3, 3)))
 
 
 def _flat(matrix: Matrix) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data.arrays import Matrix, Places
 from roadeval.geometry.ground import Ground
 
 OUTSIDE: Final = -1
@@ -29,7 +30,7 @@ class Plan:
     """Metres of a cell's side."""
 
     @cached_property
-    def cells(self) -> npt.NDArray[np.intp]:
+    def cells(self) -> Places:
         """The pixel in which each cell's centre lies, ``(rows, columns)``; `OUTSIDE` of none.
 
         It is its place in a flat image.
@@ -45,13 +46,12 @@ class Plan:
 
         The nearest pixel is taken.
         """
-        flat = image.reshape(-1, *image.shape[2:])
-        found: npt.NDArray[Any] = flat.take(self.cells, axis=0)
+        found = image.reshape(-1, *image.shape[2:]).take(self.cells, axis=0)
         found[self.cells == OUTSIDE] = nothing
         return found
 
 
-def pixels_of(ground: Ground, places: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
+def pixels_of(ground: Ground, places: Matrix) -> Places:
     """Return the pixel in which each place lies, ``(n,)`` in a flat image; `OUTSIDE` of none."""
     found = np.rint(ground.pixels(places))
     size = ground.width, ground.height

@@ -40,10 +40,9 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
     16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels, and
     opacity is left out. An `ImageError` if it is damaged, of no known format, or too large.
     """
-    format_ = _known_format(data)
-    if format_.plugin is None:
-        return _jpeg(data, limits)
-    image = _loaded(data, format_, limits)
+    image = _decoded(data, limits)
+    if isinstance(image, np.ndarray):
+        return image
     if image.mode in _SAMPLES:
         return np.repeat(eight_bits(_samples(image))[..., None], 3, axis=2)
     return np.array(image.convert("RGB"))
@@ -55,10 +54,9 @@ def to_labels(data: File, limits: Limits) -> Array:
     Of a file with a palette these are the palette's indices, or its greys if it has only greys.
     An image of three equal channels is a label image of one. Errors as of `to_rgb`.
     """
-    format_ = _known_format(data)
-    if format_.plugin is None:
-        return without_colours(_jpeg(data, limits))
-    image = _loaded(data, format_, limits)
+    image = _decoded(data, limits)
+    if isinstance(image, np.ndarray):
+        return without_colours(image)
     if image.mode == "P":
         indices = np.array(image)
         palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
@@ -76,9 +74,8 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
 
     Errors as of `to_rgb`, and if it has no palette.
     """
-    format_ = _known_format(data)
-    image = None if format_.plugin is None else _loaded(data, format_, limits)
-    if image is None or image.mode != "P":
+    image = _decoded(data, limits)
+    if isinstance(image, np.ndarray) or image.mode != "P":
         raise ImageError("an image without a palette")
     return np.array(image)
 
@@ -112,8 +109,7 @@ def size_of(data: File) -> tuple[int, int]:
     if format_.plugin is None:
         return _jpeg_size(data)
     with _damage_in(format_), _opened(data, format_) as image:
-        width, height = image.size
-        return width, height
+        return image.width, image.height
 
 
 def _jpeg(data: File, limits: Limits) -> Rgb:
@@ -123,10 +119,9 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     if bytes(data).count(_SCAN) > MOST_SCANS:
         raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
     try:
-        pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=True)
+        return simplejpeg.decode_jpeg(data, "RGB", strict=True)
     except ValueError as error:
         raise ImageError(f"a damaged JPEG ({error})") from error
-    return pixels
 
 
 def _jpeg_size(data: File) -> tuple[int, int]:
@@ -139,8 +134,11 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     return width, height
 
 
-def _loaded(data: File, format_: ImageFormat, limits: Limits) -> Any:
-    """Return a decoded image of Pillow's."""
+def _decoded(data: File, limits: Limits) -> Any:
+    """Return the pixels of a JPEG, and a decoded image of Pillow's of any other format."""
+    format_ = _known_format(data)
+    if format_.plugin is None:
+        return _jpeg(data, limits)
     with _damage_in(format_):
         with _opened(data, format_) as image:
             limits.check(*image.size)

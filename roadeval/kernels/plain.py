@@ -9,7 +9,6 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import pack, unpack
 from roadeval.data.arrays import (
@@ -22,6 +21,7 @@ from roadeval.data.arrays import (
     Labels,
     Masks,
     Matrix,
+    Places,
     Plane,
     Planes,
     Reach,
@@ -72,21 +72,17 @@ def mahalanobis(
     """
     near = _squared(planes, mean, whitening) <= greatest
     single = mean.astype(np.float32), whitening.astype(np.float32)
-    distance: Values = np.sqrt(_squared(planes, *single))
-    return distance, near.astype(np.uint8)
+    return np.sqrt(_squared(planes, *single)), near.astype(np.uint8)
 
 
-def _squared(
-    planes: Planes, mean: npt.NDArray[np.floating], whitening: npt.NDArray[np.floating]
-) -> npt.NDArray[np.floating]:
+def _squared(planes: Planes, mean: Values, whitening: Values) -> Values:
     """Compute ``|W (x - m)|^2`` in the precision of m and W."""
     r, g, b = (plane.astype(mean.dtype) - level for plane, level in zip(planes, mean, strict=True))
     first, second, third = whitening
     u = first[0] * r
     v = second[0] * r + second[1] * g
     w = third[0] * r + third[1] * g + third[2] * b
-    squared: npt.NDArray[np.floating] = u * u + v * v + w * w
-    return squared
+    return u * u + v * v + w * w
 
 
 def look_up_colours(planes: Planes, road: Words) -> Plane:
@@ -100,8 +96,7 @@ def look_up_colours(planes: Planes, road: Words) -> Plane:
     r, g, b = (plane.astype(np.int64) for plane in planes)
     word = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
     bit = ((r & 3) << 4 | (g & 3) << 2 | b & 3).astype(np.uint64)
-    found: Plane = (road[word] >> bit & np.uint64(1)).astype(np.uint8)
-    return found
+    return (road[word] >> bit & np.uint64(1)).astype(np.uint8)
 
 
 # --- Masks of a bit a pixel: counted, dilated and eroded ------------------------------------------
@@ -131,7 +126,7 @@ def erode(bits: Bits, reach: Reach, width: int) -> Bits:
 def _element(reach: Reach) -> Plane:
     side = 2 * max(len(reach) - 1, int(reach.max())) + 1
     rows, columns = np.abs(np.indices((side, side)) - side // 2)
-    inside: Plane = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
+    inside = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
     return inside.astype(np.uint8)
 
 
@@ -176,13 +171,12 @@ def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     return label[label > 0], pixel[label > 0]
 
 
-def _sums(labels: npt.NDArray[np.integer], colours: npt.NDArray[np.uint8], count: int) -> Sums:
+def _sums(labels: Places, colours: Plane, count: int) -> Sums:
     values = colours.astype(np.float64)
-    columns: list[npt.NDArray[np.float64]] = [np.bincount(labels, minlength=count).astype(float)]
+    columns = np.column_stack([np.ones(len(values)), values, values**2]).T
     # Sums of 8-bit values and of their squares stay far below 2^53: float64 adds them exactly.
-    columns += [np.bincount(labels, values[:, c], count).astype(float) for c in range(3)]
-    columns += [np.bincount(labels, values[:, c] ** 2, count).astype(float) for c in range(3)]
-    return np.stack(columns, axis=1).astype(np.int64)
+    sums = [np.bincount(labels, column, count) for column in columns]
+    return np.stack(sums, axis=1).astype(np.int64)
 
 
 def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
@@ -312,11 +306,10 @@ def label_runs(labels: Labels) -> Runs:
     y, x = np.nonzero(begins)
     runs = np.stack([y[:-1], x[:-1], x[1:]], axis=1)[y[:-1] == y[1:]]
     label = labels[runs[:, 0], runs[:, 1]]
-    found: Runs = np.column_stack([runs, label])[label > 0].astype(np.int32)
-    return found
+    return np.column_stack([runs, label])[label > 0].astype(np.int32)
 
 
-def _run_pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:
+def _run_pixels(runs: Runs) -> tuple[Sums, Sums, Sums]:
     """Row, column and label of every pixel of some runs, ``(n,)`` each."""
     y, start, end, label = runs.T.astype(np.int64)
     length = end - start
@@ -329,14 +322,10 @@ def keep_region(bits: Bits, width: int) -> Bits:
 
     An empty mask stays empty.
     """
-    count, labels = cv2.connectedComponents(unpack(bits, width))
-    if count <= 1:
-        return bits.copy()
-    areas = np.bincount(labels.ravel(), minlength=count)[1:]
-    best = np.flatnonzero(areas == areas.max()) + 1
-    # The library numbers components by blocks of rows: of equals, the first pixel decides.
-    first = best[0] if len(best) == 1 else labels[np.isin(labels, best)][0]
-    return pack(labels == first)
+    runs, _ = components(bits, width, 8)
+    labels = paint(runs, len(bits), width)
+    areas = np.bincount(labels.ravel(), minlength=2)[1:]
+    return pack(labels == 1 + areas.argmax())
 
 
 def fill_holes(bits: Bits, width: int) -> Bits:

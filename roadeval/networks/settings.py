@@ -46,10 +46,10 @@ class NetSettings:
     deviation: Channels | None = None
     """The difference is divided by this: one number for each channel in the order of ``channels``,
     or one for all; by default 1."""
-    outputs: tuple[str, ...] | None = None
+    outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     """Names of the outputs that show road; where there are several, road is what one of them calls
     road."""
-    road: tuple[Class, ...] | None = None
+    road: Annotated[tuple[Class, ...], Field(min_length=1)] | None = None
     """The numbers of the classes that are road, from 0."""
     activation: Literal["softmax", "sigmoid", "none"] | None = None
     """How probabilities are made of an output: ``softmax`` over its classes, ``sigmoid`` of each,
@@ -80,10 +80,3 @@ class NetSettings:
         if deviation is not None and min(deviation) <= 0:
             raise ValueError("must be above 0")
         return deviation
-
-    @field_validator("outputs", "road")
-    @classmethod
-    def _some(cls, named: tuple[object, ...] | None) -> tuple[object, ...] | None:
-        if named is not None and (not named or len(set(named)) < len(named)):
-            raise ValueError("must name at least one, and each once")
-        return named

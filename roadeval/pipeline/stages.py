@@ -9,8 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cache
 from importlib import import_module
@@ -24,7 +23,7 @@ import numpy as np
 from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
-from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View, per_view
+from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
 from roadeval.runtime.discovery import by_name, found_in
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import visible
@@ -128,7 +127,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     ``image``, ``(H, W, 3)`` uint8 RGB; ``moment``, a `roadeval.data.Moment`, or None for an image
     by itself; and ``settings``, whose default is an instance of a dataclass. It returns ``(H, W)``
     bool or whole numbers, nonzero where road is; or floats from 0 to 1, how probable road is, whose
-    mask is what is above one half; or an `Output` without layers other than its mask.
+    mask is what is above one half.
     """
     arguments = inspect.signature(function).parameters
     for argument, about in arguments.items():
@@ -151,10 +150,6 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
 
 
 def _output(found: Any, spec: LayerSpec) -> Output:
-    if isinstance(found, Output):
-        if found.layers or found.mask is None:
-            return found
-        return replace(found, layers=(Layer(spec, found.mask),))
     array, codes = np.asarray(found), None
     if array.ndim != 2:
         raise ValueError(f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask")
@@ -170,49 +165,47 @@ def _output(found: Any, spec: LayerSpec) -> Output:
 def guarded(stage: Stage) -> Stage:
     """Return a stage whose every error is a `StageError`, and so is an output that cannot be."""
 
+    def named(what: str, work: Callable[..., Any]) -> Callable[..., Any]:
+        def run(*arguments: Any) -> Any:
+            try:
+                return work(*arguments)
+            except (RoadevalError, MemoryError):
+                raise
+            except Exception as error:  # whatever somebody's code raises
+                where = _place(error)
+                raise StageError(f"stage {stage.name} {what}: {_said(error)}{where}") from error
+
+        return run
+
     def bind(settings: Any, parameters: Any) -> Callable[[View], Output]:
-        with _named(stage, "cannot be made ready"):
-            run = stage.bind(settings, parameters)
-            specs = stage.specs(settings)
+        run, specs = stage.bind(settings, parameters), stage.specs(settings)
 
         def checked(view: View) -> Output:
-            with _named(stage, "failed"):
-                output = run(view)
-                _check_output(output, view, stage, specs)
+            output = run(view)
+            _check_output(output, view, stage, specs)
             return output
 
-        return checked
+        return named("failed", checked)
 
-    def fit(training_set: TrainingSet, settings: Any) -> Any:
-        assert stage.fit is not None
-        with _named(stage, "cannot learn"):
-            return stage.fit(training_set, settings)
-
-    return replace(stage, bind=bind, fit=None if stage.fit is None else fit)
+    fit = stage.fit and named("cannot learn", stage.fit)
+    return replace(stage, bind=named("cannot be made ready", bind), fit=fit)
 
 
-@contextmanager
-def _named(stage: Stage, what: str) -> Iterator[None]:
-    try:
-        yield
-    except (RoadevalError, MemoryError):
-        raise
-    except Exception as error:  # whatever somebody's code raises
-        # Where in somebody's file it arose, as (mine.py:12).
-        frames = traceback.extract_tb(error.__traceback__)
-        others = [each for each in frames if PACKAGE not in Path(each.filename).parents]
-        own = [each for each in others if each.filename == others[0].filename][-1:]
-        where = "".join(f" ({Path(each.filename).name}:{each.lineno})" for each in own)
-        raise StageError(f"stage {stage.name} {what}: {_said(error)}{where}") from error
+def _place(error: Exception) -> str:
+    """Return where in somebody's file an error arose, as `` (mine.py:12)``; else nothing."""
+    frames = traceback.extract_tb(error.__traceback__)
+    others = [each for each in frames if PACKAGE not in Path(each.filename).parents]
+    own = [each for each in others if each.filename == others[0].filename][-1:]
+    return "".join(f" ({Path(each.filename).name}:{each.lineno})" for each in own)
 
 
-TYPES: Final[Mapping[LayerKind, tuple[type[np.generic], ...]]] = {
-    LayerKind.MASK: (np.bool_, np.integer),
-    LayerKind.LABELS: (np.uint8,),
-    LayerKind.RGB: (np.uint8,),
-    LayerKind.SCALAR: (np.generic,),
+KINDS: Final = {
+    LayerKind.MASK: "2[biu]",
+    LayerKind.LABELS: "2u1",
+    LayerKind.RGB: "3u1",
+    LayerKind.SCALAR: "2",
 }
-"""What a layer's array may hold, so that a recording can."""
+"""What a layer's array must be for a recording: its dimensions, and the start of its type."""
 
 
 def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
@@ -224,18 +217,20 @@ def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSp
         raise TypeError("it handed out no mask (Packed.of makes one)")
     if output.mask is not None and output.mask.shape != size:
         raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
-    arrays: list[tuple[str, Any, tuple[int, ...], tuple[type[np.generic], ...]]] = [
-        ("image", output.image, view.image.shape, (np.uint8,)),
-        ("probability", output.probability, size, (np.uint16,)),
+    arrays: list[tuple[str, Any, str]] = [
+        ("image", output.image, "3u1"),
+        ("probability", output.probability, "2u2"),
     ]
     for layer in output.layers:
         if layer.spec not in specs:
             raise ValueError(f"it handed out a layer {layer.spec.name!r} that it does not announce")
-        arrays.append((f"layer {layer.spec.name!r}", layer.array, size, TYPES[layer.spec.kind]))
-    for what, array, shape, types in arrays:
-        if array is not None and not (
-            array.shape[: len(shape)] == shape
-            and any(np.issubdtype(array.dtype, each) for each in types)
-        ):
-            wanted = f"{' or '.join(each.__name__ for each in types)} {shape}"
-            raise ValueError(f"its {what} is {array.dtype} {array.shape}, not {wanted}")
+        arrays.append((f"layer {layer.spec.name!r}", layer.array, KINDS[layer.spec.kind]))
+    for what, array, kind in arrays:
+        if array is None:
+            continue
+        fits = array.shape == view.image.shape[: array.ndim]
+        if not fits or not re.match(kind, f"{array.ndim}{array.dtype.str[1:]}"):
+            raise ValueError(
+                f"its {what} is {array.dtype} {array.shape}: it must be of the image's size "
+                f"{size}, and of a type that can be recorded"
+            )

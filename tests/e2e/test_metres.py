@@ -124,7 +124,8 @@ def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
     run = here("replay", "rig.mcap", *words, cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     facts = roadeval.Result(tmp_path / "rig").facts
-    heights = {name: each.drive.ground.pose[0] for name, each in facts.cameras.items()}
+    axes = {name: each.drive.ground.axes() for name, each in facts.cameras.items()}
+    heights = {name: -(turn.T @ origin)[2] for name, (turn, origin) in axes.items()}
     assert heights == pytest.approx({"front": 1.42, "rear": 2.5})
     assert {*pd.read_csv(tmp_path / "rig" / "metres.csv")["camera"]} == {"front", "rear"}
     (tmp_path / "camera.toml").write_text(CAMERA)

@@ -29,6 +29,14 @@ def made(**settings: object) -> Ground:
     return ground
 
 
+def pose(ground: Ground) -> tuple[float, ...]:
+    """The height in metres; pitch and roll in degrees."""
+    turn, origin = ground.axes()
+    optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    _, pitch, roll = Rotation.from_matrix(turn.T @ optical.T).as_euler("ZYX", degrees=True)
+    return -(turn.T @ origin)[2], pitch, roll
+
+
 def test_places_are_seen_where_the_synthetic_world_draws_them():
     pose = Pose(0, 1.3, 0, pitch=-math.radians(4), roll=math.radians(2))
     world = np.column_stack([-PLACES[:, 1], np.zeros(len(PLACES)), PLACES[:, 0]])
@@ -79,8 +87,7 @@ def test_a_pixel_covers_more_the_farther_it_lies():
 
 
 def test_a_camera_that_moves_is_where_it_moved_to():
-    height, pitch, roll = made().moved(pitch=1, height=0.05).pose
-    assert (height, pitch, roll) == pytest.approx((1.35, 5, 2))
+    assert pose(made().moved(pitch=1, height=0.05)) == pytest.approx((1.35, 5, 2))
 
 
 def test_reduced_images_show_the_same_places_at_reduced_pixels():
@@ -100,7 +107,7 @@ def test_a_homography_is_what_four_corners_say():
     settings = GroundSettings(homography=tuple(-7 * found.ravel()), focal=(560.0,))
     posed, _ = ground_of(None, settings, SIZE)
     assert posed is not None
-    assert posed.moved().pose == pytest.approx((1.3, 4, 2), abs=1e-4)
+    assert pose(posed.moved()) == pytest.approx((1.3, 4, 2), abs=1e-4)
 
 
 def mounted(parent: str, at: tuple[float, ...], pitch: float, yaw: float = 0.0) -> Calibration:
@@ -130,7 +137,7 @@ def test_what_a_file_says_replaces_what_the_log_says():
     )
     ground, _ = ground_of(known, given, SIZE)
     assert ground is not None
-    assert ground.pose == pytest.approx((1.5, 3, -1))
+    assert pose(ground) == pytest.approx((1.5, 3, -1))
     assert ground.distortion == LENSES["plumb_bob"]
 
 

@@ -39,5 +39,5 @@ def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
 
 
 def test_a_layer_of_another_size_is_named():
-    with pytest.raises(StageError, match=r"its layer 'mask' is uint8 \(3, 6\), not .*\(4, 6\)"):
+    with pytest.raises(StageError, match=r"its layer 'mask' is uint8 \(3, 6\): .* size \(4, 6\)"):
         run(MASK, IMAGE[:3, :, 0])
