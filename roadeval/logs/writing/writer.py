@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -24,12 +26,16 @@ from roadeval.images import ImageError, format_of, png_of, size_of
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
 from roadeval.logs.settings import NS
-from roadeval.runtime.files import NewFile, check_input
+from roadeval.runtime.files import NewFile, check_input, writing
 from roadeval.version import VERSION
 
 FORMATS: Final = ("jpeg", "png", "webp")
 FRAME_ID: Final = "camera"
 """The camera's coordinate frame, by name."""
+
+
+Schema = tuple[str, str, bytes]
+"""Name, encoding and text."""
 
 
 class LogWriter:
@@ -43,14 +49,14 @@ class LogWriter:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._new = NewFile(self.path)
-        with self._explained():
+        with writing(self.path, LogError):
             self._new.begin()
             self._file = self._new.partial.open("wb")
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
-        self._schemas: dict[tuple[str, str], int] = {}
-        self._channels: dict[str, int] = {}
-        self._counts: dict[int, int] = {}
+        self._schemas: dict[Schema, int] = {}
+        self._channels: dict[str, tuple[int, Iterator[int]]] = {}
+        """Of each topic, and the numbers of its messages."""
 
     def image(
         self,
@@ -73,19 +79,8 @@ class LogWriter:
             raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
         message = CompressedImage(frame_id=frame_id, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
-
-        def text() -> bytes:
-            from mcap_protobuf.schema import build_file_descriptor_set
-
-            described: bytes = build_file_descriptor_set(CompressedImage).SerializeToString(
-                deterministic=True
-            )
-            return described
-
-        schema = CompressedImage.DESCRIPTOR.full_name, "protobuf"
-        channel = self._channel(topic, "protobuf", schema, text)
         data = message.SerializeToString(deterministic=True)
-        self._write(channel, stamp_ns, log_time_ns, data)
+        self._write(topic, _image_schema(), stamp_ns, log_time_ns, data)
 
     def mask(
         self,
@@ -103,83 +98,53 @@ class LogWriter:
         png = png_of(mask)
         self.image(topic, stamp_ns, png, "png", log_time_ns=log_time_ns, frame_id=frame_id)
 
-    def json(
-        self,
-        topic: str,
-        stamp_ns: int,
-        message: Mapping[str, Any],
-        schema: tuple[str, str],
-        *,
-        log_time_ns: int | None = None,
+    def _write(
+        self, topic: str, schema: Schema, stamp_ns: int, log_time_ns: int | None, data: bytes
     ) -> None:
-        """Write a message in JSON, with its schema's name and text (JSON Schema).
-
-        A `LogError` if the disk is full.
-        """
-        name, text = schema
-        channel = self._channel(topic, "json", (name, "jsonschema"), text.encode)
-        data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
-        self._write(channel, stamp_ns, log_time_ns, data)
-
-    def _channel(
-        self, topic: str, encoding: str, schema: tuple[str, str], text: Callable[[], bytes]
-    ) -> int:
-        """Return the channel of a topic, with a schema's name and encoding; made if it is new."""
         if topic not in self._channels:
             if schema not in self._schemas:
-                self._schemas[schema] = self._writer.register_schema(*schema, text())
-            number = self._schemas[schema]
-            self._channels[topic] = self._writer.register_channel(topic, encoding, number)
-        return self._channels[topic]
-
-    def _write(self, channel: int, stamp_ns: int, log_time_ns: int | None, data: bytes) -> None:
-        sequence = self._counts[channel] = self._counts.get(channel, -1) + 1
+                self._schemas[schema] = self._writer.register_schema(*schema)
+            encoding = schema[1].removesuffix("schema")
+            channel = self._writer.register_channel(topic, encoding, self._schemas[schema])
+            self._channels[topic] = channel, count()
+        channel, sequence = self._channels[topic]
         log_time = stamp_ns if log_time_ns is None else log_time_ns
-        with self._explained():
-            self._writer.add_message(channel, log_time, data, stamp_ns, sequence)
+        with writing(self.path, LogError):
+            self._writer.add_message(channel, log_time, data, stamp_ns, next(sequence))
 
     def finish(self) -> None:
-        """Write the end of the file; `close` gives it its name.
+        """Write the end of the file, which has its name after the ``with`` statement.
 
         A `LogError` if the disk is full.
         """
         if not self._file.closed:
-            with self._explained():
+            with writing(self.path, LogError):
                 self._writer.finish()  # type: ignore[no-untyped-call]
                 self._file.close()
-
-    def close(self) -> None:
-        """Complete the file and give it its name; a `LogError` if the disk is full."""
-        try:
-            self.finish()
-            with self._explained():
-                self._new.publish()
-        except BaseException:
-            self._discard()
-            raise
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:
-        if kind is None:
-            self.close()
-        else:
-            self._discard()
-
-    def _discard(self) -> None:
-        """Remove the unfinished file."""
-        # On a full disk closing fails as well, but the first error is the one to report.
-        with suppress(OSError):
-            self._file.close()
-        self._new.discard()
-
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
         try:
-            yield
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error
+            if kind is None:
+                self.finish()
+                with writing(self.path, LogError):
+                    self._new.publish()
+        finally:
+            # On a full disk closing fails as well, but the first error is the one to report.
+            with suppress(OSError):
+                self._file.close()
+            self._new.discard()
+
+
+@cache
+def _image_schema() -> Schema:
+    from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+    from mcap_protobuf.schema import build_file_descriptor_set
+
+    described = build_file_descriptor_set(CompressedImage).SerializeToString(deterministic=True)
+    return CompressedImage.DESCRIPTOR.full_name, "protobuf", described
 
 
 ROOT: Final = "/roadeval"
@@ -214,8 +179,9 @@ class SidecarWriter(LogWriter):
             self.mask(topic, stamp, image, log_time_ns=log_time, frame_id=frame_id or FRAME_ID)
         for tally in result.tallies:
             topic = f"{root}/metrics/{tally.variant}/{tally.stage}"
-            schema = METRICS, _schema(tuple(tally.rates))
-            self.json(topic, stamp, _message(result.frame, tally), schema, log_time_ns=log_time)
+            message = _message(result.frame, tally)
+            data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
+            self._write(topic, _schema(tuple(tally.rates)), stamp, log_time, data)
 
 
 def _message(frame: Frame, tally: Tally) -> dict[str, Any]:
@@ -261,13 +227,15 @@ def _coloured(layer: Layer) -> npt.NDArray[np.uint8]:
     return palette[np.asarray(layer.array, np.uint8)]
 
 
-def _schema(rates: tuple[str, ...]) -> str:
+@cache
+def _schema(rates: tuple[str, ...]) -> Schema:
     """Return the JSON Schema of the metrics, with Foxglove's own form of a time."""
     time = {"type": "object", "title": "time", "properties": {"sec": _INTEGER, "nsec": _INTEGER}}
     counts = dict.fromkeys(("frame", "TP", "TN", "FP", "FN", "N"), _INTEGER)
     properties = {"timestamp": time, "variant": {"type": "string"}, "stage": {"type": "string"}}
     properties |= counts | dict.fromkeys(rates, _RATE)
-    return json.dumps({"title": METRICS, "type": "object", "properties": properties})
+    text = json.dumps({"title": METRICS, "type": "object", "properties": properties})
+    return METRICS, "jsonschema", text.encode()
 
 
 CAMERA: Final = "/camera/image"
@@ -315,22 +283,21 @@ def pack(
     images, output = Path(images), Path(output)
     if rate_hz is not None and not 1e-4 <= rate_hz <= 1000:
         raise LogError(f"{rate_hz:g} images a second: must be at least 0.0001 and at most 1000")
-    if images.suffix.lower() in VIDEO_SUFFIXES and images.is_file():
-        if masks is not None:
-            raise LogError(f"{images}: masks go with a folder of images, not with a video")
-        count = 0
-        with LogWriter(output) as log:
-            for count, (time_ns, jpeg) in enumerate(_frames_of(images), start=1):
-                if rate_hz is not None:
-                    time_ns = round((count - 1) * NS / rate_hz)  # noqa: PLW2901
-                log.image(CAMERA, time_ns, jpeg, "jpeg")
-            if not count:
-                raise LogError(f"{images}: a video without frames")
-        words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
-        return PackResult(output, count, 0, words)
-    if not images.is_dir():
+    if images.is_dir():
+        return _pack_folder(images, output, Path(masks) if masks else None, rate_hz)
+    if images.suffix.lower() not in VIDEO_SUFFIXES or not images.is_file():
         raise LogError(f"{images}: neither a folder of images nor a video")
-    return _pack_folder(images, output, Path(masks) if masks else None, rate_hz)
+    if masks is not None:
+        raise LogError(f"{images}: masks go with a folder of images, not with a video")
+    number = 0
+    with LogWriter(output) as log:
+        for number, (time_ns, jpeg) in enumerate(_frames_of(images), start=1):
+            regular = 0 if rate_hz is None else round((number - 1) * NS / rate_hz)
+            log.image(CAMERA, time_ns if rate_hz is None else regular, jpeg, "jpeg")
+        if not number:
+            raise LogError(f"{images}: a video without frames")
+    words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
+    return PackResult(output, number, 0, words)
 
 
 def _pack_folder(
@@ -340,24 +307,34 @@ def _pack_folder(
     belong = images_of(labels, files)
     if labels and not belong:
         raise LogError(f"{masks}: no mask has the name of an image in {images} ({some(labels)})")
-    by_image = {image: label for label, image in belong.items()}
-    if len(by_image) < len(belong):
-        extra = next(label for label in belong if by_image[belong[label]] != label)
-        other = by_image[belong[extra]]
-        raise LogError(f"{masks}: {extra.name} and {other.name} belong to the same image")
-    stamps, words = _stamps(files, rate_hz)
+    by_image: dict[Path, Path] = {}
+    for label, image in belong.items():
+        if (other := by_image.setdefault(image, label)) != label:
+            raise LogError(f"{masks}: {other.name} and {label.name} belong to the same image")
+    in_order, times = ordered(files)
+    if rate_hz is None and times is not None:
+        files, words = in_order, "the times in the files' names"
+    else:
+        rate = rate_hz or DEFAULT_RATE_HZ
+        words = f"{rate:g} images a second"
+        times = [round(i * NS / rate) for i in range(len(files))]
     with LogWriter(output) as log:
-        for file, stamp in stamps.items():
+        for file, stamp in zip(files, times, strict=True):
             log.image(CAMERA, stamp, *_image(file))
             if file in by_image:
-                label = _image(by_image[file], is_label=True)
-                log.image(TRUTH, stamp, *label, log_time_ns=stamp + LABEL_DELAY_NS)
-    used = set(by_image.values())
-    warnings = (
-        *_unpaired("images without a mask", [f for f in files if labels and f not in by_image]),
-        *_unpaired("masks without an image", [label for label in labels if label not in used]),
+                label_file = _image(by_image[file], is_label=True)
+                log.image(TRUTH, stamp, *label_file, log_time_ns=stamp + LABEL_DELAY_NS)
+    unpaired = {
+        "images without a mask": [file for file in files if labels and file not in by_image],
+        "masks without an image": [label for label in labels if label not in belong],
+    }
+    return PackResult(
+        output,
+        len(files),
+        len(by_image),
+        words,
+        tuple(f"{what}: {some(own)} ({len(own)} in all)" for what, own in unpaired.items() if own),
     )
-    return PackResult(output, len(files), len(by_image), words, warnings)
 
 
 def _label_images(masks: Path, images: Path) -> Sequence[Path]:
@@ -372,22 +349,6 @@ def _label_images(masks: Path, images: Path) -> Sequence[Path]:
             f"{error}; labels of an annotation tool are for the packed log: pack without them, "
             f"then roadeval replay LOG.mcap --truth {masks} --truth-images {images}"
         ) from error
-
-
-def _unpaired(what: str, files: Sequence[Path]) -> Iterator[str]:
-    """Yield a sentence that names some of the files, if there are any."""
-    if files:
-        yield f"{what}: {some(files)} ({len(files)} in all)"
-
-
-def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], str]:
-    """Return each file's stamp, in the order of the stamps, and their source in words."""
-    in_order, times = ordered(files)
-    if rate_hz is None and times is not None:
-        return dict(zip(in_order, times, strict=True)), "the times in the files' names"
-    rate = rate_hz or DEFAULT_RATE_HZ
-    regular = {file: round(i * NS / rate) for i, file in enumerate(files)}
-    return regular, f"{rate:g} images a second"
 
 
 def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
