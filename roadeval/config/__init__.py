@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         run_toml,
     )
     from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
-    from roadeval.config.tables import ConfigError, in_file, read_tables
+    from roadeval.config.tables import ConfigError, in_file, override, read_tables
     from roadeval.config.variants import (
         AS_IT_IS,
         PRESETS,

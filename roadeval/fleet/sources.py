@@ -14,10 +14,11 @@ from __future__ import annotations
 import glob
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from roadeval.config import OF_A_LOG, RunConfig, in_file, read_tables
+from roadeval.config import OF_A_LOG, in_file, override, read_tables
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import (
@@ -34,12 +35,12 @@ from roadeval.fleet.entry import (
     scheme_of,
     shown,
 )
-from roadeval.logs import files_of
+from roadeval.logs import LogConfig, files_of
+from roadeval.runtime.settings import Checked
 from roadeval.runtime.text import visible
 
 MANIFEST: Final = ".toml"
 """The ending of a manifest's name."""
-_KEYS: Final = ("path", "group", "tags", *OF_A_LOG)
 
 
 def find_drives(words: Sequence[str]) -> list[DriveEntry]:
@@ -150,6 +151,30 @@ def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
     return list(kept.values())
 
 
+def _tag(name: Any) -> Any:
+    if not is_plain(name):
+        raise ValueError("a tag's name is made of letters, digits, '-' and '_' alone")
+    return name
+
+
+def _word(value: Any) -> str:
+    if not isinstance(value, str | int | float) or value == "":
+        raise ValueError("must be text, a number, true or false")
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+Word = Annotated[str, Checked(_word)]
+
+
+@dataclass(frozen=True, slots=True)
+class Row(LogConfig):
+    """An entry of a manifest: one drive or several, and the settings that they have alone."""
+
+    path: str = ""
+    group: Word | None = None
+    tags: Mapping[Annotated[str, Checked(_tag)], Word] = field(default_factory=dict)
+
+
 def read_manifest(path: Path) -> Iterator[DriveEntry]:
     """Yield the drives of a manifest.
 
@@ -157,54 +182,19 @@ def read_manifest(path: Path) -> Iterator[DriveEntry]:
     cannot be used.
     """
     tables = read_tables(path)
-    for key in tables:
-        if key != "drives":
-            raise FleetError(f"{path}: {key}: a manifest has only [[drives]], one for each drive")
-    rows = tables.get("drives", [])
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise FleetError(f"{path}: drives must be tables, each under [[drives]]")
-    if not rows:
-        raise FleetError(f"{path}: names no drive; it needs a [[drives]] for each")
-    for number, row in enumerate(rows, 1):
-        yield from _described(row, f"{path}: [[drives]] number {number}", path.parent)
-
-
-def _described(row: Mapping[str, Any], where: str, folder: Path) -> Iterator[DriveEntry]:
-    """Yield the drives of an entry of a manifest."""
-    path = row.get("path")
-    if not isinstance(path, str) or not path:
-        raise FleetError(f"{where}: path must name a log, or several as *.mcap")
-    where = f"{where}, {shown(path)}"
-    for key in row:
-        if key not in _KEYS:
-            raise FleetError(f"{where}: {key}: there is no such key; choose {', '.join(_KEYS)}")
-    group = _word(row["group"], f"{where}: group") if "group" in row else None
-    tags = _tags(row.get("tags", {}), where)
-    settings = {name: row[name] for name in OF_A_LOG if name in row}
-    with in_file(where):
-        RunConfig().of_drive(settings)  # checked before the first drive is replayed
-    try:
-        sources = _sources(path, folder)
-    except RoadevalError as error:
-        raise FleetError(f"{where}: {error}") from error
-    for source in sources:
-        yield entry_of(source, group, tags, settings)
-
-
-def _tags(tags: Any, where: str) -> dict[str, str]:
-    if not isinstance(tags, Mapping):
-        raise FleetError(f'{where}: tags must be a table, as {{ weather = "rain" }}')
-    for key in tags:
-        if not is_plain(key):
-            raise FleetError(
-                f"{where}: tag {key!r}: a tag's name is made of letters, digits, '-' and '_' alone"
-            )
-    return {key: _word(value, f"{where}: tag {key}") for key, value in tags.items()}
-
-
-def _word(value: Any, where: str) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if not isinstance(value, str | int | float) or value == "":
-        raise FleetError(f"{where}: must be text, a number, true or false")
-    return str(value)
+    rows = tables.get("drives")
+    if not isinstance(rows, list) or not rows or len(tables) > 1:
+        raise FleetError(f"{path}: a manifest has [[drives]], one for each drive, and nothing else")
+    for number, table in enumerate(rows, 1):
+        where = f"{path}: [[drives]] number {number}"
+        with in_file(where):
+            row = override(Row(), table, "drives")
+        if not row.path:
+            raise FleetError(f"{where}: path must name a log, or several as *.mcap")
+        try:
+            sources = _sources(row.path, path.parent)
+        except RoadevalError as error:
+            raise FleetError(f"{where}: {error}") from error
+        settings = {name: table[name] for name in OF_A_LOG if name in table}
+        for source in sources:
+            yield entry_of(source, row.group, row.tags, settings)

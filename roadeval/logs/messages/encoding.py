@@ -116,9 +116,8 @@ class MessageReader(NamedTuple):
     ``header.stamp`` or ``timestamp``, the camera's name in ``header.frame_id`` or ``frame_id``."""
     stamp: Decode | None = None
     """Return the stamp alone, where that is cheaper than to decode the message."""
-    is_whole: Callable[[Buffer], bool] | None = None
-    """Return whether a message is exactly as long as its fields say. Without it, a message is whole
-    if it can be decoded."""
+    is_whole: Callable[[Buffer], bool] = lambda _: True
+    """Return whether a message that can be decoded is exactly as long as its fields say."""
 
 
 @dataclass(frozen=True, slots=True)

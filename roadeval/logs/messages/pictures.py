@@ -7,12 +7,12 @@ need the frames before them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import chain
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, Protocol
 
 from mcap.records import Channel, Schema
 
@@ -137,16 +137,28 @@ def nanoseconds(stamp: Any) -> int:
     return int(seconds) * 1_000_000_000 + int(rest)
 
 
-class Decoder(NamedTuple):
-    """Reads the messages of a channel: the whole picture, or only its stamp in nanoseconds.
+@dataclass(frozen=True, slots=True)
+class Decoder:
+    """Reads the messages of a channel; a `BadMessage` for one that cannot be decoded."""
 
-    They raise `BadMessage` for a message that cannot be decoded.
-    """
+    reader: MessageReader
 
-    picture: Callable[[Buffer], LoggedPicture]
-    stamp: Callable[[Buffer], int]
-    fields: Callable[[Buffer], Any]
-    """Return the message with its fields as attributes, whatever it carries."""
+    def fields(self, data: Buffer) -> Any:
+        """Return the message with its fields as attributes, whatever it carries."""
+        with _one_error():
+            return self.reader.decode(data)
+
+    def picture(self, data: Buffer) -> LoggedPicture:
+        """Return the picture that it carries."""
+        with _one_error():
+            return picture_in(self.reader.decode(data))
+
+    def stamp(self, data: Buffer) -> int:
+        """Return its stamp alone, in nanoseconds."""
+        if self.reader.stamp is None:
+            return self.picture(data).stamp_ns
+        with _one_error():
+            return nanoseconds(self.reader.stamp(data))
 
 
 @cache
@@ -170,55 +182,35 @@ def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
 
 def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
     """Return what decodes the messages of a channel; a `BadMessage` if nothing decodes them."""
-    reader = _reader(channel, schema)
-    if reader is None:
+    parts = () if schema is None else (schema.name, schema.encoding, schema.data)
+    decoder = _decoder_for(channel.message_encoding, *parts)
+    if decoder is None:
         name = schema.encoding if schema else "no"
         raise BadMessage(
             f"{channel.message_encoding!r} messages with {name!r} schema are not readable"
         )
-
-    def picture(data: Buffer) -> LoggedPicture:
-        with _one_error():
-            return picture_in(reader.decode(data))
-
-    def stamp(data: Buffer) -> int:
-        if reader.stamp is None:
-            return picture(data).stamp_ns
-        with _one_error():
-            return nanoseconds(reader.stamp(data))
-
-    def fields(data: Buffer) -> Any:
-        with _one_error():
-            return reader.decode(data)
-
-    return Decoder(picture, stamp, fields)
+    return decoder
 
 
 def message_stamp(channel: Channel, schema: Schema | None, message: Message) -> int | None:
     """Return a message's stamp; None if its fields contradict its length or cannot be read."""
-    reader = _reader(channel, schema)
-    if reader is not None and reader.is_whole is not None and not reader.is_whole(message.data):
-        return None
-    try:
-        return decoder_for(channel, schema).picture(message.data).stamp_ns
-    except BadMessage:
-        return None
-
-
-def _reader(channel: Channel, schema: Schema | None) -> MessageReader | None:
-    parts = () if schema is None else (schema.name, schema.encoding, schema.data)
-    return _reader_for(channel.message_encoding, *parts)
+    with suppress(BadMessage):
+        decoder = decoder_for(channel, schema)
+        if decoder.reader.is_whole(message.data):
+            return decoder.picture(message.data).stamp_ns
+    return None
 
 
 @lru_cache(maxsize=64)
-def _reader_for(message_encoding: str, *parts: Any) -> MessageReader | None:
-    """Return what reads the messages of a schema, whichever channels and files share it."""
+def _decoder_for(message_encoding: str, *parts: Any) -> Decoder | None:
+    """Return what decodes the messages of a schema, whichever channels and files share it."""
     encoding = message_encodings().get(message_encoding)
     if encoding is None:
         return None
     name, schema_encoding, data = parts or ("", "", b"")
     schema = Schema(id=1, name=name, encoding=schema_encoding, data=data) if parts else None
-    return encoding.reader(schema)
+    reader = encoding.reader(schema)
+    return Decoder(reader) if reader else None
 
 
 @contextmanager
@@ -268,12 +260,8 @@ class Video:
         self._av: Final = av
         self._packets = packets
         self._limits = limits
-        self._decoder: Any = None
-        self._next = 0
-        self._broken = ""
-        self._damaged = False
-        self._waiting: dict[int, Picture] = {}
-        self._ready: dict[int, DecodedPicture | FrameError] = {}
+        self._ready: dict[int, DecodedPicture | FrameError]
+        self._begin(0)
 
     def __len__(self) -> int:
         return len(self._packets)
@@ -283,109 +271,97 @@ class Video:
 
         A `FrameError` if it, or one that it builds upon, cannot be decoded.
         """
-        if position not in self._ready:
-            self._go_to(position)
-        last = min(position + PATIENCE, len(self._packets) - 1)
-        while position not in self._ready and self._next <= last:
-            self._feed(self._next)
-            self._next += 1
-        if position not in self._ready and self._next == len(self._packets):
-            with suppress(BadMessage):
-                self._drain(None)
-            self._decoder = None
-        found = self._ready.pop(position, None)
+        if position not in self._ready and not 0 <= position - self._next <= PATIENCE:
+            keyframe = self._keyframe(position)
+            if position < self._next or keyframe > self._next:
+                self._begin(keyframe)
+        while position not in self._ready and self._next <= position + PATIENCE:
+            if not next(self._steps, False):
+                break
+        found = self._ready.pop(position, FrameError("the decoder gave no picture for it"))
         self._ready = {ready: late for ready, late in self._ready.items() if ready > position}
-        if found is None:
-            raise FrameError("the decoder gave no picture for it")
         if isinstance(found, FrameError):
             raise found
         return found
 
-    def _go_to(self, position: int) -> None:
-        """Begin at the keyframe before a position, unless decoding on gets there sooner."""
-        if self._next <= position <= self._next + PATIENCE:
-            return
-        keyframe = self._keyframe(position)
-        if position < self._next or keyframe > self._next:
-            self._decoder, self._waiting, self._ready = None, {}, {}
-            self._next, self._broken, self._damaged = keyframe, "", False
+    def _begin(self, position: int) -> None:
+        self._next, self._damaged = position, False
+        self._ready = {}
+        self._steps = self._decode(position)
 
     def _keyframe(self, position: int) -> int:
         """Position of the last keyframe at or before ``position``."""
         for candidate in range(position, max(position - FARTHEST_KEY, -1), -1):
-            try:
-                packet = self._packets.picture(candidate)
-            except FrameError:
-                continue
-            if is_keyframe(packet):
-                return candidate
+            with suppress(FrameError):
+                if is_keyframe(self._packets.picture(candidate)):
+                    return candidate
         return position
 
-    def _feed(self, position: int) -> None:
-        try:
-            packet = self._packets.picture(position)
-        except FrameError as error:
-            self._broken = "a frame that it builds upon is lost"
-            self._ready[position] = error
-            return
-        if is_keyframe(packet):
-            self._broken = ""
-        elif self._decoder is None:
-            self._broken = "the video has no keyframe before it"
-        if self._broken:
-            self._ready[position] = FrameError(self._broken)
-            return
-        try:
-            codec = codec_of(packet)
-            if self._decoder is None:
-                if codec is None:
-                    raise BadMessage("its video codec is unknown")
-                self._decoder = self._av.CodecContext.create(_DECODERS.get(codec, codec), "r")
-                self._decoder.thread_count = 1
-                self._decoder.options = {"max_pixels": str(self._limits.max_pixels)}
-            self._waiting[position] = packet
-            unit = self._av.Packet(bytes(packet.data))
-            unit.pts = unit.dts = position
-            self._drain(unit)
-        except BadMessage as error:
-            self._ready[position] = FrameError(str(error))
-            self._broken = "a frame that it builds upon is lost"
+    def _decode(self, begin: int) -> Iterator[bool]:
+        """Decode from a keyframe on, a packet a step; the frames come into ``_ready``."""
+        decoder: Any = None
+        waiting, broken = dict[int, Picture](), ""
+        for position in range(begin, len(self._packets)):
+            self._next = position + 1
+            try:
+                packet = self._packets.picture(position)
+                if is_keyframe(packet):
+                    broken = ""
+                elif decoder is None:
+                    broken = "the video has no keyframe before it"
+                if broken:
+                    raise FrameError(broken)
+                decoder = decoder or self._decoder(packet)
+                waiting[position] = packet
+                unit = self._av.Packet(bytes(packet.data))
+                unit.pts = unit.dts = position
+                self._take(decoder, unit, waiting)
+            except (BadMessage, FrameError) as error:
+                self._ready[position] = FrameError(str(error))
+                broken = broken or "a frame that it builds upon is lost"
+            yield True
+        if decoder is not None:
+            with suppress(BadMessage):
+                self._take(decoder, None, waiting)
+        yield True
 
-    def _drain(self, unit: Any) -> None:
-        if self._decoder is None:
-            return
+    def _decoder(self, packet: Picture) -> Any:
+        codec = codec_of(packet)
+        if codec is None:
+            raise BadMessage("its video codec is unknown")
+        decoder = self._av.CodecContext.create(_DECODERS.get(codec, codec), "r")
+        decoder.thread_count = 1
+        decoder.options = {"max_pixels": str(self._limits.max_pixels)}
+        return decoder
+
+    def _take(self, decoder: Any, unit: Any, waiting: dict[int, Picture]) -> None:
+        """Decode a packet, or what is left in the decoder, and note the frames that come out."""
         try:
-            frames = self._decoder.decode(unit)
+            frames = decoder.decode(unit)
         except self._av.FFmpegError as error:
-            raise BadMessage(self._reason(error)) from error
+            raise BadMessage(self._reason(decoder, error)) from error
         for frame in frames:
-            damage = self._damage_of(frame)
-            packet = self._waiting.pop(frame.pts, None)
-            if packet is not None and damage:
-                self._ready[frame.pts] = FrameError(damage)
+            # The decoder has filled in what is damaged.
+            self._damaged = frame.is_corrupt or (self._damaged and not frame.key_frame)
+            packet = waiting.pop(frame.pts, None)
+            if packet is not None and self._damaged:
+                what = "its video" if frame.is_corrupt else "a frame that it builds upon"
+                self._ready[frame.pts] = FrameError(f"{what} is damaged")
             elif packet is not None:
                 pixels = frame.to_ndarray(format="rgb24")
                 self._ready[frame.pts] = DecodedPicture(packet.stamp_ns, packet.data, pixels)
 
-    def _reason(self, error: Any) -> str:
+    def _reason(self, decoder: Any, error: Any) -> str:
         """Return why a packet cannot be decoded: its size, where the decoder tells it."""
         reason = f"its video cannot be decoded: {error.strerror}"
-        if not (self._decoder.width and self._decoder.height):
+        if not (decoder.width and decoder.height):
             most = f"{self._limits.max_pixels} pixels that `frames.max_pixels` allows"
             return f"{reason}, or it has more than the {most}"
         try:
-            self._limits.check(self._decoder.width, self._decoder.height)
+            self._limits.check(decoder.width, decoder.height)
         except ImageError as too_large:
             return str(too_large)
         return reason
-
-    def _damage_of(self, frame: Any) -> str:
-        """Return what is wrong with a frame, in which the decoder has filled in what is damaged."""
-        if frame.is_corrupt:
-            self._damaged = True
-            return "its video is damaged"
-        self._damaged &= not frame.key_frame
-        return "a frame that it builds upon is damaged" if self._damaged else ""
 
 
 def is_keyframe(packet: Picture) -> bool:

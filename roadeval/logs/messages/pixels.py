@@ -85,14 +85,26 @@ def format_of(picture: RawPicture) -> PixelFormat:
     return format_
 
 
-def rows_of(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Array:
+def raw_format(picture: RawPicture, limits: Limits) -> PixelFormat:
+    """Return the pixel format of a picture; a `BadMessage` if that or its size cannot be."""
+    format_ = format_of(picture)
+    with _bad_message():
+        limits.check(picture.width, picture.height)
+    wide, high = format_.block
+    if picture.width % wide or picture.height % high:
+        even = "width and height" if high > 1 else "width"
+        size = f"{picture.width}x{picture.height}"
+        raise BadMessage(f"an image of {size} in {picture.encoding}, which needs an even {even}")
+    return format_
+
+
+def rows_of(picture: RawPicture, limits: Limits) -> Array:
     """Return the samples of a picture as rows, without padding, in this machine's byte order.
 
-    A `BadMessage` if the data is shorter than its size says, or the size cannot be. An `ImageError`
-    if it is larger than the limits allow.
+    A `BadMessage` as of `raw_format`, or if the data is shorter than its size says.
     """
     width, height = picture.width, picture.height
-    check_size(picture, format_, limits)
+    format_ = raw_format(picture, limits)
     rows = int(height * format_.rows)
     dtype = np.dtype(format_.dtype).newbyteorder(">" if picture.big_endian else "<")
     row = width * format_.channels * dtype.itemsize
@@ -110,30 +122,19 @@ def rows_of(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Array:
     return np.ascontiguousarray(array, dtype.newbyteorder("="))
 
 
-def check_size(picture: RawPicture, format_: PixelFormat, limits: Limits) -> None:
-    """Refuse a size that the limits forbid, or that the format cannot have."""
-    limits.check(picture.width, picture.height)
-    wide, high = format_.block
-    if picture.width % wide or picture.height % high:
-        even = "width and height" if high > 1 else "width"
-        size = f"{picture.width}x{picture.height}"
-        raise BadMessage(f"an image of {size} in {picture.encoding}, which needs an even {even}")
-
-
 def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
     """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own.
 
-    A `BadMessage` or an `ImageError` if its encoding is unknown, or as of `rows_of`.
+    A `BadMessage` if its encoding is unknown, or as of `rows_of`.
     """
     import cv2
 
-    format_ = format_of(picture)
-    samples = eight_bits(rows_of(picture, format_, limits))
-    if format_.code is None:
+    samples, code = eight_bits(rows_of(picture, limits)), format_of(picture).code
+    if code is None:
         # An array of its own: a part of a message may not be written to.
         return np.require(samples, requirements=["C", "W"])
     try:
-        rgb = cv2.cvtColor(samples, getattr(cv2, format_.code))
+        rgb = cv2.cvtColor(samples, getattr(cv2, code))
     except cv2.error as error:
         size = f"{picture.width}x{picture.height}"
         raise BadMessage(f"an image of {size} in {picture.encoding}: {error.err}") from error
@@ -146,10 +147,10 @@ def to_rgb(picture: Picture, limits: Limits) -> Rgb:
     16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels. A
     `BadMessage` if it is damaged or cannot be decoded.
     """
-    with _bad_message():
-        if isinstance(picture, RawPicture):
-            return raw_to_rgb(picture, limits)
-        if isinstance(picture, CompressedPicture):
+    if isinstance(picture, RawPicture):
+        return raw_to_rgb(picture, limits)
+    if isinstance(picture, CompressedPicture):
+        with _bad_message():
             return images.to_rgb(_image_file(picture), limits)
     return picture.pixels
 
@@ -165,20 +166,11 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
     if isinstance(picture, RawPicture):
         layout = format_of(picture)
         if layout.is_grey and layout.dtype != "f4":
-            with _bad_message():
-                return rows_of(picture, layout, limits)
+            return rows_of(picture, limits)
     elif isinstance(picture, CompressedPicture):
         with _bad_message():
             return images.to_labels(_image_file(picture), limits)
     return without_colours(to_rgb(picture, limits))
-
-
-def raw_format(picture: RawPicture, limits: Limits) -> PixelFormat:
-    """Return the pixel format of a picture; a `BadMessage` if that or its size cannot be."""
-    with _bad_message():
-        format_ = format_of(picture)
-        check_size(picture, format_, limits)
-        return format_
 
 
 def size_of(picture: Picture) -> tuple[int, int] | None:

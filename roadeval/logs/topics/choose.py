@@ -103,9 +103,7 @@ def choose_truth(
     truth = _only(_clear_truths(own, image, colors=colors), image, "label", "`topics.truth`")
     if truth is not None:
         by = "colours" if truth.channels == 3 else "single channel"
-        is_rig = bool(_other_cameras(topics, image))
-        no_others = ", and no other camera's by path and frame_id" if is_rig else ""
-        return Choice(truth, f"the label image, by its name and its {by}{no_others}")
+        return Choice(truth, f"the label image, by its name and its {by}")
     if others := _clear_truths(roads, image, colors=colors):
         whose = f"{others[0].name} belongs to another camera than {image.name}, by "
         whose += elsewhere[others[0].name]

@@ -222,9 +222,8 @@ class TopicReader:
         table = np.concatenate(rows)
         table = table[np.argsort(table[:, 0], kind="stable")]
         self.log_times: npt.NDArray[np.int64] = np.ascontiguousarray(table[:, 0])
-        self._offsets = table[:, 1]
-        self._numbers = table[:, 2].astype(np.int16)
-        self._chunks = table[:, 3].astype(np.int32)
+        self._places = table[:, 1:]
+        """Of each message the offset, the number of its channel here, and that of its chunk."""
         # An array of Python's own: each image asks for some thirty stamps, one by one.
         self._stamps = array("q", [UNREAD]) * len(table)
         self._kept: dict[int, Message] = {}
@@ -237,7 +236,7 @@ class TopicReader:
         if position in self._kept:
             return self._kept[position]
         message = self._read(position)
-        if message is None and int(self._chunks[position]) != OUTSIDE:
+        if message is None and self._places[position, 2] != OUTSIDE:
             self._correct(position)
             message = self._read(position)
         if message is None:
@@ -252,8 +251,8 @@ class TopicReader:
 
     def _read(self, position: int) -> Message | None:
         """Read a message; None if it is not the one that the index lists."""
-        source = self.channels[self._numbers[position]]
-        chunk, offset = int(self._chunks[position]), int(self._offsets[position])
+        offset, number, chunk = self._places[position].tolist()
+        source = self.channels[number]
         try:
             message: Message = source.container.message(chunk, offset)
         except BadRecord as error:
@@ -265,14 +264,14 @@ class TopicReader:
 
     def _correct(self, position: int) -> None:
         """Correct the places of a chunk's messages by looking into the chunk."""
-        number, chunk = self._numbers[position], self._chunks[position]
+        _, number, chunk = self._places[position].tolist()
         source = self.channels[number]
-        here = np.flatnonzero((self._numbers == number) & (self._chunks == chunk))
-        listed = {(int(self.log_times[i]), int(self._offsets[i])): i for i in here}
-        found = [tuple(e) for e in source.container.look(int(chunk), source.channel_id).tolist()]
+        here = np.flatnonzero((self._places[:, 1:] == (number, chunk)).all(axis=1))
+        listed = {(int(self.log_times[i]), int(self._places[i, 0])): i for i in here}
+        found = [tuple(e) for e in source.container.look(chunk, source.channel_id).tolist()]
         missed = [entry for entry in found if entry not in listed]
         for wrong, right in zip(sorted(listed.keys() - {*found}), missed, strict=False):
-            self.log_times[listed[wrong]], self._offsets[listed[wrong]] = right
+            self.log_times[listed[wrong]], self._places[listed[wrong], 0] = right
 
     def picture(self, position: int) -> LoggedPicture:
         """Read the picture of a message; a `FrameError` if it cannot be read or decoded."""
@@ -306,8 +305,8 @@ class TopicReader:
 
     def is_lost(self, position: int) -> bool:
         """Return whether a message lies in a chunk that was found to be unreadable."""
-        source = self.channels[self._numbers[position]]
-        return bool(source.container.is_bad(int(self._chunks[position])))
+        _, number, chunk = self._places[position].tolist()
+        return self.channels[number].container.is_bad(chunk)
 
     def expected(self) -> int:
         """Return how many messages there should be, by the files' own statistics."""
@@ -328,15 +327,15 @@ class TopicReader:
 
     def readable(self) -> int:
         """Count the messages of the log, without those in chunks found to be damaged."""
-        lost = 0
-        for number, source in enumerate(self.channels):
-            found = np.unique(self._chunks[self._numbers == number], return_counts=True)
-            for chunk, count in zip(*found, strict=True):
-                lost += source.container.is_bad(int(chunk)) * int(count)
-        return len(self) - lost
+        chunks, counts = np.unique(self._places[:, 1:], axis=0, return_counts=True)
+        return sum(
+            count
+            for (number, chunk), count in zip(chunks.tolist(), counts.tolist(), strict=True)
+            if not self.channels[number].container.is_bad(chunk)
+        )
 
     def _decoder(self, position: int) -> Decoder:
-        source = self.channels[self._numbers[position]]
+        source = self.channels[self._places[position, 1]]
         return decoder_for(source.channel, source.schema)
 
     def _error(self, position: int, reason: str) -> FrameError:

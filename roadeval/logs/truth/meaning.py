@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -127,7 +127,7 @@ class Confidence:
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes confidences")
         if isinstance(picture, RawPicture) and format_of(picture).dtype == "f4":
-            values = rows_of(picture, format_of(picture), limits)
+            values = rows_of(picture, limits)
             if not ((values >= 0) & (values <= 1)).all():
                 raise BadMessage("it holds a confidence that is not from 0 to 1")
             return np.rint(values.astype(np.float64) * TOP).astype(np.uint16)
@@ -171,14 +171,14 @@ def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMa
     """
     pictures = Counter(seen)
     values = sorted(pictures)
-    for setting, given in (("road", labels.road), ("ignore", labels.ignore)):
-        for each in given:
-            if isinstance(each, str):
-                raise LogError(
-                    f"`labels.{setting}` {each}: {name} has no names of classes; give its value"
-                )
     if labels.road or labels.road_colors:
-        return _as_given(labels, values, name)
+        by_color = bool(labels.road_colors)
+        text = _color_name if by_color else str
+        wanted = labels.road, labels.ignore
+        if by_color:
+            wanted = (*map(_packed, labels.road_colors),), (*map(_packed, labels.ignore_colors),)
+        there = f"{name}, whose frames hold {_listed(map(text, values))}"
+        return _as_given(wanted, {value: value for value in values}, there, by_color=by_color)
     for meaning in _MASKS:
         # A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would
         # be ignored.
@@ -194,23 +194,25 @@ def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMa
     )
 
 
-def _as_given(labels: LabelSettings, seen: list[int], name: str) -> ClassMap:
-    """Return the meaning of the values, or of the colours, that the settings name."""
-    by_color = bool(labels.road_colors)
+def _as_given(
+    wanted: tuple[Iterable[Any], Iterable[Any]],
+    codes: Mapping[Any, int],
+    there: str,
+    *,
+    by_color: bool = False,
+) -> ClassMap:
+    """Return the meaning of values, colours or classes, by what is road and what is ignored.
+
+    ``codes`` has the value of each that occurs, ``there`` says of whom and which.
+    """
     ending, text = ("_colors", _color_name) if by_color else ("", str)
-    wanted = {
-        "road": [*map(int, labels.road), *map(_packed, labels.road_colors)],
-        "ignore": [*map(int, labels.ignore), *map(_packed, labels.ignore_colors)],
-    }
-    for setting, values in wanted.items():
-        for value in values:
-            if value not in seen:
-                raise LogError(
-                    f"`labels.{setting}{ending}` {text(value)} does not occur in {name}, whose "
-                    f"frames hold {_listed(map(text, seen))}"
-                )
-    meaning = dict.fromkeys(wanted["road"], ROAD) | dict.fromkeys(wanted["ignore"], IGNORE)
-    return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, v) for v in wanted.values())))
+    meaning: dict[int, int] = {}
+    for setting, given, truth in zip(("road", "ignore"), wanted, (ROAD, IGNORE), strict=True):
+        for each in given:
+            if each not in codes:
+                raise LogError(f"`labels.{setting}{ending}` {text(each)} does not occur in {there}")
+            meaning[codes[each]] = truth
+    return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, each) for each in wanted)))
 
 
 ALONE: Final = "road"
@@ -224,27 +226,19 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     one that does not occur.
     """
     classes = origin.classes
-    if not labels.road and {*classes} == {ALONE}:
-        labels = LabelSettings((ALONE,), labels.ignore)
-    # A class may be called 7.
-    labels = LabelSettings(tuple(map(str, labels.road)), tuple(map(str, labels.ignore)))
+    road = labels.road or ((ALONE,) if {*classes} == {ALONE} else ())
     known = _counted(origin, classes)
-    if not labels.road:
+    if not road:
         raise LogError(
             f"{name} has the classes {known}: name those that mean road with `labels.road`, and "
             "those to leave out with `labels.ignore`"
         )
-    meaning: dict[int, int] = {}
-    for setting, given, truth in (("road", labels.road, ROAD), ("ignore", labels.ignore, IGNORE)):
-        for each in map(str, given):
-            if each not in classes:
-                where = f"{name}, which has the classes {known}"
-                raise LogError(f"`labels.{setting}` {each} does not occur in {where}")
-            meaning[classes[each]] = truth
-    words = _words(map(str, labels.road), map(str, labels.ignore))
-    if rest := [each for each in classes if classes[each] not in meaning]:
-        words += f"; non-road is all else, {_counted(origin, rest)}"
-    return ClassMap(meaning, NON_ROAD, False, words)
+    # A class may be called 7.
+    wanted = [*map(str, road)], [*map(str, labels.ignore)]
+    found = _as_given(wanted, classes, f"{name}, which has the classes {known}")
+    rest = [each for each in classes if classes[each] not in found.meaning]
+    words = f"; non-road is all else, {_counted(origin, rest)}" if rest else ""
+    return replace(found, words=found.words + words)
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:

@@ -449,19 +449,15 @@ def check_times(pairing: Pairing, name: str, clock: Clock) -> None:
     if not len(pairing.labels):
         raise LogError(f"{name}: the log has no times to pair by; set `truth.pair` to number")
     if next(frames_of(pairing), None) is None:
-        theirs, ours = (_some_times(each) for each in (pairing.labels, pairing.images))
+        theirs, ours = (
+            f"{each.stamp(0)} to {each.stamp(len(each) - 1)}"
+            for each in (pairing.labels, pairing.images)
+        )
         raise LogError(
             f"{name}: none of them belongs to a frame by {clock}: theirs are {theirs} ns, the "
             f"frames' {ours} ns; at most {pairing.tolerance / 1e6:g} ms may lie between "
             "(`topics.sync_tolerance_ms`), or pair by number (`truth.pair`)"
         )
-
-
-def _some_times(stamps: Stamps) -> str:
-    """Return the first three times, and the last one, for messages."""
-    count = len(stamps)
-    first = ", ".join(str(stamps.stamp(place)) for place in range(min(3, count)))
-    return first if count <= 3 else f"{first}, ... {stamps.stamp(count - 1)}"
 
 
 def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) -> Pairing:
@@ -485,28 +481,16 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
             "made of all of them: leave `truth.images` out, and pair by number or stamp"
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
-    if not inside:
+    is_shifted = named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames)
+    if not inside or is_shifted:
+        which = "only some" if inside else "none"
         raise LogError(
-            f"{name}: none of them belongs to a frame by {labels.by}: theirs are {keys[0] + first} "
-            f"to {keys[-1] + first} ({some([label.path for label in labels.labels])}), the frames' "
-            f"{first} to {first + frames - 1}{_help(labels, first)}"
-        )
-    if named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames):
-        raise LogError(
-            f"{name}: its numbers are {first + 1} to {first + frames}, and the frames' {first} to "
-            f"{first + frames - 1}: if it begins at the first frame, set `truth.first` to "
-            f"{first + 1}"
+            f"{name}: {which} of them belong to a frame by {labels.by}: theirs are "
+            f"{keys[0] + first} to {keys[-1] + first} ({some([e.path for e in labels.labels])}), "
+            f"the frames' {first} to {first + frames - 1}: if {keys[0] + first} is the first "
+            "frame's, set `truth.first` to it; or name the folder of the images that the log was "
+            "made of with `truth.images`"
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
     unsure = frames - images.sure
     return Pairing(Times(range(frames), images.sure), labels, 0, unused=unused, unsure=unsure)
-
-
-def _help(labels: NamedLabels, first: int) -> str:
-    """Return the setting by which labels without a frame may find theirs."""
-    keys = labels.log_times
-    by_name = "name the folder of the images that the log was made of with `truth.images`"
-    if keys[-1] - keys[0] == len(keys) - 1:
-        number = keys[0] + first
-        return f": if {number} is the first frame's, set `truth.first` to {number}; or {by_name}"
-    return f": {by_name}"

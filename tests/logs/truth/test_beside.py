@@ -90,8 +90,8 @@ def replay(drive: Path, path: Path, *words: Any):
 def test_numbers_from_one_are_refused_with_the_setting_that_shifts_them(drive, tmp_path):
     path = images(tmp_path / "truth", *(f"{number}.png" for number in range(1, FRAMES + 1)))
     message = refusal(drive, path)
-    assert "its numbers are 1 to 6, and the frames' 0 to 5" in message
-    assert message.endswith("set `truth.first` to 1")
+    assert "theirs are 1 to 6 (1.png, 2.png, 3.png, ...), the frames' 0 to 5" in message
+    assert "if 1 is the first frame's, set `truth.first` to it" in message
     assert select(drive, path, first=1)[1] == [*range(FRAMES)]
 
 

@@ -59,7 +59,7 @@ def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
 
 @pytest.mark.parametrize("setting", ["road", "ignore"])
 def test_a_name_for_labels_without_names_is_refused(setting: str) -> None:
-    with pytest.raises(LogError, match=f"`labels.{setting}` sky: /labels has no names"):
+    with pytest.raises(LogError, match=f"`labels.{setting}` sky does not occur in /labels"):
         understand(LabelSettings(**{"road": (3,), setting: ("sky",)}), [0, 3], "/labels")
 
 

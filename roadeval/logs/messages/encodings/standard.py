@@ -36,7 +36,7 @@ def _cdr(schema: Schema | None) -> MessageReader | None:
     decode = decode_by_library(DecoderFactory(), "cdr", schema)
     fields = fields_of(schema)
     if fields is None:
-        return None if decode is None else MessageReader(lambda data: decode(_uncompressed(data)))
+        return decode and MessageReader(lambda data: decode(_uncompressed(data)))
     layouts = Layouts(fields, _after_head, PADDING)
     return MessageReader(
         lambda data: layouts.read(_uncompressed(data), decode),
@@ -130,7 +130,7 @@ def _protobuf(schema: Schema | None) -> MessageReader | None:
     from mcap_protobuf.decoder import DecoderFactory
 
     decode = decode_by_library(DecoderFactory(), "protobuf", schema)
-    return None if decode is None else MessageReader(decode)
+    return decode and MessageReader(decode)
 
 
 # --- The encoding of ROS 1: fields in the machine's order, without alignment ----------------------
@@ -142,7 +142,7 @@ def _ros1(schema: Schema | None) -> MessageReader | None:
     decode = decode_by_library(DecoderFactory(), "ros1", schema)
     fields = fields_of(schema)
     if fields is None:
-        return None if decode is None else MessageReader(decode)
+        return decode and MessageReader(decode)
     layouts = Layouts(fields, partial(FieldReader, order="<", start=0, aligned=False))
     return MessageReader(lambda data: layouts.read(data, decode))
 
