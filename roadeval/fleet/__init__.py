@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.fleet.entry import DriveEntry, FleetError, shown
+    from roadeval.fleet.drives import DriveEntry, FleetError, find_drives, shown
     from roadeval.fleet.remote import readable, stamp
-    from roadeval.fleet.sources import find_drives
 
 if not TYPE_CHECKING:  # there every name is known
     __getattr__ = on_demand(__name__)

@@ -13,7 +13,7 @@ from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
-from roadeval.fleet.entry import FleetError
+from roadeval.fleet.drives import FleetError
 
 ATTEMPTS: Final = 2
 """Attempts at a drive whose worker dies; on a cluster the scheduler's settings decide."""

@@ -24,7 +24,7 @@ from threading import Thread
 from typing import IO, Any, Final, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 
-from roadeval.fleet.entry import (
+from roadeval.fleet.drives import (
     BUCKETS,
     FleetError,
     bucket_and_key,

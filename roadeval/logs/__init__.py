@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     )
     from roadeval.logs.topics.reader import TopicInfo
     from roadeval.logs.truth.drawn import Proposal
+    from roadeval.logs.truth.labels import LabelSource, label_files
     from roadeval.logs.truth.picks import (
         PICK,
         Picked,
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
         digest_of,
         proposal_files,
     )
-    from roadeval.logs.truth.source import LabelSource, label_files
     from roadeval.logs.writing.writer import LogWriter, NoSidecar, PackResult, SidecarWriter, pack
 
 if not TYPE_CHECKING:  # there every name is known

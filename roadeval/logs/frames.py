@@ -24,10 +24,9 @@ from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
 from roadeval.logs.topics.calibration import calibration_of
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
-from roadeval.logs.truth.meaning import Labels
-from roadeval.logs.truth.pairing import REACH, Camera, Clock, Partners, by_time, frames_of
-from roadeval.logs.truth.source import (
+from roadeval.logs.truth.labels import (
     Label,
+    Labels,
     LabelSource,
     check_size,
     meaning_of,
@@ -35,6 +34,7 @@ from roadeval.logs.truth.source import (
     read_or_error,
     samples,
 )
+from roadeval.logs.truth.pairing import REACH, Camera, Clock, Partners, by_time, frames_of
 
 TRUTH: Final = "/truth"
 SHADOW: Final = "/shadow"

@@ -23,8 +23,8 @@ from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import choose_truth, named
 from roadeval.logs.topics.reader import TopicInfo, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
+from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
 from roadeval.logs.truth.pairing import frames_of, with_keys
-from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
 from roadeval.runtime.text import visible
 
 SMALL: Final = 50_000_000

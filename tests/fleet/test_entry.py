@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.fleet.entry import FleetError, deal, entry_of, groups_of
+from roadeval.fleet.drives import FleetError, deal, entry_of, groups_of
 from roadeval.logs.container.records import MAGIC
 
 DRIVES = {f"drive{k}": f"day{k // 3}" for k in range(30)}

@@ -8,7 +8,7 @@ import pytest
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.fleet import find_drives
-from roadeval.fleet.entry import identity
+from roadeval.fleet.drives import identity
 from tests.fixtures.elsewhere import split_bag, talker
 
 LOG = talker(3).bytes()

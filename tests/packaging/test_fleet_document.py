@@ -7,7 +7,7 @@ import duckdb
 import pytest
 
 import roadeval
-from roadeval.fleet.sources import read_manifest
+from roadeval.fleet.drives import read_manifest
 from tests.results.fleet.making import fleet_of
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "fleet.md"

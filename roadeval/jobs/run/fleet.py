@@ -12,9 +12,8 @@ from typing import Any
 
 from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
+from roadeval.fleet.drives import DriveEntry, FleetError, deal, find_drives, groups_of, shuffled
 from roadeval.fleet.engine import ATTEMPTS, died, started
-from roadeval.fleet.entry import DriveEntry, FleetError, deal, groups_of, shuffled
-from roadeval.fleet.sources import find_drives
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
     Done,
@@ -77,7 +76,7 @@ def replay_fleet(
     ----------
     drives
         Logs, rosbag2 folders, folders that are searched, patterns, URLs, and manifests: see
-        `roadeval.fleet.sources.find_drives`.
+        `roadeval.fleet.drives.find_drives`.
     output
         The fleet's folder, which the workers must see under the same path.
     config

@@ -22,7 +22,7 @@ from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, Ru
 from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import final_stages
-from roadeval.fleet.entry import DriveEntry, FleetError
+from roadeval.fleet.drives import DriveEntry, FleetError
 from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import asked, software
 from roadeval.jobs.run.replay import replay

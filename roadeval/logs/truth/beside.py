@@ -6,7 +6,7 @@ import io
 from collections import Counter
 from collections.abc import Collection, Sequence
 from functools import cache, partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final
 from xml.etree.ElementTree import ParseError, XMLParser, fromstring
@@ -75,7 +75,7 @@ def _labels_of(files: Sequence[Path], path: Path, size: Size | None) -> LabelSet
 def _readers() -> dict[str, list[LabelFormat]]:
     """Return the formats by the endings of their files."""
     found: dict[str, list[LabelFormat]] = {}
-    for each in found_in(formats, "FORMAT"):
+    for each in chain(*found_in(formats, "FORMATS")):
         found.setdefault(each.ending, []).append(each)
     return found
 

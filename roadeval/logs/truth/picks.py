@@ -20,7 +20,7 @@ from roadeval.data import ROAD, Truth
 from roadeval.images import Limits
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import PROPOSED, Proposal
-from roadeval.logs.truth.formats import coco, cvat, labelme
+from roadeval.logs.truth.formats import standard
 from roadeval.runtime.documents import read_bounded, read_json
 
 PICK: Final = "pick.json"
@@ -29,7 +29,7 @@ PROPOSALS: Final = "proposals"
 LABELS: Final = "labels"
 """What the folder of picked frames holds: this file, and these folders."""
 FORMAT: Final = {"name": "roadeval-pick", "version": 1}
-WRITTEN: Final = {"coco": coco.FORMAT, "labelme": labelme.FORMAT, "cvat": cvat.FORMAT}
+WRITTEN: Final = {"coco": standard.COCO, "labelme": standard.LABELME, "cvat": standard.CVAT}
 """Formats of annotation tools in which masks to correct are written."""
 
 

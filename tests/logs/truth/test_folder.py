@@ -12,9 +12,8 @@ from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.truth.beside import labels_in, npy_picture
-from roadeval.logs.truth.meaning import Confidence
+from roadeval.logs.truth.labels import Confidence, log_and_topic
 from roadeval.logs.truth.pairing import NamedLabels, with_keys
-from roadeval.logs.truth.source import log_and_topic
 from tests.logs.making import png
 
 

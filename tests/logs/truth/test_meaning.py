@@ -11,7 +11,7 @@ from roadeval.logs import LabelSettings, LogError
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
-from roadeval.logs.truth.meaning import seen_in, understand
+from roadeval.logs.truth.labels import seen_in, understand
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()

@@ -1,1 +1,1 @@
-"""Label formats: files in which annotation tools keep shapes, a module for each."""
+"""Label formats: files in which annotation tools keep shapes; ``FORMATS`` of each file here."""
