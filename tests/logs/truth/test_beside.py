@@ -23,7 +23,7 @@ from roadeval.logs import (
 )
 from roadeval.logs.errors import FrameError
 from roadeval.logs.truth.beside import GREATEST, labels_in
-from roadeval.logs.truth.formats.coco import lengths_in
+from roadeval.logs.truth.formats.standard import lengths_in
 from tests.e2e.commands import here
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 from tests.logs.truth.test_folder import opened
