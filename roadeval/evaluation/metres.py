@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import CODES, NON_ROAD, ROAD, Histogram, Probability, Truth
-from roadeval.data.arrays import Bits, Floats, Matrix, TruthBits, pack, unpack
+from roadeval.data.arrays import Bits, Floats, Matrix, Plane, Sums, TruthBits, pack, unpack
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import Ground
 from roadeval.geometry.plan import OUTSIDE, Plan, pixels_of
@@ -118,7 +118,7 @@ class Survey:
         return np.array(counts, np.uint32)
 
     @cached_property
-    def _cells(self) -> npt.NDArray[np.int64]:
+    def _cells(self) -> Sums:
         """How many cells of the ground seen from above each pixel stands for, ``(S, H, W)``.
 
         A cell takes the pixel in which its centre lies.
@@ -194,17 +194,19 @@ class Survey:
         road, labelled, *own = (_runs(each, ends) for each in taken)
         found = np.full((len(own), len(lines), 2, 2), np.nan)
         for number, line in enumerate(lines):
-            known = labelled[number]
+            known, borders = labelled[number], line.borders
             if number % places == places - 1:
-                end, start, cap = _ahead(road[number], known, line.borders)
+                end, start, cap = _ahead(road[number], known, borders)
                 found[:, number, 0, 1] = end
+                nothing = borders[start] if known else math.nan
                 for place, runs in enumerate(own):
-                    found[place, number, 0, 0] = _free(runs[number], start, cap, line.borders)
+                    found[place, number, 0, 0] = _free(runs[number], start, cap, borders, nothing)
                 continue
-            *sides, middle = _sides(road[number], line.borders, 0.0, known)
+            *sides, middle = _sides(road[number], known, borders, 0.0)
             found[:, number, :, 1] = sides
+            whole = [(0, len(line.pixels))]
             for place, runs in enumerate(own):
-                found[place, number, :, 0] = _sides(runs[number], line.borders, middle)[:2]
+                found[place, number, :, 0] = _sides(runs[number], whole, borders, middle)[:2]
         by_stance = found.reshape(len(own), self.stances, 2 * places, 2)
         return by_stance[:, :, :-1]
 
@@ -228,7 +230,7 @@ Runs = list[tuple[int, int]]
 """The first pixel of each stretch on a line, and the one after its last."""
 
 
-def _runs(flags: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> list[Runs]:
+def _runs(flags: Plane, ends: Sums) -> list[Runs]:
     """Return the stretches of pixels that are set, line by line; ``ends`` are the lines' ends."""
     padded = np.concatenate([[0], flags, [0]])
     changed = np.asarray(padded[1:] != padded[:-1])
@@ -248,8 +250,6 @@ def _runs(flags: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> list[Run
 
 def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
     """Join stretches with less than ``gap`` metres between them."""
-    if len(runs) < 2:
-        return runs
     joined: Runs = []
     for start, stop in runs:
         if joined and abs(borders[start] - borders[joined[-1][1]]) < gap:
@@ -260,12 +260,11 @@ def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
 
 
 def _sides(
-    runs: Runs, borders: list[float], middle: float, known: Runs | None = None
+    runs: Runs, known: Runs, borders: list[float], middle: float
 ) -> tuple[float, float, float]:
     """Return the left and the right end of the road nearest to a place, and its middle, in metres.
 
-    An end beyond which nothing is known is NaN: by default all of the line is. Without road all
-    three are, but for the middle.
+    An end beyond which nothing is known is NaN. Without road all three are, but for the middle.
     """
     best, far = None, math.inf
     for start, stop in _joined(runs, borders, GAP):
@@ -275,13 +274,9 @@ def _sides(
     if best is None:
         return math.nan, math.nan, middle
     start, stop = best
-    left, right = start > 0, stop < len(borders) - 1
-    if known is not None:
-        left = any(first < start <= end for first, end in known)
-        right = any(first <= stop < end for first, end in known)
     return (
-        borders[start] if left else math.nan,
-        borders[stop] if right else math.nan,
+        borders[start] if any(first < start <= end for first, end in known) else math.nan,
+        borders[stop] if any(first <= stop < end for first, end in known) else math.nan,
         (borders[start] + borders[stop]) / 2,
     )
 
@@ -297,11 +292,9 @@ def _ahead(road: Runs, known: Runs, borders: list[float]) -> tuple[float, int, f
     return _free(road, start, borders[stop], borders, math.nan), start, borders[stop]
 
 
-def _free(
-    runs: Runs, start: int, cap: float, borders: list[float], nothing: float | None = None
-) -> float:
+def _free(runs: Runs, start: int, cap: float, borders: list[float], nothing: float) -> float:
     """Return how far the road reaches from a pixel on, in metres, at most to ``cap``."""
     for first, stop in _joined(runs, borders, GAP_AHEAD):
         if first <= start < stop:
             return min(borders[stop], cap)
-    return borders[start] if nothing is None and not math.isnan(cap) else math.nan
+    return nothing

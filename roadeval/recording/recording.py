@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 
 from roadeval.data import ERRORS, Rows, VariantLayout
+from roadeval.data.arrays import Plane
+from roadeval.data.result import Cells
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError, SeveralCamerasError
 from roadeval.recording.rrd_file import RrdFile, Span, flat, whole
@@ -173,15 +174,15 @@ class Recording:
         """Return the sentences about a frame."""
         return self._notes.get(frame, ())
 
-    def image(self, frame: int) -> npt.NDArray[np.uint8]:
+    def image(self, frame: int) -> Plane:
         """Return the camera's image, ``(H, W, 3)`` uint8 RGB."""
         return self._array(at.CAMERA, frame)
 
-    def truth(self, frame: int) -> npt.NDArray[np.uint8]:
+    def truth(self, frame: int) -> Plane:
         """Return the truth, ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored."""
         return self._array(at.TRUTH_PATH, frame)
 
-    def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any]:
+    def layer(self, variant: str, name: str, frame: int) -> Cells:
         """Return a layer of a variant on a frame.
 
         A `RecordingError` if there is no such layer, or not on this frame. A `DamagedError` if it
@@ -221,7 +222,7 @@ class Recording:
                 check_texts(own)
         return {frame: tuple(own) for frame, own in notes.items()}
 
-    def _array(self, path: str, frame: int) -> npt.NDArray[Any]:
+    def _array(self, path: str, frame: int) -> Cells:
         if path not in self._codecs:
             known = ", ".join(sorted(self._codecs))
             raise RecordingError(f"{self.path}: there is no {path}; there are {known}")

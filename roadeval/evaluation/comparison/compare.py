@@ -356,9 +356,7 @@ class _Against:
         self._known: dict[str, None] = {}  # the regions of all drives
         self.moved: list[MovedFrame] = []
         self.disagreements: list[Disagreement] = []
-        firsts: dict[str | None, str] = {}
-        for part in new.scored:
-            firsts.setdefault(part.digest, part.drive)
+        firsts = {part.digest: part.drive for part in reversed(new.scored)}
         before = {id(own): other for other, own in pairs}
         for part in new.scored:
             masks, other = new.masks(part), before.get(id(part))
@@ -400,8 +398,7 @@ class _Against:
             first = next((pair for pair in pairs if pair.final), pairs[-1])
             self.moved = [*moved_frames(self.label, first)]
             if self._across:
-                names = self._base.label, self.label
-                table = new.rows("disagreements")
+                table, names = new.rows("disagreements"), (self._base.label, self.label)
                 self.disagreements = [*disagreements(table, pairs[0].new, *names)]
 
     def _on_drive(self, part: Part, group: str, pair: MaskPair, *, tested: bool) -> _OnDrive:

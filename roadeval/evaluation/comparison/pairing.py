@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rows
+from roadeval.data.arrays import Flags, Sums
 from roadeval.data.words import first_of
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.regions import titles
@@ -195,12 +196,12 @@ _LABELS: Final = np.array([[1, 1], [1, 0], [1, 0], [1, 1]])
 """Makes labelled pixels and road of TP, TN, FP and FN."""
 
 
-def truth_differs(base: FourCounts, new: FourCounts) -> npt.NDArray[np.bool_]:
+def truth_differs(base: FourCounts, new: FourCounts) -> Flags:
     """Return on which frames the truth's road or labelled pixels differ, ``(n,)``."""
     return np.asarray((base @ _LABELS != new @ _LABELS).any(axis=1))
 
 
-def matched(base: npt.NDArray[np.int64], new: npt.NDArray[np.int64]) -> tuple[Places, Places]:
+def matched(base: Sums, new: Sums) -> tuple[Places, Places]:
     """Return the places of the stamps that both have, in the base's order.
 
     Frames with equal stamps are matched in their order.
@@ -289,7 +290,7 @@ def region_counts(regions: Rows, mask: FrameCounts) -> dict[str, FourCounts]:
 
 def common_regions(
     base: Mapping[str, FourCounts], new: Mapping[str, FourCounts]
-) -> Iterator[tuple[str, npt.NDArray[np.bool_]]]:
+) -> Iterator[tuple[str, Flags]]:
     """Yield the regions that are the same pixels in both, with the frames that label any, ``(n,)``.
 
     Any other, as the shadow that another filter found, is left out: its ERR would describe other

@@ -12,9 +12,9 @@ from itertools import chain
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import Counts
+from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation.metric import Metric, Shown
 from roadeval.runtime.discovery import by_name, found_in
 
@@ -51,7 +51,7 @@ def of(counts: Counts) -> dict[str, float]:
     return {name: metric.function(counts) for name, metric in METRICS.items()}
 
 
-def pooled(counts: npt.NDArray[np.int64]) -> dict[str, float]:
+def pooled(counts: Sums) -> dict[str, float]:
     """Compute the tabled metrics of summed counts, ``(4,)``, by names as ``pooled_ERR``."""
     return {f"pooled_{name}": value for name, value in of(Counts(*counts.tolist())).items()}
 
@@ -61,7 +61,7 @@ def overlap(counts: Counts) -> dict[str, float]:
     return {name: metric.function(counts) for name, metric in OVERLAP.items()}
 
 
-def table(counts: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+def table(counts: Sums) -> Floats:
     """Compute the tabled metrics of many frames at once, exactly as `of` does.
 
     ``counts`` are ``(n, 4)``: TP, TN, FP, FN. Returned is ``(n, m)`` float64 in the order of

@@ -12,7 +12,6 @@ from operator import itemgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import (
     ERRORS,
@@ -31,6 +30,7 @@ from roadeval.data import (
     ones,
 )
 from roadeval.data.arrays import IGNORED, Bits, Floats, Sums
+from roadeval.data.result import Cells
 from roadeval.evaluation import metrics
 from roadeval.evaluation.region import disk, grow, square
 from roadeval.evaluation.stats import CameraRates
@@ -38,7 +38,7 @@ from roadeval.kernels import KERNELS
 
 Name = tuple[str, str]
 """A mask's variant and stage."""
-FourCounts = npt.NDArray[np.int64]
+FourCounts = Sums
 """``(n, 4)``: TP, TN, FP, FN of each frame."""
 Total = dict[str, Any]
 """See `sum_up`."""
@@ -95,7 +95,7 @@ class FrameCounts(NamedTuple):
         """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
         return metrics.table(self.counts)
 
-    def take(self, places: npt.NDArray[np.intp]) -> FrameCounts:
+    def take(self, places: Cells) -> FrameCounts:
         """Return it on the frames at some places."""
         arrays = (each[places] for each in (self.frames, self.stamps, self.counts))
         return FrameCounts(self.variant, self.stage, *arrays)
@@ -191,12 +191,12 @@ def means(rates: Floats) -> dict[str, float]:
     return _means(np.where(known, rates, 0.0).sum(axis=0), known.sum(axis=0))
 
 
-def _means(sums: Floats, defined: npt.NDArray[Any]) -> dict[str, float]:
+def _means(sums: Floats, defined: Cells) -> dict[str, float]:
     average = np.divide(sums, defined, out=np.full(len(sums), np.nan), where=defined > 0)
     return dict(zip(metrics.METRICS, average.tolist(), strict=True))
 
 
-def _total(frames: int, counts: FourCounts, sums: Floats, defined: npt.NDArray[Any]) -> Total:
+def _total(frames: int, counts: FourCounts, sums: Floats, defined: Cells) -> Total:
     undefined = (frames - defined.astype(np.int64)).tolist()
     return {
         "frames": frames,

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import (
     BASELINE,
@@ -30,7 +29,8 @@ from roadeval.data import (
     VariantResult,
     histogram,
 )
-from roadeval.data.arrays import Bits
+from roadeval.data.arrays import Bits, Values
+from roadeval.data.result import Cells
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
@@ -192,7 +192,7 @@ _LINEAR: Final = 1
 class BlindPrior:
     """Where the road was in the training frames."""
 
-    road: npt.NDArray[np.float32]
+    road: Values
     """``(H, W)`` float32: the share of the training frames in which a pixel was road, among those
     that label it; 0 where none does."""
     _masks: dict[tuple[int, int], Packed] = field(default_factory=dict, init=False, repr=False)
@@ -225,10 +225,10 @@ class BlindPrior:
         return self._masks[shape]
 
 
-def _resized(image: npt.NDArray[Any], shape: tuple[int, ...], how: int) -> npt.NDArray[Any]:
+def _resized(image: Cells, shape: tuple[int, ...], how: int) -> Cells:
     if image.shape == shape:
         return image
     import cv2
 
-    resized: npt.NDArray[Any] = cv2.resize(image, (shape[1], shape[0]), interpolation=how)
+    resized: Cells = cv2.resize(image, (shape[1], shape[0]), interpolation=how)
     return resized

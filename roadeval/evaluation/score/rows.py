@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts, Rows
-from roadeval.data.arrays import Floats
+from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation import metrics
 from roadeval.evaluation.regions import HALVES
 from roadeval.evaluation.score.counts import (
@@ -29,8 +28,6 @@ from roadeval.evaluation.score.counts import (
 
 FILTER: Final = "filter"
 """The part of an error rate that the filter caused, beside the stages'."""
-
-Ints = npt.NDArray[np.int64]
 
 
 def finals(rows: Rows) -> Rows:
@@ -89,7 +86,7 @@ def merged(chains: Iterable[Iterable[str]]) -> list[str]:
 class Causes:
     """Each frame's error rate, taken apart."""
 
-    frames: Ints
+    frames: Sums
     """``(n,)`` int64, rising."""
     parts: dict[str, Floats]
     """``(n,)`` float64 each, by the stage or `FILTER` that caused it, in order."""
@@ -127,7 +124,7 @@ def causes(rows: Rows, variant: str) -> Causes:
     return Causes(frames, {**parts, last: mine[last] - mine[before]})
 
 
-def _errors(own: Rows, frames: Ints) -> dict[str, Floats]:
+def _errors(own: Rows, frames: Sums) -> dict[str, Floats]:
     """Return a variant's ERR on frames by its stages, in the order they ran; NaN where unknown."""
     found = {}
     for (stage,), places in own.groups("stage"):
@@ -137,12 +134,12 @@ def _errors(own: Rows, frames: Ints) -> dict[str, Floats]:
     return found
 
 
-def scene_ns(stamps: Ints) -> int:
+def scene_ns(stamps: Sums) -> int:
     """Return how far apart frames of two scenes are: a quarter of the drive, at most 3 seconds."""
     return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
 
 
-def near(stamps: Ints) -> int:
+def near(stamps: Sums) -> int:
     """Return how far apart frames are that are no neighbours: a 30th of the drive, at most 1 s."""
     return min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
 
@@ -164,14 +161,14 @@ def worst(
 
 
 def most_changed(
-    stamps: Ints,
+    stamps: Sums,
     changes: Floats,
     count: int,
     *,
     harmed: bool,
     apart_ns: int | None = None,
     besides: Sequence[int] = (),
-) -> Ints:
+) -> Sums:
     """Return the places of the frames whose ERR rose most (``harmed``) or fell most.
 
     Only frames that did rise, or fall, and of neighbours only one, as in `worst`; none that is a
@@ -183,8 +180,8 @@ def most_changed(
 
 
 def separate(
-    stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
-) -> Ints:
+    stamps: Sums, ranked: Sums, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
+) -> Sums:
     """Return the first ``count`` places of a ranking that are no neighbours of one before."""
     if apart_ns is None:
         apart_ns = near(stamps)

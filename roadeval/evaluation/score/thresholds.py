@@ -23,7 +23,6 @@ from itertools import pairwise, permutations
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import (
     CODES,
@@ -37,7 +36,8 @@ from roadeval.data import (
     ones,
     wrong_above,
 )
-from roadeval.data.arrays import FN, FP, IGNORED, Bits, Floats, Sums
+from roadeval.data.arrays import FN, FP, IGNORED, Bits, Floats, Plane, Sums
+from roadeval.data.result import Cells
 from roadeval.evaluation.score.counts import Name, flat
 from roadeval.kernels import KERNELS
 
@@ -65,7 +65,7 @@ class Thresholds:
     """All road and non-road pixels."""
 
     @classmethod
-    def of(cls, counts: npt.NDArray[Any]) -> Thresholds:
+    def of(cls, counts: Cells) -> Thresholds:
         """Return the thresholds of ``(2, n)`` counts of non-road and road by code or level."""
         found = np.flatnonzero(counts.any(axis=0))[::-1]
         fp, tp = counts[:, found].astype(np.int64).cumsum(axis=1)
@@ -164,7 +164,7 @@ class HeatMap:
         self._sums = np.zeros((3, 0, 0), np.int64)
         self._bytes = np.zeros((3, 0, 0), np.uint8)
 
-    def add(self, errors: npt.NDArray[np.uint8]) -> None:
+    def add(self, errors: Plane) -> None:
         """Add a frame's errors, ``(H, W)`` uint8 in the classes of `roadeval.data.ERRORS`."""
         if not self.frames:
             self._side = max(1, -(-max(errors.shape) // CELLS))

@@ -16,11 +16,10 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, Rows, VariantResult, ones
-from roadeval.data.arrays import Floats
-from roadeval.evaluation.score.rows import Ints, near, separate
+from roadeval.data.arrays import Floats, Sums, Values
+from roadeval.evaluation.score.rows import near, separate
 from roadeval.evaluation.stats import draw_order
 
 SIGNS: Final[Mapping[str, str]] = {
@@ -34,7 +33,7 @@ _STEP: Final = 4
 
 
 @cache
-def _entropies() -> npt.NDArray[np.float32]:
+def _entropies() -> Values:
     """Return ``-p log2 p - (1-p) log2 (1-p)`` of each code of a probability, ``(65536,)``."""
     p = np.linspace(0, 1, CODES)[1:-1]
     inner = -p * np.log2(p) - (1 - p) * np.log2(1 - p)
@@ -130,14 +129,14 @@ def sign_of(rows: Rows, variant: str) -> str | None:
 
 
 def chosen(
-    stamps: Ints,
+    stamps: Sums,
     scores: Floats,
     count: int,
     seed: int,
     *,
     drawn: int = 0,
     taken: Sequence[int] = (),
-) -> tuple[Ints, Ints]:
+) -> tuple[Sums, Sums]:
     """Choose frames to label: half of them at random, half by rank.
 
     The random ones are the next in `draw_order`; one that is ``taken``, because an earlier rank has

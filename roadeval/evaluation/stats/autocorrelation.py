@@ -42,11 +42,10 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator
 
+from roadeval.data.arrays import Floats, Sums
 from roadeval.data.words import counted
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.runtime.imports import special
-
-Series = npt.NDArray[np.float64]
 
 _FEWEST: Final = 90
 _PER_ROOT: Final = 2.5
@@ -65,12 +64,12 @@ _SKEWNESS_ERROR: Final = 6.0
 class _Models(NamedTuple):
     """What each of the ``g`` models of the grid expects of a series of a given length."""
 
-    precisions: Series
+    precisions: Floats
     """``(g, m)``: one over the variances of the cosine coefficients, in the series' variance."""
-    log_factor: Series
+    log_factor: Floats
     """``(g,)``: the logarithm of the weight before any series is seen, times the factor of the
     likelihood that depends on the model alone."""
-    of_mean: Series
+    of_mean: Floats
     """``(g,)``: variance of the mean, in the series' variance."""
 
 
@@ -79,8 +78,8 @@ class MeanDistribution:
     """Distribution of the mean of a process, given a series that is a stretch of it."""
 
     mean: float
-    errors: Series
-    weights: Series
+    errors: Floats
+    weights: Floats
     """``(g,)``: the mean's standard error under each model, and the models' weights; sum 1."""
     degrees: int
     frames: float
@@ -111,7 +110,7 @@ class MeanDistribution:
         return high
 
 
-def mean_distribution(series: Series) -> MeanDistribution:
+def mean_distribution(series: Floats) -> MeanDistribution:
     """Estimate the mean of a stationary series, and its uncertainty.
 
     The series is ``(n,)`` float64, n at least 4, and not constant.
@@ -135,7 +134,7 @@ def mean_distribution(series: Series) -> MeanDistribution:
     )
 
 
-def _explained(series: Series, models: _Models) -> tuple[Series, Series, int]:
+def _explained(series: Floats, models: _Models) -> tuple[Floats, Floats, int]:
     """Return each model's estimate of the standard deviation, its weight, and their degrees."""
     n, degrees = len(series), models.precisions.shape[1]
     numbers = np.arange(1, degrees + 1)
@@ -168,7 +167,7 @@ def _models(n: int) -> _Models:
     )
 
 
-def _cosine_variances(coefficient: Series, numbers: npt.NDArray[np.int64], n: int) -> Series:
+def _cosine_variances(coefficient: Floats, numbers: Sums, n: int) -> Floats:
     """Compute variances of the orthonormal cosine coefficients (DCT-II) of an autoregression.
 
     Exact for a stationary one of variance 1 and length ``n``: its spectrum, less what the two ends
@@ -179,19 +178,19 @@ def _cosine_variances(coefficient: Series, numbers: npt.NDArray[np.int64], n: in
     gain = 1 - 2 * r * np.cos(angle) + r**2
     parity = np.where(numbers % 2, -1.0, 1.0)
     ends = 4 * r / n * ((1 - r) * np.cos(angle / 2)) ** 2 * (1 - parity * r**n)
-    variances: Series = (1 - r**2) / gain - ends / gain**2
+    variances: Floats = (1 - r**2) / gain - ends / gain**2
     return variances
 
 
-def _variance_of_mean(coefficients: Series, shares: Series, n: int) -> Series:
+def _variance_of_mean(coefficients: Floats, shares: Floats, n: int) -> Floats:
     """Compute the variance of the mean of ``n`` values, in their own variance, for each model."""
     r = coefficients
     slow = (1 + r) / (1 - r) - 2 * r * (1 - r**n) / (n * (1 - r) ** 2)
-    variances: Series = (shares * slow + (1 - shares)) / n
+    variances: Floats = (shares * slow + (1 - shares)) / n
     return variances
 
 
-def _beyond(distance: float, errors: Series, weights: Series, degrees: int) -> float:
+def _beyond(distance: float, errors: Floats, weights: Floats, degrees: int) -> float:
     """Return the probability that the mean is further off than ``distance``, skewness aside."""
     return float(2 * weights @ special("stdtr")(degrees, -distance / errors))
 
@@ -271,10 +270,10 @@ class CameraRates(NamedTuple):
     NaN where a rate is undefined, which leaves the frame out.
     """
 
-    stamps: npt.NDArray[np.int64]
+    stamps: Sums
     """``(n,)`` nanoseconds."""
-    rates: Series
-    base: Series
+    rates: Floats
+    base: Floats
     """``(n,)`` each."""
 
     def known(self) -> CameraRates:
@@ -323,7 +322,7 @@ def within_drive(
     )
 
 
-def at_moments(cameras: Sequence[CameraRates]) -> Series:
+def at_moments(cameras: Sequence[CameraRates]) -> Floats:
     """Return a value a moment, ``(T,)``; their mean is that of the cameras' mean differences.
 
     It varies as that mean does: at moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)``
@@ -341,7 +340,7 @@ def at_moments(cameras: Sequence[CameraRates]) -> Series:
     return total + sums
 
 
-def _nearest(clock: npt.NDArray[np.int64], stamps: npt.NDArray[np.int64]) -> npt.NDArray[np.intp]:
+def _nearest(clock: Sums, stamps: Sums) -> npt.NDArray[np.intp]:
     """Return the place in ``clock``, ``(T,)``, that is nearest to each of ``(n,)`` stamps."""
     order = np.argsort(clock, kind="stable")
     rising = clock[order]

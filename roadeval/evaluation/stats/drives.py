@@ -23,7 +23,7 @@ are, also where they are too many to list, as pairs of one half's sets and the o
 References
 ----------
 .. [1] R. A. Fisher, The Design of Experiments, 1935, section 21.
-.. [2] J. A. Hartigan, Using Subsample Values as Typical Values, Journal of the American
+.. [2] J. A. Hartigan, Using Subsample Floats as Typical Floats, Journal of the American
    Statistical Association 64, 1969, 1303-1317.
 .. [3] E. Horowitz, S. Sahni, Computing Partitions with Applications to the Knapsack Problem,
    Journal of the ACM 21, 1974, 277-292.
@@ -37,12 +37,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roadeval.data.arrays import Floats
 from roadeval.evaluation.stats.autocorrelation import Difference, holm
 from roadeval.runtime.imports import special
-
-Values = npt.NDArray[np.float64]
 
 LEAST_GROUPS: Final = 6
 """Groups that an interval needs. With five, the least two-sided p-value of a sign-flip test is
@@ -65,7 +63,7 @@ class DriveMean:
     """NaN if no frame has a difference: the drive is left out."""
 
 
-def group_means(drives: Iterable[DriveMean]) -> Values:
+def group_means(drives: Iterable[DriveMean]) -> Floats:
     """Return the mean of each group's drives, ``(g,)``, for any order of the drives."""
     known = sorted(
         (each for each in drives if not np.isnan(each.mean)),
@@ -75,7 +73,7 @@ def group_means(drives: Iterable[DriveMean]) -> Values:
         return np.zeros(0)
     _, sizes = np.unique([each.group for each in known], return_counts=True)
     sums = np.add.reduceat(np.array([each.mean for each in known]), np.cumsum(sizes) - sizes)
-    means: Values = sums / sizes
+    means: Floats = sums / sizes
     return means
 
 
@@ -119,7 +117,7 @@ def over_drives(
     )
 
 
-def _student(means: Values, confidence: float) -> tuple[float, float, float]:
+def _student(means: Floats, confidence: float) -> tuple[float, float, float]:
     """Return Student's interval of a mean, and the p-value of 0."""
     mean, degrees = float(means.mean()), len(means) - 1
     if np.ptp(means) == 0:
@@ -129,7 +127,7 @@ def _student(means: Values, confidence: float) -> tuple[float, float, float]:
     return mean - half, mean + half, float(2 * special("stdtr")(degrees, -abs(mean) / error))
 
 
-def sign_flip_p(values: Values, mean: float = 0.0) -> float:
+def sign_flip_p(values: Floats, mean: float = 0.0) -> float:
     """Compute the two-sided p-value of the hypothesis that the mean is ``mean``.
 
     ``p = #{s : |sum s_i (x_i - mean)| >= |sum (x_i - mean)|} / 2^n``, exactly; the time doubles
@@ -142,7 +140,7 @@ def sign_flip_p(values: Values, mean: float = 0.0) -> float:
     return min(float(np.ldexp(_sets_not_above_zero(away), 1 - len(away))), 1.0)
 
 
-def sign_flip_interval(values: Values, confidence: float) -> tuple[float, float]:
+def sign_flip_interval(values: Floats, confidence: float) -> tuple[float, float]:
     """Compute the values of the mean whose p-value is at least ``1 - confidence``.
 
     `sign_flip_can_tell` must hold. Returned are the interval's ends; it holds 0 exactly where
@@ -156,7 +154,7 @@ def sign_flip_can_tell(count: int, confidence: float) -> bool:
     return float(np.ldexp(1.0, 1 - count)) < 1 - confidence
 
 
-def _lower_end(values: Values, confidence: float) -> float:
+def _lower_end(values: Floats, confidence: float) -> float:
     """Return the least mean that is not rejected, by halves: 1e-8 of the way at most above it.
 
     The smallest value is it, or below it: there only the empty set counts. 0 is tried first, so
@@ -174,7 +172,7 @@ def _lower_end(values: Values, confidence: float) -> float:
     return high
 
 
-def _sets_not_above_zero(values: Values) -> int:
+def _sets_not_above_zero(values: Floats) -> int:
     """Count the sets of values whose sum is 0 or less, the empty one included."""
     rounding = _ROUNDING * float(np.abs(values).sum())
     half = len(values) // 2
@@ -182,7 +180,7 @@ def _sets_not_above_zero(values: Values) -> int:
     return int(np.searchsorted(second, rounding - np.sort(first), side="right").sum())
 
 
-def _sums(values: Values) -> Values:
+def _sums(values: Floats) -> Floats:
     """Return the sums of all sets of values, ``(2^n,)``."""
     sums = np.zeros(1)
     for value in values:

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roadeval.data.arrays import Floats, Sums
 from roadeval.runtime.imports import special
 
-Values = npt.NDArray[np.float64]
 REGRESSION_FROM: Final = 8
 """So many labels it takes to learn how a rate goes with the frames' score."""
 FINER: Final = 4
@@ -41,7 +40,7 @@ class Estimate:
     """So many further labels, drawn at random, would halve the interval; None where none can."""
 
 
-def draw_order(count: int, seed: int) -> npt.NDArray[np.int64]:
+def draw_order(count: int, seed: int) -> Sums:
     """Return ``count`` frames in an order of which every beginning is a stratified random sample.
 
     The first m frames lie spread along the drive, and every frame is among them with probability
@@ -67,7 +66,7 @@ def draw_order(count: int, seed: int) -> npt.NDArray[np.int64]:
 
 
 def estimate(
-    values: Values, scores: Values, every_score: Values, confidence: float = 0.95
+    values: Floats, scores: Floats, every_score: Floats, confidence: float = 0.95
 ) -> Estimate:
     """Estimate the mean of a rate over all frames.
 
