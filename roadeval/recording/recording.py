@@ -11,15 +11,12 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-import pyarrow as pa
-
 from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.data.arrays import Plane
 from roadeval.data.result import Cells
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError, SeveralCamerasError
-from roadeval.recording.rrd_file import RrdFile, Span, flat, whole
+from roadeval.recording.rrd_file import TEXT, RrdFile, whole
 from roadeval.results.facts import Facts, another_format
 from roadeval.results.tables import TableFacts, read_rows, read_table
 from roadeval.runtime.documents import check_texts, read_json
@@ -86,7 +83,6 @@ class Recording:
                 sentence = another_format(version, later=form > at.FORMAT)
                 raise RecordingError(f"{self.path}: {sentence}")
             self.layout = Layout.from_json(text)
-        self._payloads = PayloadCache(self._file)
 
     @property
     def complete(self) -> bool:
@@ -160,7 +156,7 @@ class Recording:
         """Return the text of a table; empty if the run counted none."""
         if name not in self.layout.tables:
             return self.result(name) or ""
-        lines = self._file.texts(at.result_path(name))
+        lines = (line for _, line in self._file.rows(at.result_path(name), TEXT))
         return "".join((self.layout.tables[name].rstrip(), "\n", *lines))
 
     def scalars(self, path: str) -> pd.Series[float]:
@@ -202,7 +198,7 @@ class Recording:
         for variant in self.variants:
             names = (*variant.stages, *[ERRORS.name] * scored)
             paths += (at.layer_path(variant.name, name) for name in names)
-        found = (self._payloads.get(path, self._codecs[path].component, frame) for path in paths)
+        found = (self._file.image(path, self._codecs[path].component, frame) for path in paths)
         return all(each is not None for each in found)
 
     @cached_property
@@ -228,30 +224,7 @@ class Recording:
             raise RecordingError(f"{self.path}: there is no {path}; there are {known}")
         codec = self._codecs[path]
         with whole(self.path, f"{path} on frame {frame}"):
-            payload = self._payloads.get(path, codec.component, frame)
+            payload = self._file.image(path, codec.component, frame)
             if payload is None:
                 raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
             return codec.decode(payload)
-
-
-class PayloadCache:
-    """Encoded images of a file's entities by frame, of each those of the message read last.
-
-    ``component`` is the one that holds them.
-    """
-
-    def __init__(self, file: RrdFile) -> None:
-        self._file = file
-        self._kept: dict[str, tuple[Span, dict[int, pa.ListScalar]]] = {}
-
-    def get(self, path: str, component: str, frame: int) -> bytes | None:
-        """Return the encoded image of the entity on a frame; None if there is none."""
-        if path not in self._kept or not self._kept[path][0].holds(frame):
-            span, batches = self._file.around(path, component, frame)
-            payloads: dict[int, pa.ListScalar] = {}
-            for batch in batches:
-                frames = batch.column(at.FRAME).to_pylist()
-                payloads |= zip(frames, flat(batch.column(component)), strict=True)
-            self._kept[path] = span, payloads
-        blob = self._kept[path][1].get(frame)
-        return None if blob is None else bytes(np.from_dlpack(blob.values))

@@ -12,6 +12,7 @@ it meets what it never expects.
 from __future__ import annotations
 
 import struct
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import inf
@@ -26,7 +27,7 @@ from roadeval.recording.layout import APPLICATION, FRAME, DamagedError, Recordin
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 
-_TEXT: Final = "TextDocument:text"
+TEXT: Final = "TextDocument:text"
 _MAGIC: Final = b"RRF2"
 _BEGIN: Final = 12
 """Bytes before the first header."""
@@ -61,6 +62,10 @@ class Span(NamedTuple):
         return self.first <= frame <= self.last
 
 
+ALWAYS: Final = Span()
+"""That of what was logged once, for every frame."""
+
+
 class Place(NamedTuple):
     """Where a message lies in the file, without its header, in bytes; and its frames."""
 
@@ -68,9 +73,7 @@ class Place(NamedTuple):
     """Of its entity."""
     offset: int
     size: int
-    static: bool
-    """Whether it was logged once, for every frame."""
-    span: Span
+    span: Span = ALWAYS
 
 
 class RrdFile:
@@ -83,35 +86,45 @@ class RrdFile:
         self.path = path
         self.below = ""
         """The path below which all entities are looked for."""
-        self._places: dict[str, list[Place]] = {}
+        self._places = defaultdict[str, list[Place]](list)
+        self._kept: dict[str, tuple[Span, dict[int, pa.ListScalar]]] = {}
+        """Of each entity the images of the message that was read last, by frame."""
         places, self.indexed = _read_places(path)
         for place in sorted(places, key=lambda each: (each.span.first, each.offset)):
-            self._places.setdefault(place.path, []).append(place)
+            self._places[place.path].append(place)
 
     def batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
         """Yield the rows of an entity that have a value, a batch a message.
 
         A `DamagedError` if they cannot be read.
         """
-        path = self.below + path
-        places = [each for each in self._places.get(path, ()) if each.static == static]
-        yield from self._at(component, places)
+        places = self._places.get(self.below + path, ())
+        return self._at(component, [p for p in places if (p.span == ALWAYS) == static])
 
-    def around(
-        self, path: str, component: str, frame: int
-    ) -> tuple[Span, Iterable[pa.RecordBatch]]:
-        """Return the rows of an entity in the messages with a frame, and the frames of these.
+    def image(self, path: str, component: str, frame: int) -> bytes | None:
+        """Return the encoded image of an entity on a frame; None if there is none.
 
-        A `DamagedError` if they cannot be read.
+        A `DamagedError` if it cannot be read.
         """
-        places = [each for each in self._places.get(self.below + path, ()) if not each.static]
-        here = [each for each in places if each.span.holds(frame)]
-        if not here:
-            before = max((p.span.last for p in places if p.span.last < frame), default=-inf)
-            after = min((p.span.first for p in places if p.span.first > frame), default=inf)
-            return Span(before + 1, after - 1), ()
-        first = max(each.span.first for each in here)
-        return Span(first, min(each.span.last for each in here)), self._at(component, here)
+        if path not in self._kept or not self._kept[path][0].holds(frame):
+            all_places = self._places.get(self.below + path, ())
+            places = [each for each in all_places if each.span != ALWAYS]
+            here = [each for each in places if each.span.holds(frame)]
+            # Between two messages: the last frame of the one before, the first of the one after.
+            span = Span(
+                max([-inf, *(p.span.last + 1 for p in places if p.span.last < frame)]),
+                min([inf, *(p.span.first - 1 for p in places if p.span.first > frame)]),
+            )
+            if here:
+                firsts, lasts = zip(*(each.span for each in here), strict=True)
+                span = Span(max(firsts), min(lasts))
+            images: dict[int, pa.ListScalar] = {}
+            for batch in self._at(component, here):
+                frames = batch.column(FRAME).to_pylist()
+                images |= zip(frames, flat(batch.column(component)), strict=True)
+            self._kept[path] = span, images
+        blob = self._kept[path][1].get(frame)
+        return None if blob is None else bytes(np.from_dlpack(blob.values))
 
     def _at(self, component: str, places: Iterable[Place]) -> Iterator[pa.RecordBatch]:
         for place in places:
@@ -135,13 +148,9 @@ class RrdFile:
                 rows = list(zip(batch.column(FRAME).to_pylist(), values, strict=True))
             yield from rows
 
-    def texts(self, path: str) -> Iterator[str]:
-        """Yield the documents that were logged frame by frame."""
-        return (text for _, text in self.rows(path, _TEXT))
-
     def document(self, path: str) -> str | None:
         """Return the document that was logged once; None if the run ended before it."""
-        value = self.static(path, _TEXT)
+        value = self.static(path, TEXT)
         return None if value is None else str(value)
 
     def static(self, path: str, component: str) -> Any:
@@ -263,10 +272,10 @@ def _listed(index: memoryview) -> list[Place]:
     batch = _unpacked(content, compression, size)
     names = [f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size", "is_static")]
     names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
-    rows = zip(*(batch.column(name).to_pylist() for name in names), strict=True)
+    columns = (batch.column(name).to_pylist() for name in names)
     return [
-        Place(path, offset, size, static, Span() if static or not frames else Span(*frames))
-        for path, offset, size, static, *frames in rows
+        Place(path, offset, size, ALWAYS if static or not frames else Span(*frames))
+        for path, offset, size, static, *frames in zip(*columns, strict=True)
     ]
 
 
@@ -281,12 +290,12 @@ def _written(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Place]]]:
         if kind == _ROWS:
             message = file.read(size)
             path, batch = rows_of(message)
-            static, span = FRAME not in batch.schema.names, Span()
-            if not static:
+            span = ALWAYS
+            if FRAME in batch.schema.names:
                 frames = batch.column(FRAME).to_pylist()
                 span = Span(min(frames), max(frames))
             store = dict(protobuf_fields(memoryview(message)))[_STORE]
-            yield store, [Place(path, offset, size, static, span)]
+            yield store, [Place(path, offset, size, span)]
         offset += size + _HEADER.size
 
 

@@ -133,7 +133,7 @@ def rows_of(recording, path, component):
         with file.path.open("rb") as opened:
             opened.seek(place.offset)
             _, batch = rrd_file.rows_of(opened.read(place.size))
-        if not place.static and component in batch.schema.names:
+        if place.span != rrd_file.ALWAYS and component in batch.schema.names:
             values = batch.column(component).to_pylist()
             found |= zip(batch.column("frame").to_pylist(), map(len, values), strict=True)
     return found

@@ -12,6 +12,7 @@ import pytest
 from roadeval.errors import RoadevalError
 from roadeval.recording import DamagedError, Recording
 from roadeval.recording import layout as at
+from roadeval.recording.rrd_file import ALWAYS
 
 MUTATIONS = 120
 CHECKED = ("post", "errors", "truth")
@@ -77,7 +78,7 @@ def test_what_is_read_of_it_has_its_own_checksum_or_one_line_says_where_it_is_no
 def place_of(path, recording):
     """Where the first message of an entity lies, of frames if there are any."""
     places = recording._file._places[path]
-    return min(places, key=lambda place: (place.static, place.offset))
+    return min(places, key=lambda place: (place.span == ALWAYS, place.offset))
 
 
 @pytest.fixture
