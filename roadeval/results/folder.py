@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import IO, TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from roadeval.data import Rows
 from roadeval.results.facts import SUMMARY, Facts
@@ -72,12 +71,7 @@ class ResultsWriter:
                 self._open[name] = _Growing(self.folder, TABLES[name])
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None and self._finished:
                 with self.explained():
@@ -85,7 +79,7 @@ class ResultsWriter:
         finally:
             for table in self._open.values():
                 with suppress(OSError):  # on a full disk closing fails, too
-                    table.close()
+                    table.file.close()
             self._new.discard()
 
     def append(self, lines: Mapping[str, str]) -> None:
@@ -106,7 +100,9 @@ class ResultsWriter:
         """
         with self.explained():
             for table in self._open.values():
-                table.complete()
+                table.file.close()
+                if not table.rows:
+                    table.path.unlink()
             (self.folder / RUN).write_bytes(run_toml.encode())
             names = sorted({SUMMARY, *(path.name for path in self.folder.iterdir())})
             facts = replace(facts, tables=self.tables, files=names)
@@ -125,10 +121,10 @@ class _Growing:
 
     def __init__(self, folder: Path, table: TableSchema) -> None:
         self.path = folder / f"{table.name}.csv"
-        self.rows = 0
+        self.file = self.path.open("wb")
+        self.rows = -1  # the header is none
         self._digest = hashlib.sha256()
-        self._file: IO[bytes] = self.path.open("wb")
-        self._write(table.header)
+        self.append(table.header)
 
     @property
     def stated(self) -> TableFacts:
@@ -137,21 +133,9 @@ class _Growing:
 
     def append(self, lines: str) -> None:
         self.rows += lines.count("\n")
-        self._write(lines)
-
-    def close(self) -> None:
-        self._file.close()
-
-    def complete(self) -> None:
-        """Close the file; without rows remove it."""
-        self.close()
-        if not self.rows:
-            self.path.unlink()
-
-    def _write(self, text: str) -> None:
-        content = text.encode()
+        content = lines.encode()
         self._digest.update(content)
-        self._file.write(content)
+        self.file.write(content)
 
 
 class ResultsFolder:
@@ -162,8 +146,7 @@ class ResultsFolder:
     """
 
     def __init__(self, folder: Path, camera: str = "") -> None:
-        self._folder = folder
-        self._camera = camera
+        self._folder, self._camera = folder, camera
         self._whole = Facts.read(folder / SUMMARY)
         self.facts = self._whole.cameras[camera] if camera else self._whole
 
@@ -173,10 +156,11 @@ class ResultsFolder:
         One that was not written, there being nothing to count, is empty. A `ResultsError` if it is
         damaged, or not the one that the summary states.
         """
-        path = self._folder / f"{name}.csv"
-        return read_table(name, path, self._whole.tables, self._camera)
+        return read_table(name, self._path(name), self._whole.tables, self._camera)
 
     def rows(self, name: str) -> Rows:
         """Read a table as `table` does, without pandas."""
-        path = self._folder / f"{name}.csv"
-        return read_rows(name, path, self._whole.tables, self._camera)
+        return read_rows(name, self._path(name), self._whole.tables, self._camera)
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}.csv"
