@@ -124,11 +124,11 @@ class FleetFolder:
             raise ResultsError(f"{path}: a link leads out of the fleet's folder; remove it")
         return path
 
-    def table(self, name: str, columns: list[str] | None = None) -> pa.Table:
-        """Read a table, or some columns of it."""
+    def table(self, name: str) -> pa.Table:
+        """Read a table."""
         path = self.path / f"{name}.parquet"
         try:
-            return read_parquet(path, name, columns)
+            return read_parquet(path, name)
         except FileNotFoundError:
             raise ResultsError(f"{path}: is not there; {AGAIN}") from None
 

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -278,46 +279,37 @@ class TableFile:
         self._rows = []
 
 
-def read_parquet(
-    path: Path, name: str, columns: list[str] | None = None, remedy: str = AGAIN
-) -> pa.Table:
+def read_parquet(path: Path, name: str, remedy: str = AGAIN) -> pa.Table:
     """Read a table of a fleet's folder, which others may have damaged.
 
-    All columns are read by default; ``remedy`` is what the user can do where it is damaged. A
-    `FileNotFoundError` if it is not there. A `ResultsError` if it cannot be read, or lacks a
-    column, or one is of another type.
+    ``remedy`` is what the user can do where it is damaged. A `FileNotFoundError` if it is not
+    there. A `ResultsError` if it cannot be read, or lacks a column, or one is of another type.
     """
     import pyarrow as pa
     from pyarrow import parquet
 
+    # As one file: of a path with "drive=" in it a column would be made.
+    opened = partial(parquet.ParquetFile, path, page_checksum_verification=True)
     try:
         check_input(path)
-        # As one file: of a path with "drive=" in it a column would be made.
-        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+        with opened() as file:
             _check_size(file.metadata, path.stat().st_size)
             words = [each.name for each in file.schema_arrow if each.type == pa.string()]
-        with parquet.ParquetFile(
-            path, page_checksum_verification=True, read_dictionary=words
-        ) as file:
-            table = _checked_words(file.read(columns=columns))
+        with opened(read_dictionary=words) as file:
+            table = _checked_words(file.read())
+        for column in TABLES[name].arrow():
+            if column.name not in table.column_names:
+                raise ResultsError(f"{path}: has no column {column.name}; {remedy}")
+            if table.schema.field(column.name).type != column.type:
+                raise ValueError(f"column {column.name} is not of type {column.type}")
+        for drive in table["drive"].unique().to_pylist():  # files are called after drives
+            if drive is None or not is_plain(drive):
+                raise ValueError(f"a drive is called {str(drive)[:NAMED]!r}, which is no name")
     except FileNotFoundError:
         raise
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{path}: damaged ({reason}); {remedy}") from error
-    for column in TABLES[name].arrow():
-        if column.name not in table.column_names:
-            if columns is None or column.name in columns:
-                raise ResultsError(f"{path}: has no column {column.name}; {remedy}")
-        elif table.schema.field(column.name).type != column.type:
-            raise ResultsError(
-                f"{path}: damaged (column {column.name} is not of type {column.type}); {remedy}"
-            )
-        elif column.name == "drive":  # files are called after drives
-            for drive in table["drive"].unique().to_pylist():
-                if drive is None or not is_plain(drive):
-                    what = f"a drive is called {str(drive)[:NAMED]!r}, which is no name"
-                    raise ResultsError(f"{path}: damaged ({what})")
     return table
 
 
@@ -358,6 +350,5 @@ def _checked_words(table: pa.Table) -> pa.Table:
 
 def parquet_rows(table: pa.Table, name: str) -> Rows:
     """Return a table that was read as arrays, with those of its columns that are there."""
-    schema = TABLES[name]
-    there = set(table.column_names)
-    return _arrays(table, [c for c in (*schema.columns, *schema.of_a_fleet) if c.name in there])
+    columns = (*TABLES[name].columns, *TABLES[name].of_a_fleet)
+    return _arrays(table, [each for each in columns if each.name in table.column_names])
