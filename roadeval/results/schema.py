@@ -176,7 +176,7 @@ repaired     count  pixels that only the second mask has right
 spoiled      count  pixels that only the first mask has right
 {_LABELLED}
 
-unlabelled: A row per frame without truth and variant: its doubt. It ranks frames, no error rate.
+unlabelled: A row per frame without truth and variant: how doubtful its mask is, not how wrong.
 {_IN_FRAME}
 {_STAMP}
 {_MASK}
