@@ -24,8 +24,6 @@ from roadeval.runtime.text import visible
 
 Array = npt.NDArray[Any]
 
-LARGEST: Final = (1 << 31) - 1
-"""Bytes that a protobuf file can have; larger weights lie in files beside it."""
 QUOTED: Final = 240
 """Letters of onnxruntime's complaint that a message quotes."""
 _SHOWN: Final = 12
@@ -112,8 +110,6 @@ def load(settings: NetSettings) -> OnnxFile:
     with _readable(path, "cannot read the network"):
         check_input(path)
         there = path.stat()
-    if there.st_size > LARGEST:
-        raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
     file = _opened(path, there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns)
     if settings.sha256 not in (None, file.sha256):
         raise file.error(
@@ -184,10 +180,8 @@ def _explained(path: Path) -> Iterator[None]:
         yield
     except MemoryError:
         raise
-    except UnicodeDecodeError as error:  # of a name
-        raise NetworkError(f"{path}: {_DAMAGED}") from error
     except Exception as error:  # onnxruntime's have no class of their own in common
-        if type(error).__name__ == "InvalidProtobuf":
+        if type(error).__name__ in ("InvalidProtobuf", "UnicodeDecodeError"):
             raise NetworkError(f"{path}: {_DAMAGED}") from error
         said = visible(" ".join(_PREAMBLE.sub("", str(error)).split()))
         quoted = said if len(said) <= QUOTED else f"{said[:QUOTED]}..."

@@ -104,17 +104,11 @@ class Pipeline:
 
         A `MisfitError` if that does not fit the settings.
         """
-        return Chain(
-            tuple(
-                Step(
-                    stage,
-                    own,
-                    stage.bind(own, parameters.get(stage.name)),
-                    stage.oracle and stage.oracle(own, parameters.get(stage.name)),
-                )
-                for stage, own in self._each()
-            )
-        )
+        steps = []
+        for stage, own in self._each():
+            learnt = parameters.get(stage.name)
+            steps.append(Step(stage, own, learnt, stage.bind(own, learnt)))
+        return Chain(tuple(steps))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +117,8 @@ class Step:
 
     stage: Stage
     settings: Any
+    parameters: Any
     run: Callable[[View], Output]
-    oracle: Callable[[View, Truth], Output] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +148,8 @@ class Chain:
         """
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
-            if step.oracle is not None and truth is not None:
-                seen = view.after(step.oracle(view, truth))
+            if (oracle := step.stage.oracle) is not None and truth is not None:
+                seen = view.after(oracle(step.settings, step.parameters, view, truth))
                 yield step.stage.name, dict(_masks(self.steps[place + 1 :], seen))
             view = view.after(output)
 

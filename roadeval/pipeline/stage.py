@@ -154,10 +154,10 @@ class Stage:
     what it contributes."""
     preprocesses: bool = False
     """Whether it only changes the image, in every variant."""
-    oracle: Callable[[Any, Any], Callable[[View, Truth], Output]] | None = None
-    """``oracle(settings, parameters)`` returns the stage as it would be if it were perfect: a pure
-    function of `View` and the truth, of shadow for a filter, else of the road. None where a
-    perfect one would be of no interest."""
+    oracle: Callable[[Any, Any, View, Truth], Output] | None = None
+    """``oracle(settings, parameters, view, truth)`` is the stage as it would be if it were perfect:
+    it knows the truth, of shadow for a filter, else of the road. None where a perfect one would be
+    of no interest."""
     inference_only: tuple[str, ...] = ()
     """Settings that the learnt parameters do not depend on: a model may be used with other values
     than it was trained with."""
@@ -198,13 +198,9 @@ def per_view(
     return bind
 
 
-def perfect_mask(_settings: Any, _parameters: Any) -> Callable[[View, Truth], Output]:
-    """Return the oracle of a stage that yields a road mask: the truth, ignored pixels non-road."""
-
-    def run(_view: View, truth: Truth) -> Output:
-        return Output(mask=Packed.of(truth == ROAD))
-
-    return run
+def perfect_mask(_settings: Any, _parameters: Any, _view: View, truth: Truth) -> Output:
+    """Return the truth as the road mask of a perfect stage, ignored pixels non-road."""
+    return Output(mask=Packed.of(truth == ROAD))
 
 
 def split(image: Rgb) -> Planes:

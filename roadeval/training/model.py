@@ -182,8 +182,6 @@ def _content(path: Path) -> tuple[Any, Arrays]:
         if not all(isinstance(array, np.ndarray) for array in arrays.values()):
             raise ValueError("not all of it is arrays")
         return json.loads(arrays.pop("header").tobytes()), arrays
-    except FileNotFoundError as error:
-        raise ModelError(f"{path}: there is no such model file") from error
     except Exception as error:  # archives are read by four libraries, each with errors of its own
         if isinstance(error, OSError) and error.strerror:
             raise ModelError(f"{path}: cannot read the model: {error.strerror}") from error

@@ -126,14 +126,6 @@ def test_what_is_no_image_is_refused(data: bytes) -> None:
             read(data, LIMITS)
 
 
-def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded() -> None:
-    scan = bytes([0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0])  # refines luma by nothing
-    progressive = file("JPEG", progressive=True)
-    for read in (images.to_rgb, images.to_labels):
-        with pytest.raises(ImageError, match="a JPEG of more than 100 scans"):
-            read(memoryview(progressive[:-2] + 100 * scan + progressive[-2:]), LIMITS)
-
-
 @pytest.mark.parametrize("data", [jpeg_of_size(30_000, 30_000), png_of_size(30_000, 30_000)])
 def test_a_size_is_refused_before_anything_is_decoded(data: bytes) -> None:
     for read in (images.to_rgb, images.to_labels):

@@ -22,7 +22,6 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
@@ -359,16 +358,12 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     )
 
 
-def oracle(settings: GatedSettings, model: ShadedRoad) -> Callable[[View, Truth], Output]:
-    """Return the filter as it would be if it knew what is shadow."""
-
-    def run(view: View, truth: Truth) -> Output:
-        small = reduced(view.image, settings.width)
-        shadow = enlarged((truth == 1).view(np.uint8), small.shape)
-        gain = gains(look(small, model.place, settings), shadow.astype(np.float32))
-        return Output(image=brighten(view.image, gain) if shadow.any() else view.image)
-
-    return run
+def oracle(settings: GatedSettings, model: ShadedRoad, view: View, truth: Truth) -> Output:
+    """Brighten what is truly shadow."""
+    small = reduced(view.image, settings.width)
+    shadow = enlarged((truth == 1).view(np.uint8), small.shape)
+    gain = gains(look(small, model.place, settings), shadow.astype(np.float32))
+    return Output(image=brighten(view.image, gain) if shadow.any() else view.image)
 
 
 STAGE: Final = Stage(

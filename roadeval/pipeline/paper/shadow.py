@@ -7,7 +7,6 @@ buffer rings (Eq. 9-10), their compensation (Eq. 11), the stage.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal, NamedTuple
 
@@ -348,13 +347,9 @@ def bind(settings: ShadowSettings, _learnt: None, view: View) -> Output:
     )
 
 
-def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth], Output]:
-    """Return the filter as it would be if it knew what is shadow; its compensation stays."""
-
-    def run(view: View, truth: Truth) -> Output:
-        return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
-
-    return run
+def oracle(settings: ShadowSettings, _learnt: None, view: View, truth: Truth) -> Output:
+    """Filter what is truly shadow; the compensation stays."""
+    return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
 
 
 STAGE: Final = Stage(

@@ -264,7 +264,7 @@ def test_a_wide_image_is_judged_as_the_reduced_one_and_compensated_at_its_own_si
 
 def told(image, shadow):
     """What the filter makes of an image once it knows what is shadow."""
-    return gated.oracle(GatedSettings(), model())(View.of(image), shadow).image
+    return gated.oracle(GatedSettings(), model(), View.of(image), shadow).image
 
 
 def test_true_shadow_is_brightened_whatever_was_learnt():
