@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -21,14 +20,11 @@ from roadeval.pipeline.beyond.features import reach
 from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
-from roadeval.pipeline.stage import Output, StageError, TrainingSet, View
+from roadeval.pipeline.stage import Output, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
 from roadeval.training.settings import TrainingSettings
 
-COLLAPSED: Final = 0.001
-"""A classifier that calls less than this share of its training frames road, or more than the
-rest of it, has collapsed."""
 WIDTH: Final = 160
 """Columns of the working image on which paths are sought from the reference patch."""
 _AT_ONCE: Final = 2
@@ -55,12 +51,13 @@ def fit(
     frames have truth, unless ``settings.source`` allows the patch. ``base`` is what the variants
     have learnt from other drives: stages that can learn further do so, the others stay as they are.
     """
-    if not frames:
+    learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
+    if learning and not frames:
         raise TrainingError("there is no frame to train on in the selected range")
     truths = [frame.truth for frame in frames if frame.truth is not None]
     prior = BlindPrior.of_truths(truths).road if truths else None
-    source, share = "truth", None
-    if settings.source == "patch" or len(truths) < len(frames):
+    source, share = "truth" if frames else "none", None
+    if len(truths) < len(frames) or (frames and settings.source == "patch"):
         if settings.source == "truth":
             raise TrainingError(
                 "there is no truth to train on: name its topic with `topics.truth`, give "
@@ -71,9 +68,8 @@ def fit(
         road = sum(np.count_nonzero(truth == ROAD) for truth in truths)
         share = road / (sum(np.count_nonzero(truth != IGNORE) for truth in truths) or 1)
     parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
-    warnings: list[str] = []
     pixels = 0
-    if learning := [name for name, pipeline in pipelines.items() if pipeline.learning()]:
+    if learning:
         drawn = sample(truths, settings)
         if not (pixels := len(drawn.road)):
             raise TrainingError(
@@ -84,14 +80,11 @@ def fit(
         images = tuple(frame.image for frame in frames)
         drawn = replace(drawn, images=images, truths=tuple(truths), share=share)
 
-        def learn(name: str) -> tuple[str, dict[str, Any], list[str]]:
+        def learn(name: str) -> dict[str, Any]:
             known = base.parameters.get(name, {}) if base else {}
-            learnt = _fitted(frames, drawn, pipelines[name], known)
-            return name, learnt, _collapsed(name, frames, pipelines[name], learnt)
+            return _fitted(frames, drawn, pipelines[name], known)
 
-        for name, learnt, warned in ordered(learn, learning, _AT_ONCE):
-            parameters[name] = learnt
-            warnings += warned
+        parameters |= zip(learning, ordered(learn, learning, _AT_ONCE), strict=True)
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
@@ -99,7 +92,6 @@ def fit(
         frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
         pixels,
         prior,
-        tuple(warnings),
     )
 
 
@@ -131,24 +123,6 @@ def _fitted(
         else:
             training_set = replace(training_set, images=tuple(view.image for view in after))
     return parameters
-
-
-def _collapsed(
-    variant: str, frames: Sequence[Frame], pipeline: Pipeline, parameters: Mapping[str, Any]
-) -> list[str]:
-    """Return a warning for each stage that calls all or none of its training frames road."""
-    chain = pipeline.bind(parameters)
-    shares: dict[str, list[float]] = {}
-    for frame in frames:
-        with suppress(StageError):  # it is reported when the frame is replayed
-            for name, output in chain.run(View.of_frame(frame)):
-                if output.mask is not None:
-                    shares.setdefault(name, []).append(output.mask.pixels().mean())
-    return [
-        f"{variant}: {name} has collapsed: it calls {share:.1%} of its own training frames road"
-        for name, share in ((name, np.mean(values)) for name, values in shares.items())
-        if not COLLAPSED <= share <= 1 - COLLAPSED
-    ]
 
 
 def sample(truths: Sequence[Truth], settings: TrainingSettings) -> TrainingSet:
@@ -264,14 +238,12 @@ def from_log(
     called with the number of those so far. ``labelled`` says that the log's truth may be used: then
     only frames that have one train, and some must be left to evaluate. Where no frame of the range
     has one, the first ones train. ``base`` is what was learnt from other drives. With ``picks``
-    those train that were picked by rank. Returned are the model of each seed, the first with the
-    warnings of all, and which frames are left out.
+    those train that were picked by rank. Returned are the model of each seed, the first with
+    warnings, and which frames are left out.
     """
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
     if not learning:
-        made_for = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
-        nothing = Model({name: {} for name in pipelines}, made_for, "none", frozenset(), 0)
-        return (nothing,), Schedule(picks=picks)
+        return (fit((), pipelines, settings),), Schedule(picks=picks)
     if not settings.frames:
         raise TrainingError(
             f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
@@ -302,16 +274,10 @@ def from_log(
             f"{len(held.frames)} of its own {how}: the rates are not those on a drive that it has "
             "not seen"
         )
-    models = {
-        seed: fit(held.frames, pipelines, replace(settings, seed=seed, seeds=1), base)
+    first, *others = (
+        fit(held.frames, pipelines, replace(settings, seed=seed, seeds=1), base)
         for seed in range(settings.seed, settings.seed + settings.seeds)
-    }
-    warnings += [
-        warning if seed == settings.seed else f"seed {seed}: {warning}"
-        for seed, model in models.items()
-        for warning in model.warnings
-    ]
-    first, *others = models.values()
+    )
     schedule = replace(schedule, digests=first.digests, picks=picks)
     return (replace(first, warnings=tuple(warnings)), *others), schedule
 
@@ -401,8 +367,7 @@ def from_drives(
     model = fit([frame for own in frames.values() for frame in own], pipelines, settings)
     if not bare or settings.source == "patch":
         return model
-    guessed = f"no drive has road truth in the range: {BY_PATCH}"
-    return replace(model, warnings=(guessed, *model.warnings))
+    return replace(model, warnings=(f"no drive has road truth in the range: {BY_PATCH}",))
 
 
 def spread(

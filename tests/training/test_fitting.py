@@ -5,7 +5,6 @@ import pytest
 
 from roadeval.config import ConfigError, configure
 from roadeval.data import NON_ROAD, ROAD
-from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import View
 from roadeval.training import TrainingError, TrainingSettings, fit
@@ -47,15 +46,6 @@ def test_one_class_alone_is_an_error_that_names_the_frames():
     sky.truth[:] = 0
     with pytest.raises(TrainingError, match="frames 4 to 4 do not show both road and non-"):
         fit([sky], pipelines(), TrainingSettings())
-
-
-def test_a_collapsed_classifier_is_reported():
-    # A threshold that no decision value reaches: nothing is ever called road.
-    settings = dict(pipelines()["unfiltered"].settings)
-    settings["svm"] = type(settings["svm"])(threshold=1000.0)
-    pipeline = Pipeline(("similarity", "svm", "post"), settings)
-    warnings = fit(FRAMES, {"x": pipeline}, TrainingSettings()).warnings
-    assert any("x: svm has collapsed: it calls 0.0% of its own" in w for w in warnings)
 
 
 # --- Which pixels train ---------------------------------------------------------------------------
