@@ -22,7 +22,6 @@ MANY = "y" * 1_001
         ({"verdict": BIG}, "a text of 12,001 letters, and at most 12,000 are read"),
         ({"a": [{BIG: 1}]}, "a text of 12,001 letters"),
         ({str(n): MANY for n in range(500)}, "its long texts have more than 500,000 letters"),
-        (["z" * 1_000] * 1_001, "a list in it has more than 1,000,000 letters"),
         ([0] * 101, "more than 100 values"),
         ([[[0] * 40] * 2] * 2, "more than 100 values"),
     ],

@@ -252,14 +252,14 @@ class Container:
             for each in (other, record):
                 known[record.id] = each
                 fits.append(self._fit(each, logs))
-            is_second = fits[1] > fits[0] or (fits[1] == fits[0] and checked)
-            known[record.id] = record if is_second else other
-            said, names = "a topic is described here in another way than before", ("that", "this")
-            if checked:
-                said = "the summary describes topics in another way than the data"
-                names = "the summary", "the data"
+            is_this = fits[1] > fits[0] or (fits[1] == fits[0] and checked)
+            known[record.id] = record if is_this else other
+            where, which = "by the summary" if checked else "before", "this" if is_this else "that"
             doubt = "either may be wrong" if fits[0] == fits[1] else "messages fit it better"
-            self.redefined[offset] = f"{said}; {names[is_second]} is believed; {doubt}"
+            self.redefined[offset] = (
+                f"a topic is described here in another way than {where}; {which} is "
+                f"believed; {doubt}"
+            )
         return bool(self.redefined)
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
@@ -337,8 +337,14 @@ def sure_until(container: Container) -> int | None:
 
 
 def _gaps(container: Container) -> Iterator[Damage]:
-    scan, chunks = container.scan, container.chunks
-    places = [(chunk.offset, chunk.start, chunk.end) for chunk in chunks if not chunk.cut]
+    scan = container.scan
+    # Of a chunk that is cut off the messages before the cut were saved.
+    saved = scan.saved_ns
+    places = [
+        (chunk.offset - chunk.cut, chunk.start, saved if chunk.cut and saved else chunk.end)
+        for chunk in scan.chunks
+        if not chunk.cut or saved is not None
+    ]
     for flat in scan.loose.values() if scan.gaps else ():
         places += [(at, time, time) for time, at in zip(flat[::2], flat[1::2], strict=True)]
     places.sort()
@@ -350,8 +356,6 @@ def _gaps(container: Container) -> Iterator[Damage]:
             continue
         number = bisect_left(places, (offset,))
         before = places[number - 1][2] if number else None
-        if chunks and chunks[-1].cut and chunks[-1].offset == offset and scan.saved_ns is not None:
-            before = scan.saved_ns
         after = places[number][1] if number < len(places) else None
         unsure = None
         if lossy and not listed:

@@ -25,6 +25,7 @@ LOOKED_AT: Final = 100
 DEEPEST: Final = 50
 """Frames on the way from a camera to the root, at most: more are a loop."""
 
+_UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError
 Transform = tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
 
@@ -48,22 +49,23 @@ def calibration_of(
     The topic is that whose ``frame_id`` is the images' own; of several, that whose path shares most
     with theirs. The text is empty, too, where the log has no calibration at all.
     """
-    found = {}
+    found = list[Calibration]()
     for topic in topics:
         if topic.kind is TopicKind.CALIBRATION and topic.count:
-            with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
-                found[topic.name] = _read(topic.name, readers[topic.name].fields(0), image.name)
-    own = [e for e in found.values() if not e.frame_id or e.frame_id == image.frame_id]
-    near = {each.topic: _shared(each.topic, image.name) for each in own}
-    best = [each for each in own if near[each.topic] == max(near.values())]
-    if not best or (len(best) > 1 or not (best[0].frame_id or near[best[0].topic])):
-        return None, f"none of {', '.join(found)} is clearly of {image.name}" if found else ""
+            with suppress(*_UNREADABLE):
+                found.append(_read(topic.name, readers[topic.name].fields(0), image.name))
+    own = [each for each in found if each.frame_id in ("", image.frame_id)]
+    near = [_shared(each.topic, image.name) for each in own]
+    best = [each for each, shared in zip(own, near, strict=True) if shared == max(near)]
+    if len(best) != 1 or not (best[0].frame_id or max(near)):
+        names = ", ".join(each.topic for each in found)
+        return None, f"none of {names} is clearly of {image.name}" if found else ""
     (made,) = best
     if not made.matrix[0] or not made.matrix[4]:
         return None, f"{made.topic}: its focal length is 0: the camera was never calibrated"
     if image.size not in (None, (made.width, made.height)):
         return None, f"{made.topic}: it is for images of {made.width}x{made.height}"
-    with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+    with suppress(*_UNREADABLE):
         reader = readers[made.topic]
         if _read(made.topic, reader.fields(len(reader) - 1), image.name) != made:
             return None, f"{made.topic}: it changes within the log"
@@ -101,7 +103,7 @@ def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform
     """Yield each frame's transform in its parent; later ones replace earlier ones."""
     for reader in readers:
         for position in range(min(len(reader), LOOKED_AT)):
-            with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+            with suppress(*_UNREADABLE):
                 message = reader.fields(position)
                 for each in getattr(message, "transforms", [message]):
                     yield _transform(each)
