@@ -107,7 +107,7 @@ class _Parts:
             return bytes(obstore.get(self._place.store, self._place.key, options=options).bytes())
 
         try:
-            content = self._place.ask(part)
+            content = _ask(self._place.url, part)
         except FleetError as error:
             if not str(error).endswith(NO_PARTS):
                 raise
@@ -138,17 +138,14 @@ class _Place:
     store: Any
     key: str = ""
 
-    def ask(self, function: Callable[..., Answer], *arguments: Any) -> Answer:
-        return _ask(self.url, function, *arguments)
-
 
 def _facts(place: _Place) -> tuple[int, str | None]:
     import obstore
 
     try:
-        meta = place.ask(obstore.head, place.store, place.key)
+        meta = _ask(place.url, obstore.head, place.store, place.key)
     except FleetError:  # a signed URL may be good for reading alone
-        meta = place.ask(obstore.get, place.store, place.key).meta
+        meta = _ask(place.url, obstore.get, place.store, place.key).meta
     return meta["size"], meta["e_tag"]
 
 

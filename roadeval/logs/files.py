@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Final
@@ -29,6 +29,8 @@ _NOTE: Final = 16 << 20
 # rosbag2 writes this one way. A parser of YAML would know them all, and ends the process on some.
 _LIST: Final = re.compile(r"^ *relative_file_paths:[ \r]*\n((?: *- .*\n?)+)", re.MULTILINE)
 _ITEM: Final = re.compile(r"^ *-(.*)$", re.MULTILINE)
+
+_NUMBERED: Final = re.compile(r"(.*_)(\d{1,9})\.mcap")
 
 _OTHERS: Final = (
     (0, b"#ROSBAG V", "a ROS 1 bag: mcap convert {path} {stem}.mcap"),
@@ -61,8 +63,9 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
 
     A file in a folder that is no MCAP file is left out, and returned as damage, and so is one that
-    is not there though the folder's `METADATA` lists it. A `LogError` if there is none; the message
-    names what there is instead, and how to convert it.
+    is not there though the folder's `METADATA` lists it, or though those before and after it are: a
+    recorder numbers its files from 0. A `LogError` if there is none; the message names what there
+    is instead, and how to convert it.
     """
     if not path.is_dir():
         _check(path)
@@ -75,9 +78,19 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     files = [file for file in found if file not in {each.path for each in damage}]
     if not files:
         raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
-    lacking = sorted(_listed(path, {*found}) - {*found}, key=natural)
+    lacking = sorted({*_missing(found), *_listed(path, {*found})} - {*found}, key=natural)
     unnamed = "the file is not called *.mcap"
     return files, [*damage, *(Damage(file, 0, _problem(file) or unnamed) for file in lacking)]
+
+
+def _missing(files: Sequence[Path]) -> Iterator[Path]:
+    """Yield the files that lack among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
+    found = [match for file in files if (match := _NUMBERED.fullmatch(file.name))]
+    numbers = {int(match[2]) for match in found}
+    one_name = len({match[1] for match in found}) == 1
+    if one_name and len(found) == len(files) and 0 in numbers and max(numbers) < 2 * len(files):
+        lacking = sorted({*range(max(numbers))} - numbers)
+        yield from (files[0].with_name(f"{found[0][1]}{number}.mcap") for number in lacking)
 
 
 def _listed(folder: Path, there: Set[Path]) -> set[Path]:

@@ -13,9 +13,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import Calibration, Mounting
+from roadeval.data.arrays import Vector
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.topics.reader import TopicInfo, TopicReader
@@ -26,7 +26,7 @@ DEEPEST: Final = 50
 """Frames on the way from a camera to the root, at most: more are a loop."""
 
 _UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError
-Transform = tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]
+Transform = tuple[str, Vector, Vector]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
 
 
@@ -142,13 +142,13 @@ def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | Non
     return None
 
 
-def _product(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64]) -> Any:
+def _product(one: Vector, other: Vector) -> Any:
     """Multiply two quaternions x, y, z, w."""
     (a, b), (c, d) = (one[:3], one[3]), (other[:3], other[3])
     return np.append(b * c + d * a + np.cross(a, c), b * d - a @ c)
 
 
-def _turned(rotation: npt.NDArray[np.float64], point: npt.NDArray[np.float64]) -> Any:
+def _turned(rotation: Vector, point: Vector) -> Any:
     """Turn a point by a unit quaternion."""
     twice = 2 * np.cross(rotation[:3], point)
     return point + rotation[3] * twice + np.cross(rotation[:3], twice)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -137,28 +138,25 @@ def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
 def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
     """Return the fields of a `TopicInfo` that a message shows."""
     picture = reader.picture(position)
+    kind, size, channels = TopicKind.VIDEO, None, 3
     if isinstance(picture, RawPicture):
-        return {
-            "kind": TopicKind.IMAGE,
-            "format": picture.encoding,
-            "size": (picture.width, picture.height),
-            "channels": 1 if raw_format(picture, reader.limits).is_grey else 3,
-            "frame_id": picture.frame_id,
-        }
-    found = {"lossy": lossy_format(picture), "frame_id": picture.frame_id}
-    if (codec := codec_of(picture)) is not None:
-        try:
+        kind, name, size = TopicKind.IMAGE, picture.encoding, (picture.width, picture.height)
+        channels = 1 if raw_format(picture, reader.limits).is_grey else 3
+    elif name := codec_of(picture) or "":
+        with suppress(FrameError, LogError):  # the first frame may not be decodable
             pixels = Video(reader, reader.limits).picture(0).pixels
             size = pixels.shape[1], pixels.shape[0]
-        except (FrameError, LogError):  # the first frame cannot be decoded
-            size = None
-        return found | {"kind": TopicKind.VIDEO, "format": codec, "size": size, "channels": 3}
-    pixels = to_labels(picture, reader.limits)
-    return found | {
-        "kind": TopicKind.COMPRESSED,
-        "format": picture.format,
-        "size": (pixels.shape[1], pixels.shape[0]),
-        "channels": 1 if pixels.ndim == 2 else 3,
+    else:
+        pixels = to_labels(picture, reader.limits)
+        kind, name, size = TopicKind.COMPRESSED, picture.format, pixels.shape[1::-1]
+        channels = 1 if pixels.ndim == 2 else 3
+    return {
+        "kind": kind,
+        "format": name,
+        "size": size,
+        "channels": channels,
+        "lossy": lossy_format(picture),
+        "frame_id": picture.frame_id,
     }
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache, partial
 from itertools import chain, islice
 from pathlib import Path
@@ -64,7 +65,12 @@ def _labels_of(files: Sequence[Path], path: Path, size: Size | None) -> LabelSet
         own = [file for file in files if file.suffix.lower() == ending]
         filled = (file for file in own if file.is_file() and file.stat().st_size)
         for file in islice(filled, _TRIED):
-            if (format_ := _format_of(file, alone=path.is_file())) is not None:
+            try:
+                format_ = _format_of(file)
+            except LogError:
+                if path.is_file():
+                    raise
+            else:
                 return _drawn(own, format_, size)
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
     labels = tuple(map(file_label, of_ids(images)))
@@ -80,22 +86,14 @@ def _readers() -> dict[str, list[LabelFormat]]:
     return found
 
 
-def _format_of(file: Path, *, alone: bool) -> LabelFormat | None:
-    """Return the format of a file; a `LogError` if it is ``alone`` and of no known one."""
-    try:
-        content = _parsed(file)
-    except LogError:
-        if alone:
-            raise
-        return None
-    known = _readers()[file.suffix.lower()]
-    try:
-        found = next((each for each in known if each.holds(file, content)), None)
-    except _NOT_SO:
-        found = None
-    if found is None and alone:
-        raise LogError(f"{file}: not labels of {' or '.join(each.name for each in known)}")
-    return found
+def _format_of(file: Path) -> LabelFormat:
+    """Return the format of a file; a `LogError` if it is of no known one."""
+    content, known = _parsed(file), _readers()[file.suffix.lower()]
+    with suppress(*_NOT_SO):
+        for each in known:
+            if each.holds(file, content):
+                return each
+    raise LogError(f"{file}: not labels of {' or '.join(each.name for each in known)}")
 
 
 def _parsed(file: Path) -> Any:
@@ -141,12 +139,13 @@ def _drawn(files: Sequence[Path], format_: LabelFormat, size: Size | None) -> La
     found = Counter(sorted(name for each in labelled for name in each.classes))
     classes = {name: value for value, name in enumerate(found, 1)}
     broken = [NamedLabel(each, bytes, partial(_raise, why)) for each, why in problems.items()]
-    return LabelSet(
-        [*(_label(each, classes) for each in labelled), *broken],
-        classes,
-        occurring=found,
-        notes=_notes(drawn, labelled, others),
-    )
+    notes = []
+    if others:
+        notes.append(f"{some(others)}: of another format than the other labels, not read")
+    if bare := len(drawn) - len(labelled):
+        notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
+    labels = [*(_label(each, classes) for each in labelled), *broken]
+    return LabelSet(labels, classes, occurring=found, notes=tuple(notes))
 
 
 def _raise(problem: str, *_: Any) -> Picture:
@@ -166,29 +165,19 @@ def _label(drawn: Drawing, classes: dict[str, int]) -> NamedLabel:
     return NamedLabel(Path(drawn.image), drawn.content, picture)
 
 
-def _notes(
-    drawn: Sequence[Drawing], labelled: Collection[Drawing], others: Sequence[str]
-) -> tuple[str, ...]:
-    """Return warnings about the labels, a sentence each."""
-    notes = []
-    if others:
-        notes.append(f"{some(others)}: of another format than the other labels, not read")
-    if bare := len(drawn) - len(labelled):
-        notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
-    return tuple(notes)
-
-
 NPY: Final = ".npy"
 
 
 def file_label(file: Path) -> NamedLabel:
     """Return the label of an image or NPY file."""
     ending = file.suffix.lower()
-    if ending == NPY:
-        return NamedLabel(file, partial(_content, file), npy_picture)
-    return NamedLabel(
-        file, partial(_content, file), lambda data, _: CompressedPicture(0, ending[1:], data)
-    )
+
+    def picture(data: bytes, limits: Limits) -> Picture:
+        return (
+            npy_picture(data, limits) if ending == NPY else CompressedPicture(0, ending[1:], data)
+        )
+
+    return NamedLabel(file, partial(_content, file), picture)
 
 
 def _content(file: Path) -> bytes:

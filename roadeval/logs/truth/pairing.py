@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -410,13 +411,7 @@ def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
     step = 1
     while high < len(stamps) and at(high) < stamp:
         low, high, step = high, min(high + step, len(stamps)), step * 2
-    while low < high:
-        middle = (low + high) // 2
-        if at(middle) < stamp:
-            low = middle + 1
-        else:
-            high = middle
-    return min(low, len(stamps) - 1)
+    return min(bisect_left(range(len(stamps)), stamp, low, high, key=at), len(stamps) - 1)
 
 
 def by_time(labels: LabelPictures, camera: Camera) -> Pairing:

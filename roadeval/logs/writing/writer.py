@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 import numpy as np
-import numpy.typing as npt
 from mcap.writer import Writer
 
 from roadeval.data import Frame, FrameResult, Layer, Tally
+from roadeval.data.arrays import Image
 from roadeval.images import ImageError, format_of, png_of, size_of
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
@@ -86,7 +86,7 @@ class LogWriter:
         self,
         topic: str,
         stamp_ns: int,
-        mask: npt.NDArray[np.uint8],
+        mask: Image,
         *,
         log_time_ns: int | None = None,
         frame_id: str = FRAME_ID,
@@ -169,7 +169,7 @@ class SidecarWriter(LogWriter):
         """
         root = "/".join(filter(None, (ROOT, camera.strip("/"))))
         stamp, log_time = result.frame.stamp_ns, result.frame.log_time_ns
-        images: dict[str, npt.NDArray[np.uint8]] = {}
+        images: dict[str, Image] = {}
         for variant in result.variants:
             for stage, mask in variant.masks():
                 images[f"{root}/{variant.variant}/{stage}"] = mask.pixels() * np.uint8(255)
@@ -219,7 +219,7 @@ class NoSidecar:
         """Nothing is open."""
 
 
-def _coloured(layer: Layer) -> npt.NDArray[np.uint8]:
+def _coloured(layer: Layer) -> Image:
     """Paint a label layer in its classes' colours: ``(H, W, 4)`` RGBA."""
     palette = np.zeros((256, 4), np.uint8)
     for label in layer.spec.classes:

@@ -213,6 +213,17 @@ def test_a_folder_of_split_files_is_one_log(tmp_path: Path) -> None:
         assert chatter.count == messages
 
 
+def test_a_file_that_lacks_between_the_others_is_told(tmp_path: Path) -> None:
+    names = split_bag()
+    for name in names:
+        make(f"real/rosbag2/{name}", tmp_path)
+    folder = tmp_path / "real" / "rosbag2"
+    middle = sorted(folder.glob("*_1.mcap"))[0]
+    middle.unlink()
+    with open_log(folder) as log:
+        assert log.losses[0] == f"{middle.name}: the file is missing (byte 0)"
+
+
 def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch) -> None:
     def refuse(path: Path) -> None:
         raise PermissionError(13, "Permission denied", str(path))
@@ -243,7 +254,7 @@ rosbag2_bagfile_information:
         ("bag/a_0.mcap bag/a_1.mcap", "a_1.mcap", "a_0.mcap"),
         ("'a_0.mcap' \"a_1.mcap\"", "a_1.mcap", "a_0.mcap"),
         ("a_0.mcap a_1.mcap", "a_0.mcap a_1.mcap added.mcap", ""),
-        ("a_0.mcap a_1.mcap a_3.mcap", "a_0.mcap a_3.mcap", "a_1.mcap"),
+        ("a_0.mcap a_1.mcap a_3.mcap", "a_0.mcap a_3.mcap", "a_1.mcap a_2.mcap"),
         ("a_0.mcap a_1.mcap", "renamed.mcap", ""),
     ],
 )
