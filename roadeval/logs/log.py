@@ -168,21 +168,13 @@ class Log:
         """
         sums = {container.path: hashlib.sha256() for container in self._containers}
         done = 0
-
-        def step(size: int) -> None:
-            nonlocal done
-            done += size
-            if on_bytes is not None:
-                on_bytes(done, 2 * self.size)  # chunk by chunk, and as a whole for the sum
-
         for container in self._containers:
-
-            def take(block: bytes, path: Path = container.path) -> None:
-                sums[path].update(block)
-                step(len(block))
-
             try:
-                container.verify(step, take)
+                for size, block in container.verify():
+                    sums[container.path].update(block)
+                    done += size
+                    if on_bytes is not None:
+                        on_bytes(done, 2 * self.size)  # chunk by chunk, and as a whole for the sum
             except BadRecord:
                 return None
         found = [each.hexdigest() for each in sums.values()]

@@ -106,51 +106,41 @@ class _Handler(BaseHTTPRequestHandler):
     server: LocalServer
 
     def do_GET(self) -> None:
-        """Answer a request that only reads."""
-        self._respond(acts=False)
+        """Answer a request, or with the sentence on a defect of the program."""
+        try:
+            request = self._request()
+            response = _REFUSED if request is None else self.server.answer(request)
+        except Exception as error:
+            if debug():
+                traceback.print_exc()
+            response = told(HTTPStatus.INTERNAL_SERVER_ERROR, defect(error))
+        self._send(response)
 
-    def do_POST(self) -> None:
-        """Answer a request that something be done."""
-        self._respond(acts=True)
+    do_POST = do_GET  # noqa: N815 - so the base class calls it
 
     def log_message(self, *_: object) -> None:
         """Log nothing: the terminal is for people."""
 
-    def _respond(self, *, acts: bool) -> None:
-        if not self._is_ours(acts=acts) or (request := self._request(acts=acts)) is None:
-            self._send(_REFUSED)
-        else:
-            self._send(self._answer(request))
+    def _request(self) -> Request | None:
+        """Return what the user, or a page of this server, asks for.
 
-    def _answer(self, request: Request) -> Response:
-        """Return the answer, or the sentence on a defect of the program."""
-        try:
-            return self.server.answer(request)
-        except Exception as error:
-            if debug():
-                traceback.print_exc()
-            return told(HTTPStatus.INTERNAL_SERVER_ERROR, defect(error))
-
-    def _is_ours(self, *, acts: bool) -> bool:
-        """Return whether the request comes from a page of this server, or from the user."""
+        None of what comes from anywhere else, or without the token.
+        """
+        acts = self.command == "POST"
         hosts = {f"{name}:{self.server.server_port}" for name in (HOST, "localhost")}
         host, origin = self.headers.get("Host"), self.headers.get("Origin")
         site = self.headers.get("Sec-Fetch-Site", "same-origin")
         if host not in hosts or site not in ("same-origin", "none"):
-            return False
-        return origin == f"http://{host}" if acts or origin is not None else True
-
-    def _request(self, *, acts: bool) -> Request | None:
-        """Return what is asked for; None without the token."""
+            return None
+        if (acts or origin is not None) and origin != f"http://{host}":
+            return None
         path = urlsplit(self.path).path
         _, token, *parts = path.split("/") if path.startswith("/") else ("", "")
         if not hmac.compare_digest(token.encode(), self.server.token.encode()):
             return None
-        folder = bool(parts) and parts[-1] == ""
+        folder = parts[-1:] == [""]
         named = tuple(parts[:-1] if folder else parts)
-        if not all(map(_SEGMENT.fullmatch, named)):
-            return None
-        return Request(named, acts, folder)
+        return Request(named, acts, folder) if all(map(_SEGMENT.fullmatch, named)) else None
 
     def _send(self, response: Response) -> None:
         self.send_response(response.status)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from array import array
 from bisect import bisect_left
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -140,17 +140,18 @@ class Container:
         """Whether a chunk was found to be unreadable."""
         return chunk != OUTSIDE and self.chunks[chunk].offset in self.reader.bad
 
-    def verify(self, on_bytes: Callable[[int], object], take: Callable[[bytes], object]) -> None:
+    def verify(self) -> Iterator[tuple[int, bytes]]:
         """Read everything, so that all damage is known; a `BadRecord` if the disk fails.
 
-        ``take`` is given the whole log in blocks, ``on_bytes`` how many more bytes were read.
+        Yields how many more bytes were read: first chunk by chunk, then the whole log in blocks.
         """
         for number, chunk in enumerate(self.chunks):
             if number not in self.looked_into:
                 with suppress(BadRecord):
                     self.reader.read(chunk)
-            on_bytes(chunk.data_size)
-        self.read_all(take)
+            yield chunk.data_size, b""
+        for block in self._blocks():
+            yield len(block), block
 
     def fingerprint(self) -> bytes:
         """Return what tells this log from another without its messages: sizes, places, checksums.
@@ -167,12 +168,12 @@ class Container:
         parts += [values.tobytes() for _, values in sorted(self.scan.loose.items())]
         return b"\n".join(parts)
 
-    def read_all(self, take: Callable[[bytes], object]) -> None:
-        """Pass the whole log to ``take`` in blocks, and check the checksum of all data."""
+    def _blocks(self) -> Iterator[bytes]:
+        """Yield the whole log in blocks, and check the checksum of all data."""
         crc, end = 0, self.scan.data_end or 0
         for offset in range(0, len(self.source), BLOCK):
             block = self.source[offset : offset + BLOCK]
-            take(block)
+            yield block
             if self.scan.data_crc and offset < end:
                 crc = zlib.crc32(block[: end - offset], crc)
         self.data_is_right = crc == self.scan.data_crc
@@ -186,7 +187,7 @@ class Container:
         """Check the checksum of all data, unless that was done or the file has none."""
         if self.data_is_right is None and self.scan.data_crc:
             with suppress(BadRecord):
-                self.read_all(len)
+                deque(self._blocks(), 0)
 
     def close(self) -> None:
         """Close the file."""
