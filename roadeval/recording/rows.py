@@ -10,7 +10,7 @@ and bounds neither what a killed run loses nor the memory of what waits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -66,69 +66,58 @@ class PendingRows:
     """The rows of one entity that wait."""
 
     def __init__(self, path: str, columns: Columns) -> None:
-        self._path = path
-        self._columns = columns
-        self._times: list[When] = []
-        self._values: list[Any] = []
+        self._path, self._columns = path, columns
+        self._rows: list[tuple[When, Any]] = []
         self.size = 0
 
     def add(self, when: When, value: Any) -> None:
         """Append a row of a frame, perhaps with `NOTHING`."""
-        self._times.append(when)
-        self._values.append(value)
+        self._rows.append((when, value))
         self.size += _size(value)
 
     def chunk(self) -> Chunk:
         """Return all rows as one chunk."""
-        frames, stamps, logged = zip(*self._times, strict=True)
+        whens, values = zip(*self._rows, strict=True)
+        frames, stamps, logged = np.array(whens).T
         named = zip((STAMP, *LOADER), (stamps, stamps, logged), strict=True)
         times = [
             rr.TimeColumn(FRAME, sequence=frames),
-            *(rr.TimeColumn(n, timestamp=np.array(own, "datetime64[ns]")) for n, own in named),
+            *(rr.TimeColumn(n, timestamp=own.astype("datetime64[ns]")) for n, own in named),
         ]
-        values = [value for value in self._values if value is not NOTHING]
-        columns = self._columns(values)
-        if len(values) < len(self._values):
-            columns = columns.partition([int(value is not NOTHING) for value in self._values])
+        columns = self._columns([value for value in values if value is not NOTHING])
+        if NOTHING in values:
+            columns = columns.partition([int(value is not NOTHING) for value in values])
         return Chunk.from_columns(self._path, times, columns)
 
 
-class Batcher:
+class Batcher(dict[Key, PendingRows]):
     """The rows of entities with the same `WaitLimits`: due together, or one entity's when full."""
 
     def __init__(self, limits: WaitLimits) -> None:
+        super().__init__()
         self._limits = limits
-        self._pending: dict[Key, PendingRows] = {}
         self._frames = self._due = 0
+
+    def __missing__(self, key: Key) -> PendingRows:
+        self[key] = PendingRows(*key)
+        return self[key]
 
     def add(self, path: str, columns: Columns, when: When, value: Any) -> None:
         """Append a row of this kind to the entity at ``path``."""
-        rows = self._pending.get((path, columns))
-        if rows is None:
-            rows = self._pending[path, columns] = PendingRows(path, columns)
-        rows.add(when, value)
+        self[path, columns].add(when, value)
 
     @property
     def size(self) -> int:
         """Bytes of images and text that wait."""
-        return sum(rows.size for rows in self._pending.values())
+        return sum(rows.size for rows in self.values())
 
     def end_frame(self) -> list[Key]:
         """Count a frame; return the keys of rows that are due."""
         self._frames += 1
         if self._frames - self._due >= self._limits.after(self._frames):
             self._due = self._frames
-            return list(self._pending)
-        return [key for key, rows in self._pending.items() if rows.size >= CHUNK_BYTES]
-
-    def __iter__(self) -> Iterator[Key]:
-        return iter(self._pending)
-
-    def __getitem__(self, key: Key) -> PendingRows:
-        return self._pending[key]
-
-    def __delitem__(self, key: Key) -> None:
-        del self._pending[key]
+            return list(self)
+        return [key for key, rows in self.items() if rows.size >= CHUNK_BYTES]
 
 
 def _size(value: Any) -> int:
