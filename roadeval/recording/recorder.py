@@ -321,14 +321,14 @@ class Recorder:
         self._add_images(encoded._replace(payloads={}) if put_aside else encoded)
         for path, state in encoded.states.items():
             if self._states.get(path, "") != state:
-                self._rows.add(path, columns.states, when, state)
+                self._rows[path, columns.states].add(when, state)
                 self._states[path] = state
         for note in encoded.notes:
-            self._rows.add(below + at.NOTES, columns.notes, when, note)
+            self._rows[below + at.NOTES, columns.notes].add(when, note)
         for name, text in lines.items():
-            self._rows.add(below + at.result_path(name), columns.texts, when, text)
+            self._rows[below + at.result_path(name), columns.texts].add(when, text)
         for path, numbers in encoded.numbers.items():
-            self._numbers.add(path, columns.numbers, when, numbers)
+            self._numbers[path, columns.numbers].add(when, numbers)
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
         if put_aside:
@@ -435,7 +435,7 @@ class Recorder:
         # The viewer goes on showing an image until another comes, so a missing one is cleared.
         missing = sorted(self._shown.get(below, set()) - encoded.payloads.keys())
         for path, payload in {**encoded.payloads, **dict.fromkeys(missing, NOTHING)}.items():
-            self._rows.add(path, self._columns[path], when, payload)
+            self._rows[path, self._columns[path]].add(when, payload)
         self._shown[below] = set(encoded.payloads)
 
     def _log_static(self, data: Iterable[tuple[str, list[Any]]], below: str = "") -> None:

@@ -102,10 +102,6 @@ class Batcher(dict[Key, PendingRows]):
         self[key] = PendingRows(*key)
         return self[key]
 
-    def add(self, path: str, columns: Columns, when: When, value: Any) -> None:
-        """Append a row of this kind to the entity at ``path``."""
-        self[path, columns].add(when, value)
-
     @property
     def size(self) -> int:
         """Bytes of images and text that wait."""

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from roadeval.data.words import listing, percent, plain_points, setting
 from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement
 from roadeval.evaluation.score import TESTED
-from roadeval.results.sentences import is_significant, levels, sentence
+from roadeval.results.sentences import is_significant, sentence
 from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
@@ -77,14 +77,11 @@ def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
 
 
 def _sentence(change: Change, base: str, *, several: bool) -> str:
-    what = f"{change.result} instead of {base}"
-    rate = f"{TESTED} of {change.stage}"
-    found = change.difference[TESTED]
-    ends = levels(found, change.base, change.new)
-    told = sentence(found, what, rate, levels=ends)
+    what, rate = f"{change.result} instead of {base}", f"{TESTED} of {change.stage}"
+    said = sentence(change.difference[TESTED], what, rate, (change.base, change.new))
     if change.result == change.variant or not several:
-        return told
-    return f"{change.variant}: {told[0].lower()}{told[1:]}"
+        return said
+    return f"{change.variant}: {said[0].lower()}{said[1:]}"
 
 
 def where(comparison: Comparison) -> list[str]:

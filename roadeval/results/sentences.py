@@ -39,21 +39,25 @@ _OF_FILTER: Final = "The filter "
 BLIND: Final = f"{BASELINE}, which never looks at the image"
 
 
+Rates = Mapping[str, Any]
+"""Rates of a mask by their names."""
+
+
 def sentence(
     found: Difference,
     what: str,
     rate: str,
+    ends: tuple[Rates, Rates] | None = None,
     *,
-    levels: tuple[float, float] | None = None,
     windows: str = "",
     said: str = "",
 ) -> str:
     """Return what a difference says of these frames or drives, and then of others like them.
 
     The difference is with ``what`` minus without: ``the filter``, or ``net instead of blind``;
-    ``rate`` is what changes, as ``ERR of post``. ``levels`` are the rate without and with it, given
-    only where they are of the same frames or drives; ``windows`` says in how many it is lower, in
-    brackets; ``said`` is what a sentence before has said of others like them.
+    ``rate`` is what changes, as ``ERR of post``. ``ends`` are the rates without and with it, which
+    are given where they are of the same frames or drives; ``windows`` says in how many it is lower,
+    in brackets; ``said`` is what a sentence before has said of others like them.
 
     >>> found = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
     >>> sentence(found, "the filter", "ERR")
@@ -66,24 +70,13 @@ def sentence(
     if found.is_zero:
         return f"{here} {what} leaves {rate} of every {unit} as it is."
     by = f"by {_size(found.mean, _digits(found))} pp"
-    if levels is not None:
-        before, after = (_size(level, 1 if abs(found.mean) >= FINE else 2) for level in levels)
-        by = f"from {before} to {after} %"
+    before, after = (each.get(TESTED) for each in ends or ({}, {}))
+    if defined(before) and defined(after) and abs(after - before - found.mean) < ROUNDING:
+        digits = 1 if abs(found.mean) >= FINE else 2
+        by = f"from {_size(before, digits)} to {_size(after, digits)} %"
     doubt = "" if _doubt(found) == said else f"; {_doubt(found)}"
     verb = "raises" if found.mean > 0 else "lowers"
     return f"{here} {what} {verb} {rate} {by}{windows or _counted(found)}{doubt}."
-
-
-def levels(
-    found: Difference, base: Mapping[str, Any], new: Mapping[str, Any]
-) -> tuple[float, float] | None:
-    """Return the error rates without and with; None where not both are of the difference's frames.
-
-    ``base`` and ``new`` are rates by their names.
-    """
-    before, after = base.get(TESTED, math.nan), new.get(TESTED, math.nan)
-    same = defined(before) and defined(after) and abs(after - before - found.mean) < ROUNDING
-    return (before, after) if same else None
 
 
 def _doubt(found: Difference) -> str:
@@ -199,7 +192,7 @@ def correction(differences: Iterable[Difference]) -> str:
 
 
 def verdict(
-    totals: Mapping[str, Mapping[str, Any]],
+    totals: Mapping[str, Rates],
     effects: Sequence[Effect],
     claims: Mapping[str, Mapping[str, int]] | None = None,
     thresholds: Mapping[str, Mapping[str, float]] | None = None,
@@ -233,16 +226,18 @@ def verdict(
         parts = [*whole, f"On these alone: {parts[0]}"]
     parts += at_thresholds(thresholds or {}, rates)
     for base, variant in (pair for pair in finals if pair[1] == pair[0] + TUNED):
-        found = finals[base, variant].rates[TESTED]
-        ends, rate = levels(found, rates[base], rates[variant]), f"{TESTED} of {stages[variant]}"
-        parts.append(sentence(found, f"tuning {base}", rate, levels=ends))
+        found, ends = finals[base, variant].rates[TESTED], (rates[base], rates[variant])
+        parts.append(sentence(found, f"tuning {base}", f"{TESTED} of {stages[variant]}", ends))
     of_filter = finals.get((UNFILTERED, FILTERED))
     if of_filter is not None and of_filter.rates[TESTED].units:
-        found = of_filter.rates[TESTED]
-        ends = levels(found, rates[UNFILTERED], rates[FILTERED])
-        more = {"windows": _in_windows(claims), "said": _doubt(blind) if blind else ""}
-        rate = f"{TESTED} of {of_filter.stage}"
-        parts.append(sentence(found, "the filter", rate, levels=ends, **more))
+        parts.append(
+            sentence(
+                *(of_filter.rates[TESTED], "the filter", f"{TESTED} of {of_filter.stage}"),
+                (rates[UNFILTERED], rates[FILTERED]),
+                windows=_in_windows(claims),
+                said=_doubt(blind) if blind else "",
+            )
+        )
     return " ".join(filter(None, [*parts, _costs_most(totals)]))
 
 
@@ -292,7 +287,7 @@ def from_labels(found: EstimateFacts | None, variant: str) -> Iterator[str]:
 
 
 def at_thresholds(
-    thresholds: Mapping[str, Mapping[str, float]], rates: Mapping[str, Mapping[str, Any]]
+    thresholds: Mapping[str, Mapping[str, float]], rates: Mapping[str, Rates]
 ) -> Iterator[str]:
     """Yield what the threshold of the training frames would bring to each method, in a sentence.
 
@@ -314,7 +309,7 @@ def at_thresholds(
             )
 
 
-def lowest(rates: Mapping[str, Mapping[str, Any]]) -> str | None:
+def lowest(rates: Mapping[str, Rates]) -> str | None:
     """Return the variant with the lowest error rate, of those that have masks of all frames.
 
     ``rates`` are those of final masks by variant, with their number of ``frames``. None if no error
@@ -329,7 +324,7 @@ def lowest(rates: Mapping[str, Mapping[str, Any]]) -> str | None:
     return min(full, key=full.__getitem__, default=None)
 
 
-def _best(best: str, rates: Mapping[str, Mapping[str, Any]], blind: Difference | None) -> str:
+def _best(best: str, rates: Mapping[str, Rates], blind: Difference | None) -> str:
     """Return how wrong the best variant is, and whether it is better than the baseline."""
     several, wrong = len({*rates} - {BASELINE}) > 1, f"{in_percent(rates[best][TESTED]):.1f} %"
     if blind is not None and blind.mean > 0:
@@ -358,7 +353,7 @@ def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:
     return f" (lower in {found['held']} of {counted(found['windows'], 'window')})"
 
 
-def _costs_most(totals: Mapping[str, Mapping[str, Any]]) -> str:
+def _costs_most(totals: Mapping[str, Rates]) -> str:
     """Return how the filtered variant's error rate comes about, and which step adds most to it.
 
     The first mask's own error is what the steps after it start from, and no step's addition.

@@ -25,7 +25,7 @@ def run(frames, rows, limits=WAIT):
     batcher = Batcher(limits)
     for frame in range(frames):
         for path, columns, value in rows(frame):
-            batcher.add(path, columns, (frame, frame, frame), value)
+            batcher[path, columns].add((frame, frame, frame), value)
         for key in batcher.end_frame():
             yield frame, key[0], rows_of(batcher[key])
             del batcher[key]
