@@ -147,9 +147,9 @@ class Layout:
             yield TRUE_SHADOW, SHADOW_TRUTH
         for variant in self.variants:
             for spec in variant.layers:
-                yield layer_path(variant.name, spec.name), spec
+                yield f"/{variant.name}/{spec.name}", spec
             if self.has_truth:
-                yield layer_path(variant.name, ERRORS.name), ERRORS
+                yield f"/{variant.name}/{ERRORS.name}", ERRORS
 
     def plan(self) -> Plan | None:
         """Return the ground as it is shown from above."""
@@ -158,8 +158,8 @@ class Layout:
     def from_above(self) -> Iterator[tuple[str, LayerSpec]]:
         """Yield the entity path and description of what lies on the ground seen from above."""
         if self.ground and self.has_truth:
-            yield ground_path(TRUTH.name), TRUTH
-            yield from ((ground_path(each.name), ERRORS) for each in self.variants)
+            yield f"/ground/{TRUTH.name}", TRUTH
+            yield from ((f"/ground/{each.name}", ERRORS) for each in self.variants)
 
     def scored(self) -> Iterator[tuple[str, str]]:
         """Yield the variant and stage of every counted mask, the baseline last."""
@@ -205,39 +205,6 @@ def prefixes(cameras: Iterable[str]) -> dict[str, str]:
             path += "_"
         found[name] = path
     return found
-
-
-def layer_path(variant: str, layer: str) -> str:
-    """Return the entity path of a variant's layer."""
-    return f"/{variant}/{layer}"
-
-
-def ground_path(name: str) -> str:
-    """Return the entity path of the truth, or of a variant's errors, on the ground."""
-    return f"{GROUND}/{name}"
-
-
-def guide_path(variant: str) -> str:
-    """Return the entity path of a variant's introduction."""
-    return f"{GUIDE}/{variant}"
-
-
-def scalar_path(kind: str, variant: str, stage: str, name: str = "") -> str:
-    """Return the entity path of numbers about a stage.
-
-    ``kind`` is metrics, counts, timing or facts.
-    """
-    return "/".join(("", kind, variant, stage, *([name] if name else [])))
-
-
-def state_path(variant: str) -> str:
-    """Return the entity path of a variant's health."""
-    return f"/state/{variant}"
-
-
-def result_path(name: str) -> str:
-    """Return the entity path of a table or a document."""
-    return f"/results/{name}"
 
 
 _RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")

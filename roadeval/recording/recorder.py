@@ -99,15 +99,15 @@ def _pictures(
     for variant in result.variants:
         for layer in variant.layers():
             if layer.spec.kind in kinds:
-                yield at.layer_path(variant.variant, layer.spec.name), layer.content
+                yield f"/{variant.variant}/{layer.spec.name}", layer.content
     for name, array in errors.items():
-        yield at.layer_path(name, ERRORS.name), array
+        yield f"/{name}/{ERRORS.name}", array
     if plan is not None and frame.image.shape[:2] == (plan.ground.height, plan.ground.width):
         yield at.GROUND, plan.picture(frame.image)
         if frame.truth is not None:
-            yield at.ground_path(TRUTH.name), plan.picture(frame.truth, IGNORE)
+            yield f"/ground/{TRUTH.name}", plan.picture(frame.truth, IGNORE)
         for name, array in errors.items():
-            yield at.ground_path(name), plan.picture(array, IGNORED)
+            yield f"/ground/{name}", plan.picture(array, IGNORED)
 
 
 def _numbers(
@@ -115,17 +115,17 @@ def _numbers(
 ) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Yield rates that are defined, counts, milliseconds and facts by entity path."""
     for tally in result.tallies:
-        mask = tally.variant, tally.stage
+        mask = f"{tally.variant}/{tally.stage}"
         for rate, value in tally.rates.items():
             if rate in rates and not math.isnan(value):
-                yield at.scalar_path("metrics", *mask, rate), (value,)
-        yield at.scalar_path("counts", *mask), (*tally.counts, tally.counts.n)
+                yield f"/metrics/{mask}/{rate}", (value,)
+        yield f"/counts/{mask}", (*tally.counts, tally.counts.n)
     for variant in result.variants:
         for stage in variant.stages:
-            mask = variant.variant, stage.stage
-            yield at.scalar_path("timing", *mask), (stage.seconds * 1e3,)
+            mask = f"{variant.variant}/{stage.stage}"
+            yield f"/timing/{mask}", (stage.seconds * 1e3,)
             for name, value in stage.output.facts.items():
-                yield at.scalar_path("facts", *mask, name), (value,)
+                yield f"/facts/{mask}/{name}", (value,)
 
 
 def worst_error(result: FrameResult, layout: Layout) -> float:
@@ -293,7 +293,7 @@ class Recorder:
             case "worst" if error < self._worst.least:
                 kinds = ()
         states = {at.ROLE: result.role.value}
-        states |= {at.state_path(v.name): health.get(v.name, "") for v in own.layout.variants}
+        states |= {f"/state/{v.name}": health.get(v.name, "") for v in own.layout.variants}
         level = "WARN" if set(health.values()) - {Health.OK} else "INFO"
         payloads, numbers = _payloads(result, own, kinds), _numbers(result, own.layout.rates)
         return EncodedFrame(
@@ -326,7 +326,7 @@ class Recorder:
         for note in encoded.notes:
             self._rows[below + at.NOTES, columns.notes].add(when, note)
         for name, text in lines.items():
-            self._rows[below + at.result_path(name), columns.texts].add(when, text)
+            self._rows[below + f"/results/{name}", columns.texts].add(when, text)
         for path, numbers in encoded.numbers.items():
             self._numbers[path, columns.numbers].add(when, numbers)
         self._end_frame(self._rows)

@@ -32,13 +32,13 @@ _CAMERA: Final = "EncodedImage:blob"
 
 def rig_facts(path: Path) -> Facts | None:
     """Return the facts of all cameras together; None if the run did not get there."""
-    text = RrdFile(path).document(at.result_path(at.SUMMARY))
+    text = RrdFile(path).document(f"/results/{at.SUMMARY}")
     return None if text is None else Facts.parse(text, path)
 
 
 def run_toml_in(path: Path) -> str | None:
     """Return the configuration of a recording's run as TOML; None if the run ended before it."""
-    return RrdFile(path).document(at.result_path("run"))
+    return RrdFile(path).document("/results/run")
 
 
 def _cameras(file: RrdFile) -> dict[str, str]:
@@ -118,7 +118,7 @@ class Recording:
 
     def result(self, name: str) -> str | None:
         """Return the text of a result, as ``summary``; None if the run ended before it."""
-        return self._file.document(at.result_path(name))
+        return self._file.document(f"/results/{name}")
 
     @cached_property
     def facts(self) -> Facts | None:
@@ -156,7 +156,7 @@ class Recording:
         """Return the text of a table; empty if the run counted none."""
         if name not in self.layout.tables:
             return self.result(name) or ""
-        lines = (line for _, line in self._file.rows(at.result_path(name), TEXT))
+        lines = (line for _, line in self._file.rows(f"/results/{name}", TEXT))
         return "".join((self.layout.tables[name].rstrip(), "\n", *lines))
 
     def scalars(self, path: str) -> pd.Series[float]:
@@ -190,14 +190,14 @@ class Recording:
             Masks and labels: ``(H, W)`` uint8, as the stage made them. Maps of numbers:
             ``(H, W)`` float32 in their own unit. Images: ``(H, W, 3)`` uint8 RGB.
         """
-        return self._array(at.layer_path(variant, name), frame)
+        return self._array(f"/{variant}/{name}", frame)
 
     def is_whole(self, frame: int, *, scored: bool) -> bool:
         """Return whether a frame has its image and masks, and if it was scored truth and errors."""
         paths = [at.CAMERA, *[at.TRUTH_PATH] * scored]
         for variant in self.variants:
             names = (*variant.stages, *[ERRORS.name] * scored)
-            paths += (at.layer_path(variant.name, name) for name in names)
+            paths += (f"/{variant.name}/{name}" for name in names)
         found = (self._file.image(path, self._codecs[path].component, frame) for path in paths)
         return all(each is not None for each in found)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import cycle
+from itertools import cycle, product
 from typing import Any, Final
 
 import numpy as np
@@ -70,7 +70,8 @@ def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
         tabs = [_all_cameras(layouts)]
         names = short_names([*layouts])
         for prefix, each in layouts.items():
-            parts = _below(prefix, _tabs(each), each.clouds)
+            parts = _tabs(each)
+            _below(prefix, parts, each.clouds)
             tabs.append(rrb.Tabs(*parts, active_tab=0, name=names[prefix]))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
@@ -89,63 +90,58 @@ def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
     )
 
 
-def _below(
-    prefix: str, parts: Iterable[BlueprintPart], beside: Sequence[str] = ()
-) -> list[BlueprintPart]:
-    """Return views and containers that show the entities below a path, as if they lay at the top.
+def _below(prefix: str, parts: Sequence[BlueprintPart], beside: Sequence[str] = ()) -> None:
+    """Let views and containers show the entities below a path, as if they lay at the top.
 
-    The parts are changed. What lies ``beside`` all cameras stays where it is.
+    What lies ``beside`` all cameras stays where it is.
     """
-    made = []
     for part in parts:
-        if isinstance(part, rrb.View):
-            part.origin = prefix + (part.origin if part.origin != "/" else "")
-            part.contents = [path if path in beside else prefix + path for path in part.contents]
-            own = part.visualizer_overrides
-            part.visualizer_overrides = {prefix + str(path): each for path, each in own.items()}
-        else:
+        if not isinstance(part, rrb.View):
             _below(prefix, part.contents, beside)
-        made.append(part)
-    return made
+            continue
+        part.origin = prefix + (part.origin if part.origin != "/" else "")
+        part.contents = [path if path in beside else prefix + path for path in part.contents]
+        own = part.visualizer_overrides
+        part.visualizer_overrides = {prefix + str(path): each for path, each in own.items()}
 
 
 def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
     """Return the first tab of a rig: each camera with its first variant's errors, and curves."""
-    names, pictures = short_names([*layouts]), []
+    names, pictures, paths = short_names([*layouts]), [], []
     for prefix, layout in layouts.items():
         view = outcome(layout, layout.variants[0])
         view.name = f"{names[prefix]}: {view.name}"
-        pictures += _below(prefix, [view])
-    columns = min(len(pictures), _ABREAST)
-    finals = [
-        (prefix, variant.name, variant.stages[-1])
-        for prefix, layout in layouts.items()
-        for variant in layout.variants[:_ROWS]
-        if layout.has_truth
-    ]
-    paths = [p + at.scalar_path("metrics", v, stage, "ERR") for p, v, stage in finals]
+        _below(prefix, [view])
+        pictures.append(view)
+        variants = layout.variants[:_ROWS] if layout.has_truth else ()
+        paths += [f"{prefix}/metrics/{each.name}/{each.stages[-1]}/ERR" for each in variants]
     curves = [plot("ERR as a fraction, by camera", paths)] if paths else []
     below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
-    grid = rrb.Grid(*pictures, grid_columns=columns)
+    grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
     return rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras")
 
 
 def _tabs(layout: Layout) -> list[BlueprintPart]:
     """Return the views of a camera, a tab each."""
-    tabs = [overview(layout), *(_every_layer(layout, v) for v in layout.variants)]
-    if layout.has_truth:
-        plots = []
-        for stage in dict.fromkeys(stage for _, stage in layout.scored()):
-            variants = [variant for variant, other in layout.scored() if other == stage]
-            for rate in filter(layout.rates.__contains__, SHORT):
-                paths = [at.scalar_path("metrics", variant, stage, rate) for variant in variants]
-                plots.append(plot(f"{rate} of {stage}", paths))
-        tabs += [rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage"), _counts(layout)]
-    tabs.append(rrb.Vertical(*map(stage_times, layout.variants), name="Timing"))
+    tabs = [overview(layout)]
     if layout.ground:
-        tabs.insert(1, _on_the_ground(layout, layout.ground))
+        tabs.append(_on_the_ground(layout, layout.ground))
+    tabs += [_every_layer(layout, variant) for variant in layout.variants]
+    if layout.has_truth:
+        masks = [*layout.scored()]
+        rates = [rate for rate in SHORT if rate in layout.rates]
+        plots = []
+        for stage, rate in product(dict.fromkeys(stage for _, stage in masks), rates):
+            own = [variant for variant, other in masks if other == stage]
+            paths = [f"/metrics/{variant}/{stage}/{rate}" for variant in own]
+            plots.append(plot(f"{rate} of {stage}", paths))
+        tabs.append(rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage"))
+        plots = [plot(f"{v}: pixels of {s}", [f"/counts/{v}/{s}"]) for v, s in masks]
+        columns = max(len(variant.stages) for variant in layout.variants)
+        tabs.append(rrb.Grid(*plots, grid_columns=columns, name="Counts"))
+    tabs.append(rrb.Vertical(*map(stage_times, layout.variants), name="Timing"))
     results = ("windows", "Windows (CSV)"), (at.SUMMARY, "Summary (JSON)")
-    texts = (document(at.result_path(name), title) for name, title in results)
+    texts = (document(f"/results/{name}", title) for name, title in results)
     tabs.append(rrb.Horizontal(*texts, name="Results"))
     return tabs
 
@@ -162,14 +158,14 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
 def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
     """Return the ground in space, below the camera, and from above with each variant's errors."""
     names = [each.name for each in layout.variants[:_OUTCOMES]] if layout.has_truth else []
-    flat = [picture("From above", at.GROUND)]
-    if layout.has_truth:
-        flat.append(picture("Truth: road", at.GROUND, at.ground_path(TRUTH.name)))
-    flat += [picture(f"{name}: errors", at.GROUND, at.ground_path(name)) for name in names]
+    shown = {"Truth: road": TRUTH.name} if layout.has_truth else {}
+    shown |= {f"{name}: errors": name for name in names}
+    flat = [picture(title, at.GROUND, f"/ground/{name}") for title, name in shown.items()]
+    flat = [picture("From above", at.GROUND), *flat]
     if not ground.is_posed or not layout.calibration:
         return rrb.Grid(*flat, grid_columns=len(flat), name="On the ground")
     near, far, _ = layout.extent
-    paths = [at.GROUND, *(at.ground_path(name) for name in names[:1]), at.CAMERA, *layout.clouds]
+    paths = [at.GROUND, *(f"/ground/{name}" for name in names[:1]), at.CAMERA, *layout.clouds]
     space = rrb.Spatial3DView(
         origin="/",
         contents=paths,
@@ -188,16 +184,6 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
     )
     grid = rrb.Grid(*flat, grid_columns=len(flat))
     return rrb.Horizontal(space, grid, column_shares=[2, 3], name="On the ground")
-
-
-def _counts(layout: Layout) -> BlueprintPart:
-    """Return graphs, a row a variant and a column a stage."""
-    plots = [
-        plot(f"{variant}: pixels of {stage}", [at.scalar_path("counts", variant, stage)])
-        for variant, stage in layout.scored()
-    ]
-    columns = max(len(variant.stages) for variant in layout.variants)
-    return rrb.Grid(*plots, grid_columns=columns, name="Counts")
 
 
 def overview(layout: Layout) -> BlueprintPart:
@@ -242,7 +228,7 @@ def _row(
     """
     # Titles must be short here: the layers' names.
     pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
-    header, space = document(at.guide_path(variant)), _PICTURE * (columns - len(cells))
+    header, space = document(f"/results/guide/{variant}"), _PICTURE * (columns - len(cells))
     start, shares = ([aside, header], [space, _HEADER]) if aside else ([header], [_HEADER + space])
     return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[_PICTURE] * len(cells)])
 
@@ -251,12 +237,12 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
     """Return graphs that compare the rates of the final masks, or without truth the times."""
     if not layout.has_truth:
         return [stage_times(variant) for variant in layout.variants[:_ROWS]]
-    finals = [(variant.name, variant.stages[-1]) for variant in layout.variants]
-    finals += [(BASELINE, FINAL_STAGE)] * layout.baseline
+    finals = [f"{variant.name}/{variant.stages[-1]}" for variant in layout.variants]
+    finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
     return [
         plot(
             f"{rate} as a fraction: {SHORT[rate].in_words}",
-            [at.scalar_path("metrics", *final, rate) for final in finals],
+            [f"/metrics/{final}/{rate}" for final in finals],
         )
         for rate in SHORT
         if rate in layout.rates
@@ -281,7 +267,7 @@ def truth() -> BlueprintPart:
 def outcome(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     """Return a view of the variant's errors, or without truth of what it calls road."""
     what, name = ("errors", ERRORS.name) if layout.has_truth else ("road", variant.stages[-1])
-    return picture(f"{variant.name}: {what}", at.CAMERA, at.layer_path(variant.name, name))
+    return picture(f"{variant.name}: {what}", at.CAMERA, f"/{variant.name}/{name}")
 
 
 def is_overlay(spec: LayerSpec) -> bool:
@@ -292,7 +278,7 @@ def is_overlay(spec: LayerSpec) -> bool:
 def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> BlueprintPart:
     """Return one view of layers of a variant."""
     below = [at.CAMERA] if is_overlay(specs[0]) else []
-    return picture(title, *below, *(at.layer_path(variant, spec.name) for spec in specs))
+    return picture(title, *below, *(f"/{variant}/{spec.name}" for spec in specs))
 
 
 def plot(title: str, paths: Sequence[str]) -> BlueprintPart:
@@ -387,14 +373,12 @@ def before_the_first_frame(
     if layout.ground:
         yield from _plane(layout, layout.ground)
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
-    yield at.GUIDE, [_markdown(guide(layout))]
-    for variant in layout.variants:
-        yield at.guide_path(variant.name), [_markdown(_header(variant))]
+    yield from _guides(layout, {})
     yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **layout.properties)]
     for name, header in layout.tables.items():
-        yield at.result_path(name), [rr.AnyValues(header=header.rstrip())]
+        yield f"/results/{name}", [rr.AnyValues(header=header.rstrip())]
     lanes: dict[str, tuple[str, ...]] = {at.ROLE: tuple(Role)}
-    lanes |= {at.state_path(variant.name): tuple(Health) for variant in layout.variants}
+    lanes |= {f"/state/{variant.name}": tuple(Health) for variant in layout.variants}
     for path, states in lanes.items():
         colours = [_STATES[state] for state in states]
         yield path, [rr.StateConfiguration(values=states, colors=colours)]
@@ -467,22 +451,21 @@ def of_a_rig(prefixes: Mapping[str, str], first: Layout) -> StaticData:
     own = {n: v for n, v in first.properties.items() if n not in ("image_topic", "truth_topic")}
     yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **own, cameras=list(prefixes))]
     yield at.CAMERAS, [rr.TextDocument(json.dumps(prefixes))]
-    yield at.GUIDE, [_markdown(_rig_guide(first.drive, prefixes))]
+    yield _rig_guide(first.drive, prefixes)
 
 
 def after_a_rig(texts: Mapping[str, str]) -> StaticData:
     """Yield what is known of several cameras after the last frame."""
     summary = json.loads(texts[at.SUMMARY])
-    drive, cameras = summary["drive"]["name"], summary["cameras"]
-    yield at.GUIDE, [_markdown(_rig_guide(drive, cameras, summary["verdict"]))]
-    for name, text in texts.items():
-        yield at.result_path(name), [rr.TextDocument(text)]
+    yield _rig_guide(summary["drive"]["name"], summary["cameras"], summary["verdict"])
+    yield from _results(texts)
 
 
-def _rig_guide(drive: str, cameras: Iterable[str], verdict: str = "") -> str:
-    names = as_markdown(", ".join(cameras))
-    parts = [f"### {as_markdown(drive)}", "", as_markdown(verdict), "", f"**Cameras:** {names}"]
-    return "\n".join([*parts, "", _ERRORS, "**Tabs:** one for each camera.", "", _HANDLING])
+def _rig_guide(drive: str, cameras: Iterable[str], verdict: str = "") -> tuple[str, list[Any]]:
+    names = f"**Cameras:** {as_markdown(', '.join(cameras))}"
+    return _guide(
+        drive, verdict, names, "", _ERRORS, "**Tabs:** one for each camera.", "", _HANDLING
+    )
 
 
 def _lines(layout: Layout, camera: str) -> StaticData:
@@ -494,8 +477,8 @@ def _lines(layout: Layout, camera: str) -> StaticData:
     for variant, stage in layout.scored():
         for rate in layout.rates:
             line = _line(camera + variant, variants[variant])
-            yield at.scalar_path("metrics", variant, stage, rate), [line]
-        yield at.scalar_path("counts", variant, stage), [counts]
+            yield f"/metrics/{variant}/{stage}/{rate}", [line]
+        yield f"/counts/{variant}/{stage}", [counts]
 
 
 def timing_lines(paths: Iterable[str]) -> StaticData:
@@ -515,14 +498,14 @@ def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData
     else is the same when the same log is replayed again.
     """
     summary = json.loads(texts.get(at.SUMMARY, "{}"))
-    yield at.GUIDE, [_markdown(guide(layout, str(summary.get("verdict", ""))))]
-    for variant in layout.variants:
-        final = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
-        yield at.guide_path(variant.name), [_markdown(_header(variant, final))]
+    yield from _guides(layout, summary)
     yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
     kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
-    for name, text in {**texts, **kept}.items():
-        yield at.result_path(name), [rr.TextDocument(text)]
+    yield from _results({**texts, **kept})
+
+
+def _results(texts: Mapping[str, str]) -> StaticData:
+    yield from ((f"/results/{name}", [rr.TextDocument(text)]) for name, text in texts.items())
 
 
 def _markdown(text: str) -> rr.TextDocument:
@@ -533,8 +516,12 @@ def _line(name: str, colour: Colour) -> rr.SeriesLines:
     return rr.SeriesLines(names=name, colors=colour, widths=2.0)
 
 
-def guide(layout: Layout, verdict: str = "") -> str:
-    """Return the guide to the first tab, after the verdict on the drive if there is one yet."""
+def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
+    """Yield the guide to the first tab and the rows' headers, by a summary if there is one yet.
+
+    The guide begins with the verdict on the drive; a header has the variant's name and title, and
+    the rates of its final mask.
+    """
     names = [as_markdown(variant.name) for variant in layout.variants]
     others = " and ".join(names[_ROWS:])
     rows = _ROW_GUIDE.format(
@@ -542,14 +529,15 @@ def guide(layout: Layout, verdict: str = "") -> str:
         others=f"Those of {others} have tabs of their own." if others else "",
     )
     parts = [_ERRORS, rows, _CURVES] if layout.has_truth else [_NO_TRUTH, rows]
-    return "\n".join(
-        [f"### {as_markdown(layout.drive)}", "", as_markdown(verdict), "", *parts, _HANDLING]
-    )
+    yield _guide(layout.drive, str(summary.get("verdict", "")), *parts, _HANDLING)
+    for variant, name in zip(layout.variants, names, strict=True):
+        rates = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
+        # A heading would break the name in a column as narrow as this one.
+        parts = [f"**{name}**", as_markdown(variant.title)]
+        parts += [f"{rate} {percent(rates[rate])} %" for rate in SHORT if rate in rates]
+        yield f"/results/guide/{variant.name}", [_markdown("\n\n".join(parts) + "\n")]
 
 
-def _header(variant: VariantLayout, rates: Mapping[str, Any] | None = None) -> str:
-    """Return a row's header: name and title, and the rates of its final mask if they are known."""
-    # A heading would break the name in a column as narrow as this one.
-    parts = [f"**{as_markdown(variant.name)}**", as_markdown(variant.title)]
-    parts += [f"{name} {percent(rates[name])} %" for name in SHORT if rates and name in rates]
-    return "\n\n".join(parts) + "\n"
+def _guide(drive: str, verdict: str, *parts: str) -> tuple[str, list[Any]]:
+    text = [f"### {as_markdown(drive)}", "", as_markdown(verdict), "", *parts]
+    return at.GUIDE, [_markdown("\n".join(text))]
