@@ -12,7 +12,6 @@ from roadeval.evaluation.score import Effect
 from roadeval.evaluation.stats import Difference
 from roadeval.results.sentences import (
     correction,
-    levels,
     notes,
     sentence,
     spread_in_words,
@@ -82,8 +81,9 @@ def test_what_does_not_stand_after_correction_is_unclear_and_the_family_is_named
 
 
 def test_rates_of_other_frames_than_the_difference_are_not_given():
-    assert levels(HARM, {"ERR": 0.062}, {"ERR": 0.154}) == (0.062, 0.154)
-    assert levels(HARM, {"ERR": 0.062}, {"ERR": 0.2}) is None
+    same, other = (({"ERR": 0.062}, {"ERR": after}) for after in (0.154, 0.2))
+    assert "raises ERR from 6.2 to 15.4 %;" in sentence(HARM, "the filter", "ERR", same)
+    assert "raises ERR by 9.2 pp;" in sentence(HARM, "the filter", "ERR", other)
 
 
 @pytest.mark.parametrize(
