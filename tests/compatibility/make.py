@@ -33,14 +33,14 @@ COMMANDS: Final = (
 )
 
 
-def make(path: Path) -> None:
-    """Run the commands, and pack what they leave."""
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+def make(folder: Path) -> None:
+    """Run the commands in a folder."""
+    folder.mkdir(exist_ok=True)
+    with chdir(folder):
         drive.write(Path("tiny.mcap"))
         for command in COMMANDS:
             if code := main(command.split()):
                 raise SystemExit(f"{command}: exit code {code}")
-        pack(Path(), path)
 
 
 def pack(folder: Path, path: Path) -> None:
@@ -70,4 +70,6 @@ if __name__ == "__main__":
     target = FOLDER / f"{VERSION}{SUFFIX}"
     if target.exists():
         sys.exit(f"{target} is there already: a new format comes with a new version")
-    make(target)
+    with tempfile.TemporaryDirectory() as made:
+        make(Path(made))
+        pack(Path(made), target)

@@ -30,7 +30,3 @@ def test_the_version_that_wrote_a_model_is_named(made):
     told = f"made by roadeval {version}, whose format is no longer read: train it again"
     with pytest.raises(roadeval.RoadevalError, match=told):
         roadeval.load_model(folder / MODEL)
-
-
-def test_both_versions_are_there():
-    assert {"0.1.0", "0.2.0"} <= set(versions())

@@ -8,7 +8,6 @@ import pytest
 
 from roadeval.errors import RoadevalError
 from tests.fuzz import campaign, harness
-from tests.fuzz.choices import Choices
 from tests.fuzz.harness import NAMES, Harness, Lost, harness_of, run_case
 from tests.fuzz.worker import Job, case_of
 
@@ -78,12 +77,6 @@ def test_a_case_that_takes_long_or_much_is_one(monkeypatch):
 def test_what_a_library_writes_to_standard_error_is_one(capfd):
     found = outcome_of(lambda data: os.write(2, b"libpng error: bad\n"))
     assert (found.kind, found.where) == ("printed", "libpng error: bad")
-
-
-def test_choices_go_on_with_the_first_after_their_bytes_end():
-    choices = Choices(bytes([3, 0]))
-    assert choices.number(5) == 3
-    assert [choices.number(5), choices.of("ab"), choices.bytes(2)] == [0, "a", bytes(2)]
 
 
 def test_a_case_that_ends_its_process_is_kept_and_the_rest_is_tried(tmp_path, monkeypatch):

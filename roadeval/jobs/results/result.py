@@ -156,12 +156,14 @@ class DriveResult:
         """Return the rows of a table, as ``oracles``; none where the run counted none.
 
         A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
-        are left out.
+        are left out, and so are sums over all frames.
         """
         if name not in self._read:
             rows = self._tables.rows(name)
-            cut = not self.complete and len(rows) and name != "unlabelled"
-            self._read[name] = rows.take(np.isin(rows["frame"], self._both)) if cut else rows
+            if not self.complete and len(rows) and name != "unlabelled":
+                frames = rows.columns.get("frame")
+                rows = rows.take(slice(0) if frames is None else np.isin(frames, self._both))
+            self._read[name] = rows
         return self._read[name]
 
     @property
