@@ -59,18 +59,6 @@ def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
     assert told(demo.recording, "--frame", "12") == "frame 12\n"
 
 
-def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse, told):
-    pictured = DriveResult(sparse.recording).pictured
-    assert worst(sparse) not in pictured
-    rows = [
-        (float(row["ERR"]), int(row["frame"]))
-        for row in sparse.table("frames")
-        if (row["variant"], row["stage"]) == ("filtered", "post") and int(row["frame"]) in pictured
-    ]
-    said = f"frame {max(rows)[1]}, the worst with pictures (--frame N or --worst K takes"
-    assert told(sparse.recording).startswith(said)
-
-
 def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(sparse, monkeypatch):
     shown = []
     monkeypatch.setattr("roadeval.recording.viewer.show", lambda path, frame: shown.append(frame))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import Counts, Health, Packed, Role
+from roadeval.data import Health, Packed, Role
 from roadeval.evaluation.score import (
     BlindPrior,
     Scoreboard,
@@ -31,21 +31,6 @@ def a_drive(frames: int, board: Scoreboard) -> Scoreboard:
         frame = a_frame(TRUTH, number)
         board.add(board.score(frame, Role.EVALUATED, (FILTERED, UNFILTERED)))
     return board
-
-
-def test_every_mask_of_every_variant_is_tallied_and_blind_comes_last() -> None:
-    board = a_board(BlindPrior.of_truths([pixels("#...", "#...")]))
-    result = board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
-    assert [(tally.variant, tally.stage) for tally in result.tallies] == [
-        ("filtered", "svm"),
-        ("filtered", "post"),
-        ("unfiltered", "svm"),
-        ("unfiltered", "post"),
-        ("blind", "post"),
-    ]
-    assert result.tallies[1].counts == Counts(tp=3, tn=3, fp=0, fn=1)
-    assert result.tallies[1].rates["FNR"] == 0.25
-    assert result.tallies[4].counts == Counts(tp=2, tn=3, fp=0, fn=2)
 
 
 @pytest.mark.parametrize("role", [Role.TRAINING, Role.GAP, Role.UNLABELLED])

@@ -7,7 +7,7 @@ import pytest
 from sklearn.metrics import average_precision_score, f1_score, precision_recall_curve
 
 from roadeval.data import CODES, histogram
-from roadeval.evaluation.score import Curves, Thresholds, at_levels
+from roadeval.evaluation.score import Thresholds, at_levels
 
 TOP = CODES - 1
 
@@ -78,14 +78,3 @@ def test_levels_hold_256_codes_each():
     levels = at_levels(counts)
     assert levels.shape == (2, 256)
     assert levels[1, [0, 1, 255]].tolist() == [3, 4, 8]
-
-
-def test_frames_add_up_in_any_order():
-    frames = [{("net", "post"): histogram(*drawn(seed))} for seed in range(3)]
-    one, other = Curves(), Curves()
-    for each in frames:
-        one.add(each)
-    for each in reversed(frames):
-        other.add(each)
-    assert one.totals() == other.totals()
-    assert one.totals()["net"]["post"]["frames"] == 3

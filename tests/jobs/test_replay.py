@@ -118,14 +118,6 @@ def test_pictures_are_recorded_by_the_rule(drive, tmp_path, rule, pictured, laye
                 recording.layer("filtered", layer, 14)
 
 
-@pytest.mark.parametrize("jobs", [1, 3])
-def test_the_worst_frames_pictures_are_those_of_the_highest_err(drive, tmp_path, jobs):
-    recording = roadeval.Recording(run(drive, tmp_path, record="worst:4", jobs=jobs).recording)
-    final = frames_of(tmp_path).query("stage == 'post' and variant != 'blind'")
-    worst = final.groupby("frame").ERR.max().sort_values(ascending=False, kind="stable")
-    assert list(recording.frame_numbers) == sorted(worst.index[:4])
-
-
 @pytest.fixture
 def earlier(once, tmp_path):
     """A folder with the outputs of an earlier run, and what it holds."""

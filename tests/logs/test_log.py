@@ -110,23 +110,6 @@ def test_a_stamp_beyond_all_clocks_cannot_be_read(
         assert reader.stamp(0) == (stamp if stamp == 2**63 - 1 else UNREADABLE)
 
 
-def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> None:
-    mask = grey(0)
-    mask[:, 4:] = 255
-    messages = [
-        ("/cam", 1, compressed(1, jpeg(grey(9)))),
-        ("/net/road", 1, raw(1, mask, "mono8")),
-        ("/truth/shadow", 1, raw(1, 255 - mask, "mono8")),
-    ]
-    path = ros2_log(tmp_path / "net.mcap", messages)
-    topics = TopicSettings(image="/cam", masks={"net": "/net/road"})
-    with open_log(path, LogConfig(topics=topics)) as log:
-        frame = next(log.frames(log.select())).decode()
-    assert np.array_equal(frame.external["net"], mask // 255)
-    assert frame.shadow_truth is not None
-    assert np.array_equal(frame.shadow_truth, 1 - mask // 255)
-
-
 def check_drive(path: Path, labels: LabelSettings, frames: int, *, labelled: bool) -> None:
     """Every frame is labelled, or none, and the truth has all its values."""
     with open_log(path, LogConfig(labels=labels)) as log:

@@ -207,15 +207,6 @@ def test_the_metric_is_on_the_screen_of_replay(workshop):
     assert re.search(r"\ndifference .* BACC, pp\n", workshop.done("replay"))
 
 
-def test_the_metric_is_in_the_tables_and_charts_of_the_report(report):
-    (key_table,) = re.findall(r"final mask ((?:[A-Z]+ )+)pooled", report)
-    assert key_table.split() == ["ERR", "FPR", "FNR", "ACC", "BACC"]
-    # Over the drive, and in the chart of the stages.
-    assert report.count("BACC: balanced accuracy, %") == 2
-    assert "Further rates over the drive." in report
-    assert "FPR, pp FNR, pp BACC, pp better worse" in report
-
-
 def test_the_metric_is_compared_by_its_direction(workshop):
     compared = json.loads(workshop.done("compared"))
     final = [change for change in compared["changes"] if change["final"]]

@@ -84,6 +84,14 @@ def test_neighbours_that_are_alike_narrow_the_interval_which_still_holds():
     assert np.median(widths) < 0.8 * np.median(simple_widths)
 
 
+def test_few_labels_or_an_unknown_score_give_the_plain_mean():
+    scores, rates = a_drive(0)
+    few, many = draw_order(91, 1)[: REGRESSION_FROM - 1], draw_order(91, 1)[:20]
+    assert estimate(rates[few], scores[few], scores).mean == pytest.approx(rates[few].mean())
+    unknown = np.where(np.arange(91) == 4, np.nan, scores)
+    assert estimate(rates[many], unknown[many], unknown).mean == pytest.approx(rates[many].mean())
+
+
 @pytest.mark.parametrize("labels", [5, 10, 25])
 def test_the_interval_holds(labels):
     held = 0

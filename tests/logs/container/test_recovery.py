@@ -272,24 +272,6 @@ def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
-    [
-        (b"\x28\xb5\x2f\xfd" + bytes(99), "compressed as a whole by zstd"),
-        (LOGS["broken/ok.mcap"].data(), "the file is not called *.mcap"),
-    ],
-)
-def test_a_file_that_a_recorder_lists_and_that_is_not_read_is_told(
-    tmp_path: Path, data: bytes, told: str
-) -> None:
-    (tmp_path / "a_0.mcap").write_bytes(LOGS["broken/ok.mcap"].data())
-    (tmp_path / "a_1.mcap.zstd").write_bytes(data)
-    (tmp_path / "metadata.yaml").write_text(NOTE.format("a_0.mcap\n    - a_1.mcap.zstd"))
-    with open_log(tmp_path) as log:
-        assert log.losses[0].startswith("a_1.mcap.zstd: ")
-        assert told in log.losses[0]
-
-
-@pytest.mark.parametrize(
     "note",
     [
         b"",

@@ -11,7 +11,6 @@ from roadeval.images import Limits
 from roadeval.logs import FrameError, FrameSettings, LogConfig, TopicKind, open_log
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, Video, is_keyframe
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar
-from tests.fixtures.make import make
 from tests.fixtures.shared import both
 
 H264 = "fox_pb_CompressedVideo_h264.mcap"
@@ -43,16 +42,6 @@ def test_a_start_amid_the_video_begins_at_the_keyframe_before(
     late = frames(log, start=f"{start}ns")
     assert [frame.number for frame in late] == [7, 8, 9, 10, 11]
     assert np.array_equal(late[0].image, whole[7].image)
-
-
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
-@pytest.mark.parametrize("other", ["ros2_CompressedImage_h264", "ros2_FFMPEGPacket_h264"])
-def test_one_stream_is_the_same_in_every_message(log: Path, other: str, tmp_path: Path) -> None:
-    beside = log.with_name(f"{other}.mcap")
-    if not beside.exists():
-        make(f"flavours/{beside.name}", tmp_path)
-    pairs = zip(frames(log), frames(beside), strict=True)
-    assert all(np.array_equal(a.image, b.image) for a, b in pairs)
 
 
 class Packets:

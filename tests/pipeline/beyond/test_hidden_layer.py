@@ -102,6 +102,10 @@ def test_the_network_has_less_to_say_in_the_shade(light, weight):
     assert network_weight(values, TreesSettings()) == pytest.approx(weight)
 
 
+def test_without_a_feature_that_tells_light_the_weight_is_that_in_the_light():
+    assert network_weight(np.zeros((3, 1), np.float32), TreesSettings(features=("place",))) == 2 / 3
+
+
 @pytest.mark.parametrize(
     ("changed", "why"),
     [

@@ -249,18 +249,6 @@ def test_what_stands_on_top_sees_the_base_as_its_last_feature(sample, learnt):
     assert (adapted.forest.feature == learnt.inputs).any()
 
 
-def test_adapted_trees_know_what_other_drives_taught():
-    nothing_to_see = replace(SMALL, features=("place",), least=20)
-    base = trees.fit(every_pixel((5, 9, 13)), nothing_to_see)
-    adapted = trees.adapt(base, every_pixel((3,)), nothing_to_see)
-    image, truth = picture(3, seed=99)
-    right = [
-        (trees.bind(nothing_to_see, each)(View.of(image)).mask.pixels() == truth).mean()
-        for each in (base, adapted)
-    ]
-    assert right[1] > right[0]
-
-
 def test_parts_that_see_other_features_are_refused(sample, learnt):
     other = trees.fit(sample, replace(SMALL, features=("place",)))
     with pytest.raises(ValueError, match="the forest takes 3 features of a pixel, and the network"):
