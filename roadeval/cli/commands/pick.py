@@ -7,8 +7,6 @@ from pathlib import Path
 from shlex import join, quote
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import Given, takes
@@ -24,33 +22,28 @@ if TYPE_CHECKING:
 def pick(
     sources: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="DRIVE|RESULT",
-            show_default=False,
-            help="Camera logs (MCAP), which are replayed first, results of them with their "
-            "recordings, or a fleet's folder.",
-            readable=False,
+        arguments.argument(
+            "DRIVE|RESULT",
+            "Camera logs (MCAP), which are replayed first, results of them with their recordings, "
+            "or a fleet's folder.",
         ),
     ],
     *,
     count: Annotated[
-        int, typer.Option("-n", "--count", metavar="N", min=1, max=100_000, help="Frames to label.")
+        int, arguments.option("-n --count", "Frames to label.", "N", min=1, max=100_000)
     ],
     output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="FOLDER", help="Where they land, or go on.", readable=False
-        ),
+        Path, arguments.option("-o --output", "Where they land, or go on.", "FOLDER")
     ],
     form: Annotated[
         Literal["png", "coco", "labelme", "cvat"],
-        typer.Option("--format", help="Of the present masks, which are to be corrected."),
+        arguments.option("--format", "Of the present masks, which are to be corrected."),
     ] = "png",
     variant: Annotated[
         str | None,
-        typer.Option("--by", metavar="NAME", help="Whose masks and doubt. Default: the first."),
+        arguments.option("--by", "Whose masks and doubt. Default: the first.", "NAME"),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the drawing.")] = 0,
+    seed: Annotated[int, arguments.option("--seed", "Of the drawing.", "N", min=0)] = 0,
     given: Given,
     quiet: arguments.Quiet = False,
 ) -> int:
