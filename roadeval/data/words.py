@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from itertools import takewhile
+from os.path import commonprefix
 from typing import Any, Final, TypeGuard
 
 DASH: Final = "\N{EN DASH}"
@@ -128,17 +128,14 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     >>> short_names(["/front/image_raw", "/rear/image_raw"])
     {'/front/image_raw': 'front', '/rear/image_raw': 'rear'}
     """
-    parts = {name: name.strip("/").split("/") for name in names}
-
-    def shared(paths: Sequence[Sequence[str]]) -> int:
-        same = (len({*each}) == 1 for each in zip(*paths, strict=False))
-        return sum(1 for _ in takewhile(bool, same)) if len(paths) > 1 else 0
-
-    begin = shared([*parts.values()])
-    end = shared([own[:begin:-1] for own in parts.values()])
-    short = {name: "/".join(own[begin : len(own) - end]) for name, own in parts.items()}
-    clear = len({*short.values()}) == len(short) and ("" not in short.values() or len(short) == 1)
-    return short if clear else {name: name for name in names}
+    parts = [name.strip("/").split("/") for name in names]
+    begin = end = 0
+    if len(names) > 1:
+        begin = len(commonprefix(parts))  # noqa: RUF071 - of lists it compares part by part
+        end = len(commonprefix([own[:begin:-1] for own in parts]))  # noqa: RUF071
+    short = ["/".join(own[begin : len(own) - end]) for own in parts]
+    clear = len({*short}) == len(short) and ("" not in short or len(short) == 1)
+    return dict(zip(names, short if clear else names, strict=True))
 
 
 def listing(words: Sequence[str]) -> str:
