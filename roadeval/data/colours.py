@@ -5,8 +5,6 @@ of colour vision can tell apart. Colours are sRGB, ``(r, g, b)`` of 0..255 each.
 
 >>> hex_of(FP)
 '#D55E00'
->>> with_opacity(FP, 220)
-(213, 94, 0, 220)
 """
 
 from __future__ import annotations
@@ -53,11 +51,6 @@ RING: Final = YELLOW
 
 CLEAR: Final = (0, 0, 0, 0)
 """Fully transparent: what is under it shows."""
-
-
-def with_opacity(colour: Colour, opacity: int) -> ColourWithOpacity:
-    """Return the colour with an opacity, from 0 (clear) to 255 (opaque)."""
-    return (*colour, opacity)
 
 
 _ON_PAPER: Final = {YELLOW: BLACK, GREY: (138, 138, 138)}

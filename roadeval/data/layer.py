@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from roadeval.data import colours
 from roadeval.data.arrays import FN, FP, IGNORED, TN, TP, Packed
-from roadeval.data.colours import CLEAR, with_opacity
+from roadeval.data.colours import CLEAR
 from roadeval.data.frame import IGNORE, NON_ROAD, ROAD
 
 
@@ -78,9 +78,9 @@ class Layer:
 
 ROAD_CLASSES: Final = (
     LabelClass(NON_ROAD, "non-road", CLEAR),
-    LabelClass(ROAD, "road", with_opacity(colours.ROAD, 160)),
+    LabelClass(ROAD, "road", (*colours.ROAD, 160)),
 )
-IGNORED_CLASS: Final = LabelClass(IGNORE, "ignored", with_opacity(colours.IGNORE, 160))
+IGNORED_CLASS: Final = LabelClass(IGNORE, "ignored", (*colours.IGNORE, 160))
 TRUTH: Final = LayerSpec("truth", LayerKind.MASK, "Ground truth", (*ROAD_CLASSES, IGNORED_CLASS))
 ERRORS: Final = LayerSpec(
     "errors",
@@ -88,10 +88,10 @@ ERRORS: Final = LayerSpec(
     "Errors of the final mask",
     (
         LabelClass(TN, "TN", CLEAR),
-        LabelClass(TP, "TP", with_opacity(colours.TP, 160)),
-        LabelClass(FP, "FP", with_opacity(colours.FP, 220)),
-        LabelClass(FN, "FN", with_opacity(colours.FN, 220)),
-        LabelClass(IGNORED, "ignored", with_opacity(colours.IGNORE, 160)),
+        LabelClass(TP, "TP", (*colours.TP, 160)),
+        LabelClass(FP, "FP", (*colours.FP, 220)),
+        LabelClass(FN, "FN", (*colours.FN, 220)),
+        LabelClass(IGNORED, "ignored", (*colours.IGNORE, 160)),
     ),
 )
 

@@ -74,12 +74,11 @@ class Network:
         from onnxruntime import __version__
 
         named = self.file.metadata.get("license") or self.file.metadata.get("licence") or ""
-        licence = visible(" ".join(named.split()))
         return {
             "onnxruntime": __version__,
             "file": self.file.path.name,
             "sha256": self.file.sha256,
-            "licence": (licence if len(licence) <= QUOTED else f"{licence[:QUOTED]}...") or None,
+            "licence": visible(" ".join(named.split())) or None,
             "inputs": [str(each) for each in self.file.inputs],
             "outputs": [str(each) for each in self.file.outputs],
             "road": [*map(str, self.settings.road or ())],
@@ -178,8 +177,6 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
 
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
-QUOTED: Final = 1000
-"""Letters of a licence that results quote."""
 
 
 def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:

@@ -25,7 +25,7 @@ from roadeval.data import (
     as_plain,
     is_plain,
 )
-from roadeval.data.colours import CLEAR, SHADOW, with_opacity
+from roadeval.data.colours import CLEAR, SHADOW
 from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
 from roadeval.geometry.ground import Ground
@@ -184,7 +184,7 @@ SHADOW_TRUTH: Final = LayerSpec(
     "True shadow",
     (
         LabelClass(0, "lit", CLEAR),
-        LabelClass(1, "shadow", with_opacity(SHADOW, 160)),
+        LabelClass(1, "shadow", (*SHADOW, 160)),
         IGNORED_CLASS,
     ),
 )

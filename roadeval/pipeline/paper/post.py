@@ -25,7 +25,7 @@ BOUNDARY: Final = mask_spec(
     "boundary",
     "Road boundary (Eq. 22)",
     none=colours.CLEAR,
-    boundary=colours.with_opacity(colours.BOUNDARY, 255),
+    boundary=(*colours.BOUNDARY, 255),
 )
 
 

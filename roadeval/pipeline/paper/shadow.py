@@ -31,8 +31,8 @@ from roadeval.kernels import KERNELS
 from roadeval.kernels.plain import paint, ring_pairs
 from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
-SHADOW_COLOUR: Final = colours.with_opacity(colours.SHADOW, 160)
-RING_COLOUR: Final = colours.with_opacity(colours.RING, 220)
+SHADOW_COLOUR: Final = (*colours.SHADOW, 160)
+RING_COLOUR: Final = (*colours.RING, 220)
 
 NDI: Final = LayerSpec("ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0))
 SHADOW: Final = mask_spec("shadow", "Shadow mask (Eq. 8)", lit=colours.CLEAR, shadow=SHADOW_COLOUR)
