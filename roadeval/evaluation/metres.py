@@ -7,10 +7,9 @@ counting again as if the camera stood otherwise, see `STANCES`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -217,8 +216,7 @@ def survey_of(ground: Ground, settings: EvaluationSettings, shape: tuple[int, in
     return Survey(ground.scaled(shape[1], shape[0]), settings)
 
 
-@dataclass(frozen=True, eq=False)
-class _Line:
+class _Line(NamedTuple):
     """A line on the ground: the pixels that it crosses, and where it enters and leaves them."""
 
     pixels: Pixels

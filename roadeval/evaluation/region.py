@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from math import isqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.kernels import KERNELS
 
 
-@dataclass(frozen=True, eq=False)
-class LabelledFrame:
+class LabelledFrame(NamedTuple):
     """The input of a region: a frame, its packed truth, and what the variants made of it."""
 
     frame: Frame
@@ -28,8 +27,7 @@ class LabelledFrame:
     """The places of its pixels on the ground; None where the camera is not known."""
 
 
-@dataclass(frozen=True)
-class Region:
+class Region(NamedTuple):
     """A region, or several that are found together."""
 
     titles: Mapping[str, str] | Callable[[Collection[str], int], Mapping[str, str]]

@@ -226,7 +226,7 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
     """Yield the drives that changed, and the regions and frames in which masks differ."""
     if comparison.drives:
         yield Heading("Which drives changed")
-        yield Text(told.discovery_note(), "note")
+        yield Text(told.DISCOVERY, "note")
         yield from _plot(comparison)
         yield from changed_drives(comparison)
     if comparison.regions:

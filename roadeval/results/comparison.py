@@ -21,18 +21,12 @@ NAMED: Final = 5
 
 def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dict[str, Any]:
     """Return the content of a comparison's JSON file: its facts, and the sentences on them."""
-    facts = asdict(comparison)
-    drives = [
-        {**fact, "changed": row.changed}
-        for row, fact in zip(comparison.drives, facts.pop("drives"), strict=True)
-    ]
     return {
         "format": FORMAT,
         "changed": changed_settings(comparison),
         "verdict": verdict(comparison),
         "where": where(comparison),
-        **facts,
-        "drives": drives,
+        **asdict(comparison),
         "false_discovery_rate": FALSE,
         "conditions": [_condition(each) for each in judgements],
     }
@@ -164,12 +158,10 @@ def headline(holds: Sequence[bool | None]) -> str:
     return f"failed, {listing(found)}"
 
 
-def discovery_note() -> str:
-    """Return what it means that a drive is called changed."""
-    return (
-        f"Of the drives that are called changed, at most {percent(FALSE, 0)} % on average are not "
-        "(Benjamini and Hochberg's correction over the drives; q is the p-value after it)."
-    )
+DISCOVERY: Final = (
+    f"Of the drives that are called changed, at most {percent(FALSE, 0)} % on average are not "
+    "(Benjamini and Hochberg's correction over the drives; q is the p-value after it)."
+)
 
 
 def junit_xml(comparison: Comparison, judgements: Iterable[Judgement]) -> bytes:

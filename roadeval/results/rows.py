@@ -169,14 +169,13 @@ def score_rows(
             final = facts.finals[variant] == stage
             mask = {"variant": variant, "stage": stage, "final": final}
             further = {
+                **beyond,
                 "boundary_f": beyond.get("boundary_F"),
                 "boundary_iou": beyond.get("boundary_IoU"),
                 "episodes": beyond.get("episodes", {}).get("episodes"),
                 "episode_seconds": beyond.get("episodes", {}).get("seconds"),
-                "flicker": beyond.get("flicker"),
-                "truth_flicker": beyond.get("truth_flicker"),
             }
-            yield {**mask, "region": ALL, **total, **(further if final else {})}
+            yield {**mask, "region": ALL, **(further if final else {}), **total}
             for (name, after, region), sums in regions.items():
                 if (name, after) == (variant, stage):
                     yield {**mask, "region": region, **sums}

@@ -7,9 +7,8 @@ begins with its drive and camera, so that the tables of many drives are those of
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import SIGNS
@@ -43,8 +42,7 @@ TYPES: Final = dict(
 """The type of each kind, as NumPy and Arrow call it."""
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """A column of a table, with one line of documentation."""
 
     name: str
@@ -57,8 +55,7 @@ class Column:
         return self.kind in (Kind.NAME, Kind.TEXT)
 
 
-@dataclass(frozen=True)
-class TableSchema:
+class TableSchema(NamedTuple):
     """A table: ``<name>.csv`` in the results of a drive, ``<name>.parquet`` in those of a fleet."""
 
     name: str

@@ -133,11 +133,8 @@ class DriveChange:
     difference: Difference
     q: float | None
     """The p-value after Benjamini and Hochberg's correction over all drives."""
-
-    @property
-    def changed(self) -> bool:
-        """Whether it is among the drives that are called changed."""
-        return self.q is not None and self.q <= FALSE
+    changed: bool
+    """Whether it is among the drives that are called changed."""
 
 
 @dataclass(frozen=True)
@@ -470,7 +467,7 @@ class _Against:
             rows = [
                 DriveChange(
                     *(self.label, variant, stage, each.part.name, each.new["frames"]),
-                    *(base[TESTED], each.new[TESTED], within, q),
+                    *(base[TESTED], each.new[TESTED], within, q, q is not None and q <= FALSE),
                 )
                 for (each, base, within), q in zip(own, values, strict=True)
             ]

@@ -7,8 +7,7 @@ understood as well as a complete one.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -82,8 +81,7 @@ def merged(chains: Iterable[Iterable[str]]) -> list[str]:
     return names
 
 
-@dataclass(frozen=True, eq=False)
-class Causes:
+class Causes(NamedTuple):
     """Each frame's error rate, taken apart."""
 
     frames: Sums

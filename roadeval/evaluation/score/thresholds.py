@@ -18,9 +18,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise, permutations
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -51,8 +50,7 @@ def at_levels(counts: Sums) -> Sums:
     return levels
 
 
-@dataclass(frozen=True, eq=False)
-class Thresholds:
+class Thresholds(NamedTuple):
     """The outcomes at each threshold, from the highest to the lowest that occurs."""
 
     codes: Sums

@@ -73,8 +73,7 @@ class _Models(NamedTuple):
     """``(g,)``: variance of the mean, in the series' variance."""
 
 
-@dataclass(frozen=True, eq=False)
-class MeanDistribution:
+class MeanDistribution(NamedTuple):
     """Distribution of the mean of a process, given a series that is a stretch of it."""
 
     mean: float
