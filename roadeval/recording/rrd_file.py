@@ -106,24 +106,19 @@ class RrdFile:
 
         A `DamagedError` if it cannot be read.
         """
-        if path not in self._kept or not self._kept[path][0].holds(frame):
-            all_places = self._places.get(self.below + path, ())
-            places = [each for each in all_places if each.span != ALWAYS]
-            here = [each for each in places if each.span.holds(frame)]
-            # Between two messages: the last frame of the one before, the first of the one after.
-            span = Span(
-                max([-inf, *(p.span.last + 1 for p in places if p.span.last < frame)]),
-                min([inf, *(p.span.first - 1 for p in places if p.span.first > frame)]),
-            )
-            if here:
-                firsts, lasts = zip(*(each.span for each in here), strict=True)
-                span = Span(max(firsts), min(lasts))
+        kept = self._kept.get(path)
+        if kept is None or not kept[0].holds(frame):
+            places = self._places.get(self.below + path, ())
+            here = [each for each in places if each.span != ALWAYS and each.span.holds(frame)]
+            if not here:
+                return None
+            firsts, lasts = zip(*(each.span for each in here), strict=True)
             images: dict[int, pa.ListScalar] = {}
             for batch in self._at(component, here):
                 frames = batch.column(FRAME).to_pylist()
                 images |= zip(frames, flat(batch.column(component)), strict=True)
-            self._kept[path] = span, images
-        blob = self._kept[path][1].get(frame)
+            kept = self._kept[path] = Span(max(firsts), min(lasts)), images
+        blob = kept[1].get(frame)
         return None if blob is None else bytes(np.from_dlpack(blob.values))
 
     def _at(self, component: str, places: Iterable[Place]) -> Iterator[pa.RecordBatch]:

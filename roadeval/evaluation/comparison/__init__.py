@@ -18,7 +18,6 @@ from roadeval.evaluation.comparison.conditions import (
     judge,
 )
 from roadeval.evaluation.comparison.pairing import (
-    Disagreement,
     MovedFrame,
     Part,
     Side,
@@ -27,6 +26,5 @@ from roadeval.evaluation.comparison.pairing import (
     match_drives,
     matched,
     one_drive,
-    region_counts,
     truth_differs,
 )

@@ -9,11 +9,9 @@ from roadeval.evaluation.stats.autocorrelation import (
     within_drive,
 )
 from roadeval.evaluation.stats.drives import (
-    STUDENT_FROM,
     DriveMean,
     group_means,
     over_drives,
-    sign_flip_can_tell,
     sign_flip_interval,
     sign_flip_p,
     strata,
