@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from heapq import heappushpop
 from itertools import islice
 from typing import Final, TypeVar
@@ -257,7 +257,7 @@ class LoggedFrame:
         A `FrameError` if the image or a label of it cannot be decoded.
         """
         try:
-            return at_scale(self._decode(), self.selection.scale)
+            return self._decode()
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
             self.accounting.undecodable[self.number] = str(error)
@@ -270,15 +270,17 @@ class LoggedFrame:
         if isinstance(picture, FrameError):
             raise picture
         image = to_rgb(picture, self.selection.camera.images.limits)
-        labels = {name: self._label(label, image) for name, label in self.labels.items()}
+        logged = image.shape[1], image.shape[0]
+        size = scaled_size(logged, self.selection.scale)
+        labels = {name: self._label(label, logged, size) for name, label in self.labels.items()}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
-        is_file = isinstance(picture, CompressedPicture)
+        is_file = isinstance(picture, CompressedPicture) and self.selection.scale == 1
         format_ = format_of(picture.data) if is_file else None
         return Frame(
             self.number,
             self.stamp_ns,
             self.log_time_ns,
-            image,
+            image if size == logged else _averaged(image, size),
             picture.data,
             format_.media_type if format_ else None,
             None if truth is None else truth.truth,
@@ -292,27 +294,26 @@ class LoggedFrame:
             },
         )
 
-    def _label(self, label: Label, image: Rgb) -> Labels:
-        """Decode a label, and bring it to the size of the image."""
+    def _label(self, label: Label, *sizes: tuple[int, int]) -> Labels:
+        """Decode a label, and bring it to the size of the image: as logged, then as read."""
         try:
             found = label.read(self.selection.camera.images.limits)
         except BadMessage as error:
             raise FrameError(f"{label.place}: {error}") from error
-        height, width = image.shape[:2]
-        high, wide = found.truth.shape
-        if (high, wide) == (height, width):
-            return found
-        if not self.selection.camera.resize_labels:
+        theirs, ours = found.truth.shape[1::-1], sizes[0]
+        if theirs != ours and not self.selection.camera.resize_labels:
             raise FrameError(
-                f"{label.place} is {wide}x{high}, its image {width}x{height}: "
+                f"{label.place} is {theirs[0]}x{theirs[1]}, its image {ours[0]}x{ours[1]}: "
                 "scale the labels with `topics.resize_truth`"
             )
-        probability = found.probability
-        return replace(
-            found,
-            truth=_nearest(found.truth, (width, height)),
-            probability=None if probability is None else _nearest(probability, (width, height)),
-        )
+        for size in sizes:
+            if found.truth.shape[1::-1] != size:
+                probability = found.probability
+                found = Labels(
+                    _nearest(found.truth, size),
+                    None if probability is None else _nearest(probability, size),
+                )
+        return found
 
 
 class FrameStream:
@@ -398,28 +399,6 @@ class FrameStream:
         return False
 
 
-def at_scale(frame: Frame, scale: float) -> Frame:
-    """Reduce a frame to a share of its width and height, at most 1.
-
-    Colours are averaged over the area of each new pixel; labels are the nearest pixel's. The
-    payload stays the logged file, by which a frame is recognised, but no longer this image's.
-    """
-    if scale == 1:
-        return frame
-    import cv2
-
-    size = scaled_size((frame.image.shape[1], frame.image.shape[0]), scale)
-    return replace(
-        frame,
-        image=cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA),
-        media_type=None,
-        truth=None if frame.truth is None else _nearest(frame.truth, size),
-        shadow_truth=None if frame.shadow_truth is None else _nearest(frame.shadow_truth, size),
-        external={name: _nearest(mask, size) for name, mask in frame.external.items()},
-        probabilities={name: _nearest(each, size) for name, each in frame.probabilities.items()},
-    )
-
-
 def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
     """Yield the frames of several cameras of a log by log time, each with its camera's place.
 
@@ -429,6 +408,13 @@ def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]
     whose = np.repeat(np.arange(len(streams)), [len(each) for each in streams])
     for place in whose[np.argsort(times, kind="stable")].tolist():
         yield place, next(streams[place])
+
+
+def _averaged(image: Rgb, size: tuple[int, int]) -> Rgb:
+    """Reduce an image to a width and height: colours are averaged over the area of a new pixel."""
+    import cv2
+
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _nearest(labels: Pixels, size: tuple[int, int]) -> Pixels:
