@@ -12,23 +12,10 @@ import typer
 from roadeval.cli.app import explain, main
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.signals import Stopped
-from roadeval.errors import RoadevalError
 
 
 def lines(capsys):
     return capsys.readouterr().err.splitlines()
-
-
-def test_a_known_problem_is_one_line_and_exit_code_1(capsys):
-    assert explain(RoadevalError("drive.mcap: no image topic")) == 1
-    assert lines(capsys) == ["roadeval: error: drive.mcap: no image topic"]
-
-
-def test_what_the_rooms_noted_on_an_error_is_told_with_it(capsys):
-    error = RoadevalError("disk full")
-    error.add_note("the partial recording is out.partial.rrd")
-    explain(error)
-    assert lines(capsys) == ["roadeval: error: disk full; the partial recording is out.partial.rrd"]
 
 
 @pytest.mark.parametrize(

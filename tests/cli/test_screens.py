@@ -1,4 +1,4 @@
-"""What a replay came to, and tables, on a screen."""
+"""What a replay came to, on a screen."""
 
 import io
 from pathlib import Path
@@ -7,10 +7,7 @@ import pytest
 from rich.console import Console
 
 from roadeval.cli.screens import replay as outcome
-from roadeval.cli.screens.tables import show_table
-from roadeval.data.words import DASH, MINUS
 from roadeval.jobs.run.replay import Outcome
-from roadeval.report.blocks import Cell, Table
 from roadeval.results.facts import DriveFacts, FrameAccount
 from tests.report.making import a_total
 from tests.results.making import facts_of
@@ -47,28 +44,3 @@ def test_what_to_type_next_can_be_typed_here(display, first, monkeypatch, tmp_pa
     programs = [line.split()[1:] for line in shown.splitlines() if line.startswith("next ")]
     assert all(Path(program).exists() for program, *_ in programs)
     assert [first in " ".join(words[:2]) for words in programs] == [True, first == "inspect", False]
-
-
-def printed(width, table):
-    out = Console(file=io.StringIO(), width=width)
-    show_table(table, out)
-    return [line.split() for line in out.file.getvalue().splitlines() if line and "─" not in line]
-
-
-def test_columns_that_do_not_fit_stand_below_with_the_names_again():
-    titles = ["variant", "stage", "ERR %", "FPR %", "pooled ERR %"]
-    row = ["filtered", "post", "1.00", Cell("2.00", bold=True), "3.00"]
-    assert printed(42, Table(titles, [row], text_columns=(0, 1))) == [
-        ["variant", "stage", "ERR", "%", "FPR", "%"],
-        ["filtered", "post", "1.00", "2.00"],
-        ["variant", "stage", "pooled", "ERR", "%"],
-        ["filtered", "post", "3.00"],
-    ]
-
-
-def test_numbers_are_ascii_alone():
-    rows = [["a", f"{MINUS}2.00 to {MINUS}1.00 *"], ["b", DASH]]
-    assert printed(80, Table(["", "interval"], rows))[1:] == [
-        ["a", "-2.00", "to", "-1.00", "*"],
-        ["b", "-"],
-    ]

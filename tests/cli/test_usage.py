@@ -62,11 +62,6 @@ def test_a_mistyped_command_is_guessed(capsys):
             "--variant mine names no file: preset: there is no 'mine'; choose gated, hsi, paper, "
             "printed, printed_order, robust",
         ),
-        (
-            ["replay", "a.mcap", "--variant", "mine=hsii"],
-            "--variant mine names no file: preset: there is no 'hsii'; choose gated, hsi, paper, "
-            "printed, printed_order, robust",
-        ),
     ],
 )
 def test_options_that_do_not_go_together_are_told_without_calling_a_value_invalid(

@@ -12,7 +12,6 @@ from threading import Thread
 import pytest
 
 import roadeval
-from tests.e2e.commands import here
 from tests.e2e.serving import serving, status
 
 
@@ -56,12 +55,6 @@ def test_a_signal_ends_it_at_once_and_its_port_is_free(number, demo):
         assert "Traceback" not in run.stderr.read()
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(address, timeout=5)
-
-
-def test_what_is_no_result_is_one_line(tmp_path):
-    run = here("serve", tmp_path / "missing.rrd")
-    assert run.returncode == 1
-    assert len(run.stderr.splitlines()) == 1
 
 
 def listening(process):

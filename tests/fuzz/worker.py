@@ -27,19 +27,8 @@ from tests.fuzz.harness import Harness, Outcome, harness_of, run_case
 ROOM: Final = 96
 """Random bytes of a case whose harness chooses by them."""
 INSTRUMENTED: Final = (
-    *(
-        "roadeval.images",
-        "roadeval.logs",
-        "roadeval.recording.codecs",
-        "roadeval.recording.codecs",
-    ),
-    *(
-        "roadeval.recording.layout",
-        "roadeval.recording.recording",
-        "roadeval.recording.rrd_file",
-        "roadeval.results",
-    ),
-    *("roadeval.training.model", "roadeval.config", "mcap", "mcap_ros1", "mcap_ros2"),
+    *("roadeval.config", "roadeval.images", "roadeval.logs", "roadeval.recording"),
+    *("roadeval.results", "roadeval.training.model", "mcap", "mcap_ros1", "mcap_ros2"),
     *("mcap_protobuf", "zipfile", "tomllib"),
 )
 """Modules whose branches guide Atheris."""

@@ -4,13 +4,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 from mcap.writer import CompressionType
 
 from roadeval.logs import (
     FrameSettings,
-    LabelSettings,
     LogConfig,
     LogError,
     LogWriter,
@@ -19,7 +17,6 @@ from roadeval.logs import (
 )
 from roadeval.logs.container import records
 from roadeval.logs.topics.reader import UNREADABLE
-from tests.fixtures.shared import shared
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789
@@ -108,37 +105,6 @@ def test_a_stamp_beyond_all_clocks_cannot_be_read(
             reader, "_decoder", lambda _: SimpleNamespace(stamp=lambda _data: stamp)
         )
         assert reader.stamp(0) == (stamp if stamp == 2**63 - 1 else UNREADABLE)
-
-
-def check_drive(path: Path, labels: LabelSettings, frames: int, *, labelled: bool) -> None:
-    """Every frame is labelled, or none, and the truth has all its values."""
-    with open_log(path, LogConfig(labels=labels)) as log:
-        stream = log.frames(log.select())
-        frame = next(stream).decode()
-        rest = list(stream)
-    assert len(rest) == frames - 1
-    assert all(each.labelled == labelled for each in rest)
-    if labelled:
-        assert frame.truth is not None
-        assert set(np.unique(frame.truth)) == {0, 1, 255}
-
-
-STREET = LabelSettings((3,), (11,))
-
-
-@pytest.mark.parametrize("folder", shared("drives"))
-@pytest.mark.parametrize(
-    ("name", "labels", "frames", "labelled"),
-    [
-        ("camvid_0016E5_15hz", STREET, 101, True),
-        ("camvid_0006R0_1hz", LabelSettings(), 101, True),
-        ("ford_shadows_unlabelled_raw", LabelSettings(), 39, False),
-    ],
-)
-def test_real_drives(
-    folder: Path, name: str, labels: LabelSettings, frames: int, labelled: bool
-) -> None:
-    check_drive(folder / f"{name}.mcap", labels, frames, labelled=labelled)
 
 
 # --- All that there is to say about a log, as plain data ------------------------------------------

@@ -27,12 +27,6 @@ def test_masks_and_labels_of_every_frame_come_back_equal(drive, recording):
                 np.testing.assert_array_equal(back, layer.array)
 
 
-def test_truth_and_error_map_come_back_equal(drive, recording):
-    np.testing.assert_array_equal(recording.truth(4), drive[4].frame.truth)
-    errors = recording.layer("filtered", "errors", 4)
-    np.testing.assert_array_equal(errors, drive[4].errors["filtered"].array)
-
-
 def test_the_cameras_own_file_is_passed_on(tmp_path):
     shown = frame(0)
     jpeg = cv2.imencode(".jpg", shown.image, [cv2.IMWRITE_JPEG_QUALITY, 30])[1].tobytes()

@@ -95,14 +95,6 @@ def test_a_part_of_another_shape_is_damage(part, value):
         Facts.parse(changed(**{part: value}), "here")
 
 
-@pytest.mark.parametrize("part", ["verdict", "drive", "frames", "totals"])
-def test_a_document_without_its_first_parts_is_no_summary(part):
-    content = json.loads(WRITTEN.text())
-    del content[part]
-    with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
-        Facts.parse(json.dumps(content), "here")
-
-
 def test_a_number_that_was_changed_is_damage():
     other = {**TOTALS, "filtered": {"post": {"ERR": 0.3, "frames": 100}}}
     with pytest.raises(ResultsError, match=r"here: damaged \(its content is not what was"):
