@@ -82,6 +82,13 @@ def recording_path(folder: Path, drive: str) -> Path:
     return folder / RECORDINGS / f"{drive}.rrd"
 
 
+def inside(path: Path, folder: Path) -> Path:
+    """Return a path in a fleet's folder; a `ResultsError` if a link there leads out of it."""
+    if leads_outside(path, folder):
+        raise ResultsError(f"{path}: a link leads out of the fleet's folder; remove it")
+    return path
+
+
 def is_final(row: Mapping[str, Any]) -> bool:
     """Return whether a row is of a final mask, on all pixels where the table has regions."""
     return bool(row["final"]) and row.get("region", ALL) == ALL
@@ -113,16 +120,11 @@ class FleetFolder:
 
         A `ResultsError` if a link there leads out of the folder.
         """
-        return self._inside(recording_path(self.path, drive))
+        return inside(recording_path(self.path, drive), self.path)
 
     def results(self, drive: str) -> Path:
         """Return where the results folder of a drive lies, as of `recording`."""
-        return self._inside(results_path(self.path, drive))
-
-    def _inside(self, path: Path) -> Path:
-        if leads_outside(path, self.path):
-            raise ResultsError(f"{path}: a link leads out of the fleet's folder; remove it")
-        return path
+        return inside(results_path(self.path, drive), self.path)
 
     def table(self, name: str) -> pa.Table:
         """Read a table."""
@@ -335,8 +337,7 @@ class FleetWriter:
                 )
             (self.folder / RECORDS).mkdir(parents=True, exist_ok=True)
             for each in self.folder.iterdir():  # the folder may come from anybody
-                if leads_outside(each, self.folder):
-                    raise ResultsError(f"{each}: a link leads out of the fleet's folder; remove it")
+                inside(each, self.folder)
 
     def finish(
         self,

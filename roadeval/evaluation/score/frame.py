@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -183,11 +183,6 @@ def judge(rates: Rates, blind: Rates | None) -> Health:
     return Health.DEGRADED if worse or rates["ERR"] >= DEGRADED_ERR else Health.OK
 
 
-_NEAREST: Final = 0
-_LINEAR: Final = 1
-"""OpenCV's numbers for the two, so that importing this module does not import OpenCV."""
-
-
 @dataclass(frozen=True, eq=False)
 class BlindPrior:
     """Where the road was in the training frames."""
@@ -195,7 +190,6 @@ class BlindPrior:
     road: Values
     """``(H, W)`` float32: the share of the training frames in which a pixel was road, among those
     that label it; 0 where none does."""
-    _masks: dict[tuple[int, int], Packed] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of_truths(cls, truths: Sequence[Truth]) -> BlindPrior:
@@ -208,27 +202,22 @@ class BlindPrior:
         road = np.zeros(truths[0].shape, np.float32)
         labelled = np.zeros_like(road)
         for truth in truths:
-            resized = _resized(truth, road.shape, _NEAREST)
+            resized = _resized(truth, road.shape, mixed=False)
             road += resized == ROAD
             labelled += resized != IGNORE
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
-        """Return the baseline's mask for a frame of ``shape`` (height, width): road from one half.
-
-        It is computed once for a shape, and read-only.
-        """
-        if shape not in self._masks:
-            mask = Packed.of(_resized(self.road, shape, _LINEAR) >= 0.5)
-            mask.bits.flags.writeable = False
-            self._masks[shape] = mask
-        return self._masks[shape]
+        """Return the mask for a frame of ``shape`` (height, width): road from one half."""
+        return Packed.of(_resized(self.road, shape, mixed=True) >= 0.5)
 
 
-def _resized(image: Cells, shape: tuple[int, ...], how: int) -> Cells:
+def _resized(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
+    """Return an image in another size; where its values may not be ``mixed``, the nearest."""
     if image.shape == shape:
         return image
     import cv2
 
+    how = cv2.INTER_LINEAR if mixed else cv2.INTER_NEAREST
     resized: Cells = cv2.resize(image, (shape[1], shape[0]), interpolation=how)
     return resized
