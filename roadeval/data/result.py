@@ -309,11 +309,21 @@ class Rows:
         groups: list[tuple[Any, Cells]] = [((), np.arange(len(self)))]
         for column in map(self.columns.__getitem__, names):
             groups = [
-                ((*known, value), places[column[places] == value])
+                ((*known, value), places[own])
                 for known, places in groups
-                for value in dict.fromkeys(column[places].tolist())
+                for value, own in _each(column[places])
             ]
         yield from groups
+
+
+def _each(values: Cells) -> Iterator[tuple[Any, Cells]]:
+    """Yield the different ones of many values, as they first occur, and where each is."""
+    left = np.ones(len(values), bool)
+    while left.any():
+        value = values[left.argmax()]
+        own = values == value
+        left &= ~own
+        yield value.item(), own
 
 
 T = TypeVar("T")

@@ -197,7 +197,16 @@ def _arrays(table: pa.Table, columns: Iterable[Column]) -> Rows:
 
 def _words(column: pa.ChunkedArray) -> Cells:
     """Return a column of words as an array of text; a missing one is empty."""
-    return np.array([word or "" for word in column.to_pylist()], str)
+    import pyarrow as pa
+
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    chunks = column.unify_dictionaries().chunks
+    if not chunks:
+        return np.zeros(0, str)
+    # Each word once: a table of an hour has millions of rows.
+    words = np.array([*chunks[0].dictionary.to_pylist(), ""], str)
+    return np.asarray(words[np.concatenate([_filled(each.indices, -1) for each in chunks])])
 
 
 def _numbers(column: pa.ChunkedArray) -> Cells:
