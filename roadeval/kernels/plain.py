@@ -166,9 +166,9 @@ def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     pixel = np.flatnonzero(ring)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(labels, width), [2 * width + 1] * 2)
     near = windows[np.nonzero(ring)].reshape(len(pixel), (2 * width + 1) ** 2)
-    keys = np.unique(near.astype(np.int64) * labels.size + pixel[:, None])
-    label, pixel = np.divmod(keys, labels.size)
-    return label[label > 0], pixel[label > 0]
+    inside = near > 0
+    keys = np.unique(near[inside].astype(np.int64) * labels.size + pixel[np.nonzero(inside)[0]])
+    return keys // labels.size, keys % labels.size
 
 
 def _sums(labels: Places, colours: Plane, count: int) -> Sums:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval
 
-from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.reference_patch import ReferencePatch, Share
 from roadeval.runtime.settings import Flag
 
 
@@ -49,7 +49,7 @@ class TrainingSettings:
     """
     patch: ReferencePatch = field(default_factory=ReferencePatch)
     """Self-supervision: the trapezoid in front of the vehicle that is taken for road."""
-    horizon: Annotated[float, Interval(ge=0, le=1)] = 0.4
+    horizon: Share = 0.4
     """Self-supervision: pixels above this share of the height are not road."""
     far: Annotated[float, Interval(gt=0, le=1_000_000)] = 1.0
     """Self-supervision: pixels below the horizon whose distance from the patch is less than this

@@ -43,7 +43,7 @@ from roadeval.pipeline.beyond.features import (
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.beyond.scene import Scene, scene_of, stretched
-from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.reference_patch import ReferencePatch, Share
 from roadeval.pipeline.stage import (
     GREATEST,
     MisfitError,
@@ -190,6 +190,9 @@ GEODESIC: Final = LayerSpec(
 )
 
 
+Count = Annotated[int, Field(ge=1, le=10_000)]
+
+
 @stage_settings
 class TreesSettings:
     """Settings of the boosted trees."""
@@ -203,15 +206,15 @@ class TreesSettings:
     distance to its mask's edge."""
     patch: ReferencePatch = ReferencePatch()
     """The reference patch, from which distances of colour and paths are measured."""
-    trees: Annotated[int, Field(ge=1, le=1000)] = 150
+    trees: Count = 150
     """How many. What a decision costs grows with them."""
     leaves: Annotated[int, Field(ge=2, le=LEAVES)] = 31
     """Of a tree, at most."""
-    least: Annotated[int, Field(ge=1, le=10_000)] = 50
+    least: Count = 50
     """Training pixels of a leaf, mirrored ones included, at least."""
-    hidden: Annotated[int, Field(ge=1, le=1024)] = 64
+    hidden: Count = 64
     """Planes of the network. What a decision costs grows with them, too."""
-    passes: Annotated[int, Field(ge=1, le=1000)] = 12
+    passes: Count = 12
     """Of the network's training through as many pixels as were sampled."""
     noise: Annotated[float, Field(ge=0, le=10)] = 0.1
     """Deviation of what is added in training to each input of the network, -1 to 1."""
@@ -220,7 +223,7 @@ class TreesSettings:
     the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
     the shade. By default it is 1 where images of the frame's size taught the trees, which are
     taken for the camera's own, and 4 where other cameras did: there it may mend much."""
-    threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
+    threshold: Share = 0.5
     """A pixel is road where it is more probable than this."""
 
     @field_validator("features")

@@ -226,9 +226,8 @@ def moments_of_sums(sums: Sums) -> Moments:
     The variance is taken about the grey level next to the mean, in integers: nothing cancels,
     a constant component has a deviation of exactly 0, and no component is too large.
     """
-    # Whole numbers below 2^53, so that their products and differences are exact in float64. By
-    # columns in memory, so that NumPy works on contiguous values.
-    exact = sums.astype(np.float64, order="F")
+    # Whole numbers below 2^53, so that their products and differences are exact in float64.
+    exact = sums.astype(np.float64)
     n, first, second = np.maximum(exact[:, :1], 1.0), exact[:, 1:4], exact[:, 4:]
     mean = first / n
     level = np.rint(mean)
@@ -285,12 +284,7 @@ def compensate(view: View, found: Components, ring: Packed, settings: ShadowSett
         return _compensate_hsi(view.image, found.labels(), ring, settings)
     inside = KERNELS.run_sums(view.planes, found.runs, count)
     around = KERNELS.ring_sums(view.planes, found.runs, ring.bits, count, width)
-    # In one call: most of its time does not depend on their number.
-    m = moments_of_sums(np.concatenate([inside, around]))
-    parts = np.s_[:count], np.s_[count:]
-    halves = [Moments(m.pixels[each], m.mean[each], m.deviation[each]) for each in parts]
-    # The kernels take C-contiguous arrays.
-    linear = map(np.ascontiguousarray, compensation(halves[0], halves[1], settings))
+    linear = compensation(moments_of_sums(inside), moments_of_sums(around), settings)
     return KERNELS.transfer(view.image, found.runs, *linear)
 
 
