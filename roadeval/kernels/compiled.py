@@ -101,9 +101,7 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
     height, columns = _shape(*planes)
     _require(ring, height, -(-columns // 64))
     sums, reached = np.zeros((count, 7), np.int64), np.zeros(count, np.int64)
-    first = np.full(height + 2 * width + 1, len(runs))
-    first[: width + 1] = 0
-    first[width + 1 : height + width + 1] = np.bincount(runs[:, 0], minlength=height).cumsum()
+    first = np.searchsorted(runs[:, 0], np.arange(-width, height + width + 1))
     merge = np.empty(3 * (2 * width + 1), np.int64)
     of_runs, of_ring = (runs, first), (ring, ring.shape[1], width)
     _loops.ring_sums(*planes, height, columns, *of_runs, *of_ring, sums, reached, merge)

@@ -52,7 +52,7 @@ class Tensor:
     @classmethod
     def of(cls, found: Any) -> Tensor:
         """Convert onnxruntime's description."""
-        kind = re.sub(r"^tensor\((.*)\)$", r"\1", found.type)
+        kind = found.type.removeprefix("tensor(").removesuffix(")")
         sizes = tuple(n if isinstance(n, int) and n > 0 else None for n in found.shape)
         return cls(found.name, {"float": "float32", "double": "float64"}.get(kind, kind), sizes)
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, field_validator
+from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.errors import RoadevalError
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Channels = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+OfChannels = Field(min_length=1, max_length=3)
 Side = Annotated[int, Field(ge=1, le=16384)]
 Class = Annotated[int, Field(ge=0, le=65535)]
 
@@ -37,13 +38,13 @@ class NetSettings:
     """The order of its input's dimensions: N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None
     """The order of its channels, by default ``rgb``. ``grey``: a single channel."""
-    scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    scale: Positive | None = None
     """A grey level of 0..255 is multiplied by this first; by default by 1/255, and by 1 where the
     network takes whole numbers."""
-    mean: Channels | None = None
+    mean: Annotated[tuple[Number, ...], OfChannels] | None = None
     """Subtracted from that: one number for each channel in the order of ``channels``, or one for
     all; by default 0."""
-    deviation: Channels | None = None
+    deviation: Annotated[tuple[Positive, ...], OfChannels] | None = None
     """The difference is divided by this: one number for each channel in the order of ``channels``,
     or one for all; by default 1."""
     outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
@@ -73,10 +74,3 @@ class NetSettings:
         if self.layout == "NCHW":
             return 1, self.channel_count, height, width
         return 1, height, width, self.channel_count
-
-    @field_validator("deviation")
-    @classmethod
-    def _positive(cls, deviation: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if deviation is not None and min(deviation) <= 0:
-            raise ValueError("must be above 0")
-        return deviation

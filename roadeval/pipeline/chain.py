@@ -23,11 +23,6 @@ class Pipeline:
     chain: tuple[str, ...]
     settings: Mapping[str, Any]
 
-    @classmethod
-    def default(cls, chain: Sequence[str]) -> Pipeline:
-        """Return a pipeline of these stages with their default settings."""
-        return cls(tuple(chain), {stage.name: stage.settings() for stage in stages_of(chain)})
-
     def stages(self) -> tuple[Stage, ...]:
         """Return the stages, in order."""
         return stages_of(self.chain)

@@ -46,16 +46,6 @@ from roadeval.data import (
 from roadeval.data.arrays import Flags, Places, Planes
 from roadeval.errors import RoadevalError
 
-__all__ = [
-    "Output",
-    "Stage",
-    "TrainingSet",
-    "View",
-    "per_view",
-    "perfect_mask",
-    "stage_settings",
-]
-
 T = TypeVar("T")
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet
-from roadeval.pipeline.stages import STAGES
+from roadeval.pipeline.stages import STAGES, stages_of
 from tests.pipeline.images import noise
 
 NAMES = ("shadow", "similarity", "svm", "post")
@@ -19,6 +19,11 @@ SETTINGS = {
         "post": STAGES["post"].settings(operations=("close", "open")),
     },
 }
+
+
+def default(*chain):
+    """A pipeline of some stages with their default settings."""
+    return Pipeline(chain, {stage.name: stage.settings() for stage in stages_of(chain)})
 
 
 def fitted(settings):

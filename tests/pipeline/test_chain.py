@@ -10,7 +10,7 @@ from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import View
 from roadeval.pipeline.stages import STAGES
 from tests.pipeline.images import IMAGES, noise
-from tests.pipeline.making import NAMES, SETTINGS, chain_of
+from tests.pipeline.making import NAMES, SETTINGS, chain_of, default
 
 
 @pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
@@ -105,14 +105,14 @@ def test_what_was_handed_out_is_not_changed_by_the_next_image(chains):
 
 
 def test_without_its_filters_a_pipeline_keeps_the_other_settings():
-    pipeline = Pipeline.default(("exposure", *NAMES))
+    pipeline = default("exposure", *NAMES)
     bare = pipeline.without_filter()
     assert bare.chain == ("exposure", "similarity", "svm", "post")
     assert bare.settings == {name: pipeline.settings[name] for name in bare.chain}
 
 
 def test_what_is_learnt_depends_on_filters_and_on_stages_that_learn():
-    pipeline = Pipeline.default(NAMES)
+    pipeline = default(*NAMES)
     assert pipeline.learning() == ("similarity", "svm")
     assert list(pipeline.relevant()) == ["shadow", "similarity", "svm"]
 
@@ -120,7 +120,7 @@ def test_what_is_learnt_depends_on_filters_and_on_stages_that_learn():
 def test_what_is_learnt_does_not_depend_on_settings_of_inference_only(monkeypatch):
     another = dataclasses.replace(STAGES["svm"], name="another", inference_only=("gamma", "c"))
     monkeypatch.setitem(STAGES, "another", another)
-    kept = Pipeline.default(("another", "post")).relevant()
+    kept = default("another", "post").relevant()
     assert {name: set(own) for name, own in kept.items()} == {"another": {"kernel", "threshold"}}
 
 

@@ -5,10 +5,10 @@ import pytest
 
 from roadeval.config import ConfigError, configure
 from roadeval.data import Moment, Packed
-from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import Output, StageError, View
 from roadeval.pipeline.stages import UnknownStageError, stages_of
 from tests.pipeline.images import noise
+from tests.pipeline.making import default
 
 IMAGE = noise(8, 6)
 
@@ -92,7 +92,7 @@ def test_its_settings_stand_in_a_table_of_its_own_name():
 
 
 def test_a_pipeline_keeps_the_names_of_its_chain():
-    pipeline = Pipeline.default(("shadow", somebodys("lower_half"), "post"))
+    pipeline = default("shadow", somebodys("lower_half"), "post")
     assert pipeline.without_filter().chain == (somebodys("lower_half"), "post")
     assert pipeline.masks() == ("lower_half", "post")
 

@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 import pytest
 
-from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.paper import post
 from roadeval.pipeline.paper.shadow import connected_components
 from roadeval.pipeline.stage import Output, View
 from roadeval.runtime.threads import one_thread_each
+from tests.pipeline.making import default
 
 SMALL, LARGE = (180, 320), (1440, 2560)
 """One is 64 times the other: what grew with the square would take 64 times as long a pixel."""
@@ -33,7 +33,7 @@ def specks(shape):
 def components_and_seconds(shape, runs):
     """How many components the filter finds, and the least CPU time of filter and morphology."""
     image, seconds = specks(shape), []
-    chain = Pipeline.default(["shadow"]).bind({})
+    chain = default("shadow").bind({})
     # Without the opening, which would remove the specks before they are labelled.
     process = post.bind(post.PostSettings(operations=()), None)
     with one_thread_each():

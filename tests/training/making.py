@@ -3,7 +3,7 @@
 import numpy as np
 
 from roadeval.data import Frame
-from roadeval.pipeline.chain import Pipeline
+from tests.pipeline.making import default
 
 GREY, GREEN = (170, 170, 175), (40, 80, 35)
 
@@ -20,5 +20,5 @@ def frame(number: int = 0, *, labelled: bool = True) -> Frame:
 
 def pipelines():
     """The pipelines of the two default variants."""
-    pipeline = Pipeline.default(("shadow", "similarity", "svm", "post"))
+    pipeline = default("shadow", "similarity", "svm", "post")
     return {"filtered": pipeline, "unfiltered": pipeline.without_filter()}

@@ -229,10 +229,8 @@ class TreesSettings:
     @field_validator("features")
     @classmethod
     def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        if unknown := [name for name in names if name not in GROUPS]:
-            raise ValueError(f"there is no group {unknown[0]}; choose from {', '.join(GROUPS)}")
-        if len(set(names)) < len(names):
-            raise ValueError("a group is named twice")
+        if len({*names} & GROUPS.keys()) < len(names):
+            raise ValueError(f"must be groups among {', '.join(GROUPS)}, each once")
         return names
 
 
@@ -250,12 +248,9 @@ class Blend:
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, sizes=("n", 2))
         check_range("sizes", self.sizes, 1, GREATEST)
-        own, below = self.network.inputs, self.base.inputs + 1 if self.base else None
-        if self.forest.inputs != own or below not in (None, own):
-            raise ValueError(
-                f"the forest takes {self.forest.inputs} features of a pixel, and the network {own}"
-                + ("" if below is None else f"; with that of the base there are {below}")
-            )
+        own = self.network.inputs
+        if self.forest.inputs != own or (self.base and self.base.inputs != own - 1):
+            raise ValueError("forest, network and base take different numbers of features")
 
     @property
     def inputs(self) -> int:
