@@ -14,6 +14,7 @@ import pytest
 from pyarrow import parquet
 
 import roadeval
+from roadeval.fleet import remote
 from roadeval.jobs.serve import serving
 from roadeval.recording import viewer
 from roadeval.results.facts import digest_of
@@ -264,7 +265,8 @@ def test_a_password_is_told_nowhere(fleet, source):
 
 
 @pytest.mark.parametrize("word", ["http://me:geheim@127.0.0.1:9/a.mcap", "no://me:geheim@host/a"])
-def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word):
+def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word, monkeypatch):
+    monkeypatch.setitem(remote.RETRIES, "max_retries", 0)
     manifest = tmp_path / "drives.toml"
     manifest.write_text(f'[[drives]]\npath = "{word}"\nlabels = {{ road = [3] }}\n')
     folder = tmp_path / "f"

@@ -12,6 +12,7 @@ from roadeval.logs import LogConfig, TopicSettings, open_log
 from roadeval.report import figures as drawn
 from roadeval.results import schema
 from roadeval.results.folder import ResultsFolder
+from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
 TABLES = tuple(name for name in schema.OF_A_DRIVE if name != "probabilities")
@@ -72,13 +73,19 @@ def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
     assert stamps == [(number + 1) * NS for number in range(FRAMES)]
 
 
+def test_what_the_log_lost_is_told(tmp_path):
+    outcome = run(make("broken/zero_hole.mcap", tmp_path), tmp_path)
+    assert outcome.summary["frames"]["read"] == 38
+    assert "a chunk that the summary lists is not there" in outcome.losses[0]
+    assert outcome.summary["losses"] == list(outcome.losses)
+
+
 def test_a_broken_frame_costs_itself_alone_is_named_and_is_no_neighbour(tmp_path):
     log = write_log(tmp_path / "hurt.mcap", broken=13)
     outcome = run(log, tmp_path)
     assert outcome.summary["frames"]["decoded"] == 25
     assert outcome.summary["frames"]["evaluated"] == 14
     assert "13" in outcome.losses[0]
-    assert outcome.summary["losses"] == list(outcome.losses)
     assert 13 not in set(frames_of(tmp_path).frame)
     assert outcome.summary["beyond"]["filtered"]["pairs"] == 2 + 5 + 4
 

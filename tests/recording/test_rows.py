@@ -3,12 +3,14 @@
 import pytest
 
 from roadeval.recording.rows import (
+    CHUNK_BYTES,
     IMAGES_AND_TEXT,
     NUMBERS,
     Batcher,
     WaitLimits,
     numbers,
     states,
+    texts,
 )
 
 WAIT = WaitLimits(8, 64)
@@ -41,6 +43,13 @@ def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
     assert [row for *_, rows in ended for row in rows] == list(range(1000))
     for after, _, rows in ended[:-1]:
         assert after - rows[0] + 1 == WAIT.after(after + 1)
+
+
+def test_an_entity_is_full_by_its_bytes_and_others_wait_on():
+    half = "x" * (CHUNK_BYTES // 2)
+    ended = list(run(8, lambda _: [("/large", texts, half), ("/small", texts, "x")]))
+    assert [rows for _, path, rows in ended if path == "/large"] == [[0, 1], [2, 3], [4, 5], [6, 7]]
+    assert [rows for _, path, rows in ended if path == "/small"] == [list(range(8))]
 
 
 @pytest.mark.parametrize(("limits", "most"), [(IMAGES_AND_TEXT, 320), (NUMBERS, 70)])
