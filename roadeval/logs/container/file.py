@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Final
 
 import numpy as np
 from mcap.records import Channel, Schema
@@ -102,11 +102,12 @@ class Container:
         if scan.summary.statistics is not None and not self._is_as_counted(logs):
             logs = self._file(look=True)
         if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
-            late = (each for each in scan.late if isinstance(each, Schema) or each.id in logs)
-            scan.define(*late)
+            late = [each for each in scan.late if isinstance(each, Schema) or each.id in logs]
             for chunk in self.chunks:
                 if chunk.offset in self.reader.bad:
-                    scan.define(*definitions(self.reader.remains(chunk)))
+                    late += definitions(self.reader.remains(chunk))
+            for each in late:
+                scan.define(each)
             logs = self._file()
         self.logs = self._file() if self._redefine(logs) else logs
         """Where messages lie, by the number of their channel."""
@@ -234,32 +235,27 @@ class Container:
         that of a channel's first message: of a chunk with a checksum they are believed where the
         messages fit both.
         """
-        others: list[tuple[int, Schema | Channel, bool]] = [
-            (offset, record, False) for offset, record in self.scan.conflicts
-        ]
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
         for number in sorted(first - {OUTSIDE}) if self.chunks else []:
             chunk = self.chunks[number]
             if not chunk.cut and chunk.crc and chunk.size <= IN_MEMORY:
                 with suppress(BadRecord):
-                    found = definitions(self.reader.read(chunk))
-                    others += [(chunk.offset, record, True) for record in found]
-        for offset, record, checked in others:
-            known: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
-            other = known.setdefault(record.id, record)
-            if other == record:
-                continue
-            fits = []
+                    for record in definitions(self.reader.read(chunk)):
+                        self.scan.define(record, chunk.offset)
+        checked = {chunk.offset for chunk in self.chunks if chunk.crc}
+        for offset, record in self.scan.conflicts:
+            known = self.scan.known(record)
+            other, fits = known[record.id], []
             for each in (other, record):
                 known[record.id] = each
                 fits.append(self._fit(each, logs))
-            is_this = fits[1] > fits[0] or (fits[1] == fits[0] and checked)
+            is_this = fits[1] > fits[0] or (fits[1] == fits[0] and offset in checked)
             known[record.id] = record if is_this else other
-            where, which = "by the summary" if checked else "before", "this" if is_this else "that"
+            which = "this" if is_this else "that"
             doubt = "either may be wrong" if fits[0] == fits[1] else "messages fit it better"
             self.redefined[offset] = (
-                f"a topic is described here in another way than {where}; {which} is "
-                f"believed; {doubt}"
+                f"a topic is described here in another way than before; {which} is believed; "
+                f"{doubt}"
             )
         return bool(self.redefined)
 

@@ -103,7 +103,7 @@ class Scan:
         self.schemas = dict(self.summary.schemas)
         self.channels = dict(self.summary.channels)
         self.conflicts: list[tuple[int, Schema | Channel]] = []
-        """Other descriptions than these outside chunks, with their offsets."""
+        """Other descriptions than these, with the offsets of them or their chunks."""
         self.late: list[Schema | Channel] = []
         """Descriptions behind the data, from a summary that cannot be relied on."""
         self.gaps: list[Gap] = []
@@ -222,11 +222,11 @@ class Scan:
         elif opcode == MESSAGE_INDEX and self.chunks:
             self._take_index(*content)
         elif opcode in DEFINITIONS:
-            known = self._known(content)
+            known = self.known(content)
             if self.data_end is not None and (content.id not in known or self.chunks):
                 self.late.append(content)
-            elif known.setdefault(content.id, content) != content:
-                self.conflicts.append((record.offset, content))
+            else:
+                self.define(content, record.offset)
         elif opcode == Opcode.STATISTICS and self.summary.statistics is None:
             self.summary.statistics = content
         elif opcode == Opcode.DATA_END:
@@ -260,14 +260,15 @@ class Scan:
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
         self.gaps.append(Gap(offset, end, reason, lossy))
 
-    def _known(self, record: Schema | Channel) -> dict[int, Any]:
+    def known(self, record: Schema | Channel) -> dict[int, Any]:
         """Return the known descriptions of the kind of this one, by their numbers."""
         return self.schemas if isinstance(record, Schema) else self.channels
 
-    def define(self, *records: Any) -> None:
-        """Learn schemas and channels, unless they are known."""
-        for record in records:
-            self._known(record).setdefault(record.id, record)
+    def define(self, record: Any, offset: int | None = None) -> None:
+        """Learn a description, unless it is known; of one from the data note a contradiction."""
+        other = self.known(record).setdefault(record.id, record)
+        if offset is not None and record not in (other, *(each for _, each in self.conflicts)):
+            self.conflicts.append((offset, record))
 
     def look(self, number: int) -> Mapping[int, Entries]:
         """Walk through the records of a chunk; learn its channels and where its messages lie."""
@@ -288,7 +289,7 @@ class Scan:
                 found[channel_id].extend((log_time, offset))
             elif opcode in DEFINITIONS:
                 with suppress(BadRecord):  # its messages will show that it is missing
-                    self.define(parse(opcode, records[body:after]))
+                    self.define(parse(opcode, records[body:after]), chunk.offset)
             elif opcode < PRIVATE:
                 problem = "a chunk that holds more than messages, which is not read"
         if end != len(records) and not chunk.cut:

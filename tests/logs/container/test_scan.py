@@ -185,4 +185,4 @@ def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
     assert kept(chunked) == list(range(FRAMES))
     with open_log(chunked) as log:
         told, *_ = log.losses
-    assert "described here in another way than by the summary" in told
+    assert "described here in another way than before" in told
