@@ -229,12 +229,13 @@ class Container:
         return channel is not None and (schema is not None or channel.schema_id == 0)
 
     def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
-        """Where a topic is described twice, choose by its messages; return whether there is one.
+        """Where a topic is described twice, choose by its messages; return whether any is new.
 
         Messages were written by the descriptions in the data, which stand in the first chunk or in
         that of a channel's first message: of a chunk with a checksum they are believed where the
         messages fit both.
         """
+        before = {*self.channels}, {*self.schemas}
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
         for number in sorted(first - {OUTSIDE}) if self.chunks else []:
             chunk = self.chunks[number]
@@ -257,7 +258,7 @@ class Container:
                 f"a topic is described here in another way than before; {which} is believed; "
                 f"{doubt}"
             )
-        return bool(self.redefined)
+        return bool(self.redefined) or before != ({*self.channels}, {*self.schemas})
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
         """Count the messages that a description decodes, and sum up how near their stamps are."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from mcap.opcode import Opcode
 
-from tests.fixtures.broken import HEAD, data_end, length_of, over
+from tests.fixtures.broken import HEAD, data_end, length_of, mended, over
 from tests.fuzz.intact import FRAMES, Intact, Reading, intact_logs, read
 
 START, SIZE, DATA_SIZE, NAME = 9, 25, 41, 37
@@ -74,6 +74,12 @@ def channel_in_the_summary(log: Intact) -> bytes:
     return over(log.data, at + HEAD, bytes(4))
 
 
+def number_of_labels_in_the_summary(log: Intact) -> bytes:
+    """Number the labels' topic otherwise: what describes it lies where no label does."""
+    at = places(log, Opcode.CHANNEL)[1] + HEAD
+    return mended(over(log.data, at, b"\xff\xff"))
+
+
 def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[int]]:
     """Read a damaged log; also list the frames that are not read as they were logged."""
     path = tmp_path / "drive.mcap"
@@ -98,6 +104,7 @@ def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[i
         ("unfinished", first_bytes_missing, "never finished"),
         ("unfinished", all_before_the_first_chunk_missing, "never finished"),
         ("uncompressed", channel_in_the_summary, ""),
+        ("uncompressed", number_of_labels_in_the_summary, ""),
     ],
 )
 def test_every_frame_is_read(tmp_path, kind, damage, told):

@@ -186,3 +186,13 @@ def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
     with open_log(chunked) as log:
         told, *_ = log.losses
     assert "described here in another way than before" in told
+
+
+def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchunked: Path) -> None:
+    data = unchunked.read_bytes()
+    at = records(data, MESSAGE)[6]
+    short = MESSAGE + (10).to_bytes(8, "little") + data[at + 9 : at + 19]
+    unchunked.write_bytes(data[:at] + short + data[at:])
+    assert kept(unchunked) == [*range(FRAMES)]
+    with open_log(unchunked) as log:
+        assert "of a length that cannot be" in log.losses[0]
