@@ -215,7 +215,7 @@ def parse_chunk(source: Bytes, record: Record) -> Chunk:
     head = source[record.body : record.body + CHUNK_HEAD.size + _LONGEST_NAME + 8 + 4]
     with suppress(struct.error):
         start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
-        at = CHUNK_HEAD.size + min(name_length, _LONGEST_NAME)
+        at = CHUNK_HEAD.size + name_length  # a name that is too long leads out of the head
         (data_size,) = struct.unpack_from("<Q", head, at)
         name = bytes(head[CHUNK_HEAD.size : at]).decode("utf-8", "replace")
         if name not in COMPRESSIONS:  # it is damaged, and the data has a name of its own

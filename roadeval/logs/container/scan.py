@@ -334,7 +334,7 @@ class Scan:
                 raise BadRecord("a message whose kind is damaged")
             if opcode == MESSAGE and not fits:
                 raise BadRecord("a message of a length that cannot be")
-            if offset < self.summary.index_ends.get(int(self._around(offset)[0]), 0):
+            if self._is_index_here(offset):
                 raise BadRecord("a message where a message index should be")
             return channel_id, log_time
         if end - body > LARGEST:
@@ -346,6 +346,10 @@ class Scan:
         """Return where a chunk begins here or before, and the next one, by the summary."""
         index = bisect_right(self._borders, offset)
         return self._borders[index - 1], self._borders[index]
+
+    def _is_index_here(self, offset: int) -> bool:
+        """Whether a message index lies here, by the summary."""
+        return offset < self.summary.index_ends.get(int(self._around(offset)[0]), 0)
 
     def _is_known(self, channel_id: int) -> bool:
         return not self.channels or channel_id in self.channels
@@ -376,8 +380,12 @@ class Scan:
         """Find a chunk here whose kind or lengths are damaged, by its checksum."""
         with suppress(BadRecord):
             chunk = parse_chunk(self.source, record_at(self.source, offset))
-            if chunk.compression in COMPRESSIONS and (found := self.reader.proof(chunk)):
-                return found._replace(repaired=True).record
+            anything = Record(CHUNK, offset, offset, len(self.source))
+            if chunk.compression in COMPRESSIONS:
+                for end in (chunk.data_end, self._next(chunk.data_offset, anything).offset):
+                    left = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
+                    if found := self.reader.proof(left):
+                        return found.record
         return None
 
     def _next(self, begin: int, doubted: Record) -> Record:
@@ -422,6 +430,8 @@ class Scan:
             return bool(content.proven or (ours and not in_chunk))
         if opcode in (END, BORDER, Opcode.HEADER) or (in_chunk and opcode not in _NOT_IN_CHUNKS):
             return False
+        if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
+            return not self._listed or self._is_index_here(record.offset)
         if opcode == MESSAGE and not self._is_known(content[0]):
             return False
         self._record(record.end)
