@@ -42,6 +42,20 @@ def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
         train([wrong, drives[1]], tmp_path, road=[3])
 
 
+def test_what_is_lost_of_a_log_is_told(tmp_path):
+    split = tmp_path / "split"
+    split.mkdir()
+    write_log(split / "split_0.mcap")
+    (split / "split_1.mcap").write_bytes(b"no log")
+    (split / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
+    losses = train([split], tmp_path).losses
+    assert [loss.partition(": ")[0] for loss in losses] == [
+        "split_1.mcap",
+        "/camera/image",
+        "/truth/road",
+    ]
+
+
 def test_a_drive_of_which_no_training_frame_can_be_decoded_is_refused(tmp_path):
     broken = write_log(tmp_path / "broken.mcap", broken=0)
     with pytest.raises(RoadevalError, match=r"broken.mcap: no training frame .*: frame 0: 8 bytes"):
