@@ -28,6 +28,10 @@ File = bytes | memoryview
 
 _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
+_SCAN: Final = b"\xff\xda"
+MOST_SCANS: Final = 100
+"""Most scans of a JPEG; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
+can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
 
 
 def to_rgb(data: File, limits: Limits) -> Rgb:
@@ -112,6 +116,8 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     import simplejpeg
 
     limits.check(*_jpeg_size(data))
+    if bytes(data).count(_SCAN) > MOST_SCANS:
+        raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
     try:
         return simplejpeg.decode_jpeg(data, "RGB", strict=True)
     except ValueError as error:

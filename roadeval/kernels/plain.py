@@ -165,9 +165,12 @@ def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     """
     pixel = np.flatnonzero(ring)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(labels, width), [2 * width + 1] * 2)
-    near = windows[np.nonzero(ring)].reshape(len(pixel), (2 * width + 1) ** 2)
-    inside = near > 0
-    keys = np.unique(near[inside].astype(np.int64) * labels.size + pixel[np.nonzero(inside)[0]])
+    keys, (y, x) = np.empty(0, np.int64), np.nonzero(ring)
+    for row in range(2 * width + 1):  # together the repetitions of a wide ring take much memory
+        near = windows[y, x, row]
+        inside = near > 0
+        found = near[inside].astype(np.int64) * labels.size + pixel[np.nonzero(inside)[0]]
+        keys = np.unique(np.concatenate([keys, found]))
     return keys // labels.size, keys % labels.size
 
 

@@ -11,6 +11,7 @@ from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
+from zipfile import ZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,8 @@ VERSION: Final = 10
 """Version of the file, the only one that is read; raised when a stage's parameters change."""
 WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
 """The version of roadeval by that of the file, where the file does not say it."""
+GREATEST_SIZE: Final = 1 << 29
+"""Bytes that a model's arrays may take; those of `roadeval train` take a few million."""
 Arrays = dict[str, npt.NDArray[Any]]
 """By name."""
 PRIOR: Final = "prior"
@@ -176,6 +179,9 @@ def _kept(path: Path, stages: tuple[Stage, ...], *_state: int) -> Model:
 def _content(path: Path) -> tuple[Any, Arrays]:
     try:
         check_input(path)
+        with ZipFile(path) as packed:
+            if sum(part.file_size for part in packed.infolist()) > GREATEST_SIZE:
+                raise ValueError("no model unpacks to so much")
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         # What does not begin as an array does comes out of the archive as bytes.

@@ -150,3 +150,11 @@ def test_libraries_print_nothing(capfd: pytest.CaptureFixture[str]) -> None:
             with suppress(ImageError):
                 images.to_rgb(broken, LIMITS)
         assert capfd.readouterr() == ("", ""), name
+
+
+def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded() -> None:
+    scan = bytes([0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0])  # refines luma by nothing
+    progressive = file("JPEG", progressive=True)
+    for read in (images.to_rgb, images.to_labels):
+        with pytest.raises(ImageError, match="a JPEG of more than 100 scans"):
+            read(memoryview(progressive[:-2] + 100 * scan + progressive[-2:]), LIMITS)

@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+import tracemalloc
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
+from roadeval.training.model import GREATEST_SIZE
 from tests.training.making import frame, pipelines
 
 FEW = {"trees": {"trees": 10, "features": ["place"]}}
@@ -129,3 +132,16 @@ def changed(path, values, *, without=""):
 
 
 # --- What a stage has learnt as named arrays, and back --------------------------------------------
+
+
+def test_an_archive_that_unpacks_to_more_than_any_model_is_not_unpacked(path):
+    with ZipFile(path, "a", ZIP_DEFLATED) as archive, archive.open("more.npy", "w") as file:
+        for _ in range(GREATEST_SIZE >> 20):
+            file.write(bytes(1 << 20))
+    tracemalloc.start()
+    try:
+        with pytest.raises(RoadevalError, match="not a model file, or a damaged one"):
+            load_model(path)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()

@@ -1,5 +1,6 @@
 """Eq. 6-11, each against a literal reading of it."""
 
+import tracemalloc
 from fractions import Fraction
 
 import cv2
@@ -227,6 +228,17 @@ def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed
     for k, _, ring in expected:
         assert pixel[label == k].tolist() == np.flatnonzero(ring).tolist()
     assert len(label) == sum(ring.sum() for *_, ring in expected)
+
+
+def test_a_wide_ring_does_not_take_the_memory_of_all_its_neighbours_at_once():
+    labels = np.zeros((200, 200), np.int32)
+    labels[0, 0] = 1
+    tracemalloc.start()
+    try:
+        shadow.ring_pairs(labels, labels == 0, 16)
+        assert tracemalloc.get_traced_memory()[1] < 32 * 33 * labels.size
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_pixel_between_two_components_counts_in_both_rings():
