@@ -172,7 +172,6 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
             "`masks.net.labels.road`, and those to leave out with `masks.net.labels.ignore`; or, "
             "for confidences, their threshold",
         ),
-        ({"path": "nowhere"}, "no such folder"),
         ({"path": "other.mcap"}, "name a topic of it, as"),
         ({"path": "other.mcap:/no"}, "topic /no: is not in the log; its image topics are: /seg"),
         (

@@ -1,16 +1,18 @@
 """The ground in the viewer: where its pictures lie in space, and in a rig below which paths."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import rerun as rr
+import rerun.blueprint as rrb
 
 from roadeval.data import Calibration, VariantLayout, mask_spec
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
 from roadeval.recording.layout import GROUND, Layout
-from roadeval.recording.views import before_the_first_frame
+from roadeval.recording.views import arrange, before_the_first_frame
 
 SIZE = 64, 48
 GIVEN = GroundSettings(height=1.3, pitch=4, roll=2, focal=(56.0,))
@@ -49,3 +51,19 @@ def test_a_place_on_the_ground_lies_in_space_where_the_camera_sees_it(place: tup
     in_camera = turn @ point + values(transform.translation)
     seen = np.reshape(layout.ground.matrix, (3, 3)) @ in_camera
     assert seen[:2] / seen[2] == pytest.approx(layout.ground.pixels(np.array([place]))[0], abs=1e-3)
+
+
+def spaces(part: Any) -> list[rrb.Spatial3DView]:
+    """The views of a blueprint that show space."""
+    if isinstance(part, rrb.View):
+        return [part] if isinstance(part, rrb.Spatial3DView) else []
+    return [found for each in part.contents for found in spaces(each)]
+
+
+@pytest.mark.parametrize("prefix", ["", "/front"])
+def test_the_space_shows_camera_ground_and_the_logs_point_clouds(prefix: str):
+    blueprint = arrange({prefix: replace(a_layout(), clouds=("/lidar/points",))})
+    (space,) = spaces(blueprint.root_container)
+    paths = [f"{prefix}{path}" for path in ("/ground", "/ground/filtered", "/camera")]
+    assert space.contents == [*paths, "/lidar/points"]
+    assert [*space.visualizer_overrides] == [f"{prefix}/camera", f"{prefix}/ground"]

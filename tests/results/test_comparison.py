@@ -6,6 +6,7 @@ import pytest
 
 from roadeval.evaluation.comparison import Condition
 from roadeval.results.comparison import (
+    changed_settings,
     headline,
     judged,
     verdict,
@@ -24,6 +25,21 @@ def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
     # ERR alone may stay where other rates change.
     moved = replace(rows[1], difference={**rows[1].difference, "FPR": WORSE})
     assert "net: on these 12 frames" in verdict(a_comparison(rows[0], moved))
+
+
+def test_changed_settings_are_told_of_each_result_and_some_of_many():
+    chains = ["svm"], ["trees", "post"]
+    settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}
+    changed = {"new": settings}
+    found = a_comparison(a_change(WORSE), changed_settings=changed)
+    assert changed_settings(found) == [
+        "Changed settings: preset paper to gated; chain svm to trees, post; svm.c 1 to 2."
+    ]
+    rows = a_change(WORSE), a_change(WORSE, result="newer")
+    several = a_comparison(*rows, changed_settings=changed)
+    assert changed_settings(several, 1) == [
+        "Changed settings in new: preset paper to gated; and 2 more."
+    ]
 
 
 @pytest.mark.parametrize(

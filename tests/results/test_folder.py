@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,19 @@ def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
     assert line == f"{OF}6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
     assert math.isnan(ResultsFolder(tmp_path).table("frames").loc[2, "TPR"])
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path, *, finished: bool) -> None:
+    write(tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    board = a_board()
+    with suppress(KeyboardInterrupt), ResultsWriter(tmp_path) as writer:
+        writer.append(lines(next(scored(board))))
+        if finished:
+            writer.finish(the_rest(board), RUN_TOML)
+        raise KeyboardInterrupt
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_the_next_run_s_files_are_all_that_is_left_of_results_and_others_stay(

@@ -11,6 +11,7 @@ from roadeval import Result
 from roadeval.results.fleet import (
     FleetFolder,
     Record,
+    frames_path,
     read_record,
     record_path,
 )
@@ -125,3 +126,14 @@ def test_a_record_that_was_changed_is_none(tmp_path, was, now):
     assert text.count(was) == 1
     path.write_text(text.replace(was, now))
     assert read_record(tmp_path, "a") is None
+
+
+def test_a_drive_is_whole_where_its_summary_and_the_frames_that_it_has_are_there(tmp_path):
+    made = write(tmp_path)
+    summary, frames = tmp_path / "results" / "a" / "summary.json", frames_path(tmp_path, "a")
+    summary.parent.mkdir(parents=True)
+    summary.touch()
+    assert not made.is_whole(tmp_path)
+    frames.parent.mkdir(parents=True)
+    frames.touch()
+    assert made.is_whole(tmp_path)
