@@ -53,3 +53,5 @@ def test_several_results_are_one_table_with_their_drives(made):
     assert len({*both.scores["drive"]}) == len(both.parts) == len(both.drives) == 2
     one, other = both.frames.groupby("drive").ERR.mean()
     assert one == other
+    assert roadeval.Result(made.recording).recording == made.recording
+    assert roadeval.Result(made.recording, made.alone).recording is None
