@@ -349,13 +349,3 @@ def test_a_comparison_is_a_page_with_the_changes_and_the_frames_that_changed(
     assert moved <= {int(each.get_attribute("data-frame")) for each in strips.all()}
     assert len(moved) > 1
     assert violations(seen.tab) == []
-
-
-def test_two_fleets_are_compared_on_a_page(tmp_path, watched):
-    old, new = (fleet_of(tmp_path / name, 12, change=c) for name, c in (("old", 0), ("new", 0.02)))
-    path = tmp_path / "compared.html"
-    assert here("compare", old, new, "-o", path).returncode == 0
-    seen = watched(path.as_uri(), color_scheme="dark")
-    assert seen.complaints == []
-    assert seen.tab.locator(".rows circle").count() >= 10
-    assert violations(seen.tab) == []

@@ -244,12 +244,3 @@ def test_a_condition_is_judged_where_half_of_the_shorter_range_is_common(common,
     (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
     assert judged.holds is holds
     assert holds or "fewer than half of the 40 of the smaller one" in judged.why
-
-
-def test_certainty_is_judged_by_the_interval_of_any_stage_and_rate():
-    base = [(7 * number) % 23 for number in range(60)]
-    new = [wrong + 5 + place % 2 for place, wrong in enumerate(base)]
-    sides = [a_side("a", base), a_side("b", new)]
-    texts = ("post.filtered.ERR > 4pp surely", "post.filtered.FPR > 9pp surely")
-    judged = judge(compare(sides, SETTINGS), [Condition.parse(text) for text in texts], SETTINGS)
-    assert [row.holds for row in judged] == [True, True]

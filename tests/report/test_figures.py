@@ -177,14 +177,6 @@ def test_a_pdf_holds_each_picture_once_and_as_jpeg(twice: list[list[Path]]) -> N
     assert content.count(b"/DCTDecode") == len({"the camera", "the mask, thrice"})
 
 
-@pytest.mark.filterwarnings("ignore:Glyph")
-def test_a_letter_that_the_font_lacks_leaves_the_others_theirs(tmp_path: Path) -> None:
-    write_figures(tmp_path, "道路 Straße", rows_of(a_table(3)), [])
-    fonts = (tmp_path / "fig3a_error_rate.pdf").read_bytes().split(b"/FontName")[1:]
-    assert fonts
-    assert all(b"+DejaVuSans" in font[:40] for font in fonts)
-
-
 def test_without_rates_only_masks_are_drawn(tmp_path: Path) -> None:
     write_figures(tmp_path, "drive", NO_WINDOWS, [an_example(truth=False)])
     assert {path.name for path in tmp_path.iterdir()} == {"fig2_masks.png", "fig2_masks.pdf"}

@@ -119,9 +119,7 @@ def test_chunks_of_a_wrong_size_that_unpack_to_gigabytes_take_seconds(tmp_path):
 @pytest.mark.parametrize(
     ("name", "frames", "said"),
     [
-        ("concatenated_two_halves", 40, "another log begins here"),
         ("hole_in_chunk_0", 15, "lost: 4 of /camera/image"),
-        ("bomb_private_records", 4, "so many records"),
         ("schema_byte_changed", 6, "that is believed; messages fit it better"),
         ("schema_byte_intact", 6, ""),
     ],
