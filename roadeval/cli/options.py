@@ -87,7 +87,7 @@ TABLES: Final[Mapping[str, tuple[type, str]]] = {
 """The settings that flags set, by the names of their tables, and their parts of the help."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Option:
     """An option of the command line that gives a setting its value."""
 

@@ -65,7 +65,7 @@ OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "mask
 """The tables that may differ from drive to drive."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RunConfig(LogConfig):
     """Every option of a run.
 

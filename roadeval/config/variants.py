@@ -74,7 +74,7 @@ Masks = Mapping[str, MaskSettings]
 """Settings of masks in files, by the variant's name."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Variant:
     """A named method: its pipeline, and the preset that it started from."""
 

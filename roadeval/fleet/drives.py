@@ -109,7 +109,7 @@ OF_THE_SYSTEM: Final = ("lost+found", "System Volume Information")
 """Folders at the top of a disk that cannot be read."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DriveEntry:
     """A drive of a fleet."""
 
@@ -409,7 +409,7 @@ def _word(value: Any) -> str:
 Word = Annotated[str, Checked(_word)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Row(LogConfig):
     """An entry of a manifest: one drive or several, and the settings that they have alone."""
 

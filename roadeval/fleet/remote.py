@@ -130,7 +130,7 @@ def stamp(url: str) -> tuple[int, str | None]:
     return _facts(_place(url))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Place:
     """Where an object is: its store, and its key there."""
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from roadeval.config import OutputSettings
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Outputs:
     """The files and folders of a run."""
 

@@ -41,7 +41,7 @@ SHADOW: Final = "/shadow"
 """Names of road truth and true shadow among labels; no mask's name begins with a slash."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Selection:
     """Topics and rules of a replay."""
 
@@ -229,7 +229,7 @@ class Accounting:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LoggedFrame:
     """A frame as logged, not decoded yet."""
 

@@ -31,7 +31,7 @@ SMALL: Final = 50_000_000
 """Bytes of a log that is read whole where its checksums are of use: that takes a moment."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RemoteLog:
     """A log that lies elsewhere: one file."""
 
@@ -293,7 +293,7 @@ class Log:
         self.close()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LogDescription:
     """The content of a log, its damage, and what a replay would pick."""
 

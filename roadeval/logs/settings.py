@@ -216,7 +216,7 @@ class FrameSettings:
     """Leave out images of more pixels. They are not decoded: a damaged head may claim any size."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LogConfig:
     """All that is asked of a log, without what becomes of its frames."""
 

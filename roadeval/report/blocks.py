@@ -18,7 +18,7 @@ from roadeval.runtime.text import as_markdown
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ImageFile:
     """The bytes of a PNG or JPEG file."""
 
@@ -31,7 +31,7 @@ class ImageFile:
         return f"{hashlib.blake2b(self.content, digest_size=8).hexdigest()}.{suffix}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Block:
     """A part of a page."""
 
@@ -81,7 +81,7 @@ def _parts(value: Any) -> Iterator[Any]:
         yield from value.parts()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Heading(Block):
     """A heading; one of level 1 is numbered. All are in the outline."""
 
@@ -89,7 +89,7 @@ class Heading(Block):
     level: int = 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Text(Block):
     """A paragraph."""
 
@@ -98,14 +98,14 @@ class Text(Block):
     """``body``, ``note`` (small and grey), ``title`` or ``verdict``."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Command(Block):
     """A command to copy."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BulletList(Block):
     """A titled list of sentences."""
 
@@ -115,7 +115,7 @@ class BulletList(Block):
     """``plain`` or ``warning``."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Cell(Block):
     """A table's cell."""
 
@@ -129,7 +129,7 @@ class Cell(Block):
     """Address below that of a served page to which it leads; or empty."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table(Block):
     """A table."""
 
@@ -180,7 +180,7 @@ def plain(cell: Cell | str) -> str:
     return cell.text if isinstance(cell, Cell) else cell
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Figure(Block):
     """Charts beside each other below one legend, with a caption."""
 
@@ -200,7 +200,7 @@ class Figure(Block):
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ImageGrid(Block):
     """Pictures of equal size in rows, each with a few words below it."""
 
@@ -212,14 +212,14 @@ class ImageGrid(Block):
     """Printed below all of them."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class KeepTogether(Block):
     """Blocks with no page break between them."""
 
     blocks: Sequence[Block]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Details(Block):
     """Blocks that a page shows after a click on their title."""
 
@@ -229,7 +229,7 @@ class Details(Block):
     """Whether paper has them, below their title as a heading."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TwoColumns(Block):
     """Two stacks of blocks side by side; the left one takes ``share`` of the width."""
 
@@ -238,14 +238,14 @@ class TwoColumns(Block):
     share: float = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TableOfContents(Block):
     """The document's headings with their pages: of the first level, or down to a depth."""
 
     depth: int = 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Document(Block):
     """A document."""
 
@@ -265,7 +265,7 @@ class Document(Block):
         return {image.name: image.content for image in self.images()}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Picture(Block):
     """A picture of a strip."""
 
@@ -276,7 +276,7 @@ class Picture(Block):
     image: ImageFile
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Strip(Block):
     """A frame with its pictures."""
 
@@ -291,7 +291,7 @@ class Strip(Block):
     """Opens it in the viewer; empty without a recording."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LinkList(Block):
     """Titles with the addresses that they lead to; paper has none."""
 

@@ -18,7 +18,7 @@ POINTS: Final = 1500
 """Points of a series along the drive, at most: more do not fit beside each other on a screen."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Look:
     """How a series is drawn; no two variants differ by their colour alone."""
 
@@ -90,7 +90,7 @@ class ChartKind(StrEnum):
     MARKS = "marks"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Series:
     """Numbers of one look."""
 
@@ -110,7 +110,7 @@ class Series:
         return ((x, y) for x, y in zip(self.x, self.y, strict=True) if math.isfinite(y))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Level:
     """A value across a whole chart, as a mean, with the ends of its interval; NaN without one."""
 
@@ -120,7 +120,7 @@ class Level:
     high: float = math.nan
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Key:
     """An entry of a legend: a name and what it stands for."""
 
@@ -130,7 +130,7 @@ class Key:
     look: Look = Look(FAINT)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Chart:
     """A chart."""
 

@@ -26,7 +26,7 @@ Tick = tuple[float, str]
 """A place on an axis, from the left or the bottom, and the number or name there."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Span:
     """A closed range of numbers."""
 
@@ -74,7 +74,7 @@ def span_of_frames(charts: Iterable[Chart]) -> Span:
     return Span(low - margin, high + margin)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Shape:
     """The parts of a series."""
 
@@ -95,7 +95,7 @@ class Shape:
         return "".join(f"M{x:g} {y:g}h0" for x, y in self.marks)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mark:
     """A number in a row."""
 
@@ -109,7 +109,7 @@ class Mark:
     """Ends of the interval, within the chart."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MarkRow:
     """A row of marks."""
 
@@ -121,7 +121,7 @@ class MarkRow:
     """Whether a rule is above it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Drawing:
     """A chart as it is drawn."""
 

@@ -25,7 +25,7 @@ WINDOWS: Final = 30
 """Points of the figures over the drive, at most."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class NotableFrame:
     """A frame, in a table or with its pictures."""
 

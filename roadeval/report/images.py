@@ -29,7 +29,7 @@ DARKEN: Final = 0.75
 _LEVELS: Final = np.arange(256, dtype=np.uint8)[:, None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LayerImage:
     """One layer of one frame."""
 
@@ -43,7 +43,7 @@ class LayerImage:
     its own unit."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ExampleFrame:
     """A frame to show: its image, its truth if it has one, and the final masks of variants."""
 

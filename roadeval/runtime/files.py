@@ -166,7 +166,7 @@ def put(path: Path, content: bytes) -> None:
         file.discard()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Content:
     """The files of a folder that are replaced; all others stay."""
 

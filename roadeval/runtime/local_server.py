@@ -39,7 +39,7 @@ TEXT: Final = "text/plain; charset=utf-8"
 PAGE: Final = "text/html; charset=utf-8"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Request:
     """What a browser asks for."""
 
@@ -51,7 +51,7 @@ class Request:
     """Whether the path ends with a slash."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Response:
     """An answer."""
 

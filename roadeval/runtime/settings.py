@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Flag:
     """The flag of the command line that sets a field."""
 
@@ -27,7 +27,7 @@ class Flag:
     """Its part of the help, if that differs from the part of its table."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Checked:
     """A function that checks a field's value: it returns the value, or raises a ValueError."""
 

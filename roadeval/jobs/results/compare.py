@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from roadeval.report.blocks import Document
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """A comparison with its judged conditions."""
 
@@ -207,7 +207,7 @@ ROWS: Final = 60
 """Points of the figure over the drive, at most."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ComparedMask:
     """A final mask that is compared."""
 

@@ -24,7 +24,7 @@ LISTED: Final = 10
 """Frames that are listed by default."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WorstFrame:
     """One of the worst frames of a drive, or of all drives of a fleet."""
 

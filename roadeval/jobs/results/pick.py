@@ -32,7 +32,7 @@ PNG: Final = "png"
 """The format of masks as images, 255 where there is road."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Outcome:
     """The frames that a command has picked."""
 
@@ -145,7 +145,7 @@ def _shares(sizes: Sequence[int], count: int) -> list[int]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Wanted:
     """The options of `pick` for one drive: its share of the frames, and its folder."""
 

@@ -35,7 +35,7 @@ from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
 from roadeval.version import VERSION
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FleetOutcome:
     """The result of replaying a fleet."""
 

@@ -59,7 +59,7 @@ Their training frames are held decoded."""
 FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DriveTask:
     """The task of a worker that replays a drive; travels to another process."""
 
@@ -83,7 +83,7 @@ class DriveTask:
         return asked(self.config, self.model, self.fold)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Done:
     """The report of a drive that is done, to the command that replays the fleet."""
 
@@ -286,7 +286,7 @@ def _disk_failure(error: BaseException | None) -> BaseException | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FoldTask:
     """The task of a worker that trains the model of a fold."""
 
@@ -305,7 +305,7 @@ class FoldTask:
         return self.folder / MODELS / f"fold_{self.fold}.model"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FoldModel:
     """The model of a fold."""
 

@@ -49,7 +49,7 @@ _NUMBER: Final = re.compile(r"(?<![:\d])\d+")
 """A number that is not the line of a file."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Failure:
     """A frame on which a stage failed. The error itself would hold the frame's images."""
 
@@ -97,7 +97,7 @@ SPARSE: Final = 5
 """Where there are more frames than so many for each label, a note says so."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Run:
     """A prepared run: its frames, the chains that run on them, and the score so far."""
 
@@ -329,7 +329,7 @@ class Encoder(Protocol):
         """Encode the frame at ``position`` among those read, from 0."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ProcessedFrame:
     """A scored frame without its layers, its lines of the tables, and its encoded form.
 

@@ -29,7 +29,7 @@ from roadeval.version import VERSION
 OnFrame = Callable[[FrameResult], None]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Outcome:
     """The result of a replay: where it lies, and its facts."""
 
@@ -144,7 +144,7 @@ def _written(
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Ended:
     """What a camera's run has found."""
 

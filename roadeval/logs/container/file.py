@@ -276,7 +276,7 @@ class Container:
         return len(distances), -sum(distances)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Damage:
     """Something wrong with a file."""
 

@@ -120,7 +120,7 @@ class MessageReader(NamedTuple):
     """Return whether a message that can be decoded is exactly as long as its fields say."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Encoding:
     """A message encoding."""
 
@@ -201,7 +201,7 @@ class FieldReader:
         return self._data[self._at - length : self._at]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Layouts:
     """The layouts that messages of a channel can have.
 

@@ -26,7 +26,7 @@ from roadeval.logs.settings import parse_time
 from roadeval.runtime.discovery import found_in
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RawPicture:
     """Pixels as logged: ``height`` rows of ``step`` bytes (0: not said), in ``encoding``."""
 
@@ -41,7 +41,7 @@ class RawPicture:
     """The camera's name, as the header has it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class CompressedPicture:
     """An image file, or a packet of a video, with what the message says its format is."""
 
@@ -51,7 +51,7 @@ class CompressedPicture:
     frame_id: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class DecodedPicture:
     """A video's frame: its packet, and what became of it together with those before it."""
 
@@ -137,7 +137,7 @@ def nanoseconds(stamp: Any) -> int:
     return int(seconds) * 1_000_000_000 + int(rest)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Decoder:
     """Reads the messages of a channel; a `BadMessage` for one that cannot be decoded."""
 

@@ -26,7 +26,7 @@ from roadeval.logs.messages.pictures import (
 Array = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PixelFormat:
     """How an encoding lays out its pixels."""
 

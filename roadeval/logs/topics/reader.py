@@ -42,7 +42,7 @@ GAP: Final = 2.5
 Size = tuple[int, int]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TopicInfo:
     """One topic of a log."""
 
@@ -166,7 +166,7 @@ UNREAD: Final = UNREADABLE - 1
 """A stamp not read yet."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FileChannel:
     """A channel of one file of the log."""
 

@@ -94,7 +94,7 @@ class Runs(NamedTuple):
 Shape = Outline | Runs
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Drawing:
     """The shapes on one image."""
 
@@ -153,7 +153,7 @@ PROPOSED: Final = "road"
 """The class of what is proposed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LabelFormat:
     """A kind of files that hold labels.
 

@@ -54,7 +54,7 @@ _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 2
 """Masks that need no settings: what their values mean."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Labels:
     """A decoded label picture."""
 
@@ -117,7 +117,7 @@ class ClassMap:
         return truth
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Confidence:
     """Confidence maps: road is what has at least the ``threshold``, from 0 to 1."""
 
@@ -297,7 +297,7 @@ _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LabelSource:
     """Labels of one source: truth, true shadow, or another method's masks."""
 
@@ -328,7 +328,7 @@ class LabelSource:
         return Label(self, picture, self.pictures.place(position))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Label:
     """A label of a frame as logged, which any thread can decode."""
 

@@ -35,7 +35,7 @@ _DIGITS: Final = 18
 """Most digits of a number that 64 bits hold."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class NamedLabel:
     """One label beside the log. All that a label format has to give is a list of them."""
 
@@ -47,7 +47,7 @@ class NamedLabel:
     """Return the picture of that content; a `BadMessage` or `ImageError` if there is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LabelSet:
     """The labels of a folder or a file, and the names of their classes."""
 
@@ -221,7 +221,7 @@ class Clock(StrEnum):
     ORDER = "their order"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Camera:
     """The images that labels are paired with, and the rules for it."""
 
@@ -266,7 +266,7 @@ def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
     return period // 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Pairing:
     """How the images and labels of one source are paired.
 

@@ -42,7 +42,7 @@ class Why(StrEnum):
     """Most in doubt: to look at, and to learn from."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Picked:
     """A picked frame."""
 

@@ -249,7 +249,7 @@ QUALITY: Final = 95
 """JPEG quality of a video's frames, 0 to 100."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PackResult:
     """The log that was written, and what a user should know of it."""
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from roadeval.results.facts import Totals
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OverDrive:
     """A figure of a drive's report."""
 
@@ -255,7 +255,7 @@ def changes(finals: Sequence[Change]) -> list[Chart]:
     ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ForestRow:
     """A drive's difference as a fraction; lower is better."""
 

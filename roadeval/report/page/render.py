@@ -43,7 +43,7 @@ _SCRIPTS: Final = (
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Place:
     """Where a page finds what belongs to it."""
 
@@ -177,7 +177,7 @@ def _source(image: ImageFile | bytes) -> str:
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Row:
     """A row's cells, each with whether it repeats the one above, and its classes."""
 

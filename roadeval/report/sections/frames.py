@@ -132,7 +132,7 @@ ROWS: Final = 2000
 """Frames in the table, at most; of a longer drive those with the highest error rate."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameBrowser(Block):
     """The frames of a drive on a page: one with its pictures, and a table of all."""
 
