@@ -106,6 +106,15 @@ def test_labelled_frames_alone_give_the_tables_of_the_whole(places, tmp_path, tr
     assert any(each.startswith("only frames with truth were read") for each in part.warnings)
 
 
+def test_a_stride_that_misses_every_label_says_so(places, tmp_path):
+    done = replay(places, tmp_path, "6", ("net",), frames={"every": 2})
+    (said,) = [each for each in done.warnings if "none of the frames that were read" in each]
+    assert "`frames.every` 2 leaves out each one that has" in said
+    assert "`frames.labelled` reads only frames that have" in said
+    every = replay(places, tmp_path, "6", ("net",), frames={"every": 2, "labelled": True})
+    assert every.summary["frames"]["evaluated"] == 3
+
+
 def test_the_summary_says_where_truth_lies(places, tmp_path):
     def stated(folder, name):
         return replay(folder, tmp_path / name, "6", ("net",)).summary["masks"]["truth"]
