@@ -220,6 +220,7 @@ def test_long_runs_are_those_of_pycocotools(seed):
     np.testing.assert_array_equal(runs.fill((1920, 1080)), mask)
 
 
+@pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 @given(arrays(bool, (HEIGHT, WIDTH)))
 def test_the_area_and_the_box_of_a_coco_proposal_are_those_of_its_runs(road):
     (content,) = proposal_files("coco", [Proposal("a.png", road)]).values()
