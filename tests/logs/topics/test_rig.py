@@ -61,34 +61,26 @@ def test_of_two_truths_the_cameras_own_is_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("image", "frame_id", "label", "its_frame_id"),
+    ("camera", "labels", "belong"),
     [
-        ("/camera/image_raw", "camera", "/labels/semantic", "labels"),
-        ("/camera/image", "camera_optical", "/front/road_mask", "base_link"),
-        ("/front/left/image", "", "/front/labels", ""),
+        ({"/camera/image_raw": "camera"}, {"/labels/semantic": "labels"}, True),
+        ({"/camera/image": "camera_optical"}, {"/front/road_mask": "base_link"}, True),
+        ({"/front/left/image": ""}, {"/front/labels": ""}, True),
+        ({"/rear/image": ""}, {"/front/labels": ""}, False),
+        ({"/image": "camera_1"}, {"/labels": "camera_2"}, False),
+        ({"/image": "CAM_BACK"}, {"/labels": "CAM_FRONT"}, False),
+        ({"/cam0/image": ""}, {"/cam1/labels": ""}, False),
     ],
 )
 def test_the_only_camera_takes_a_truth_that_names_no_other(
-    tmp_path: Path, image: str, frame_id: str, label: str, its_frame_id: str
+    tmp_path: Path, camera: dict[str, str], labels: dict[str, str], belong: bool
 ) -> None:
-    assert truth(rig(tmp_path, {image: frame_id}, {label: its_frame_id}), image) == label
-
-
-@pytest.mark.parametrize(
-    ("image", "frame_id", "label", "its_frame_id"),
-    [
-        ("/rear/image", "", "/front/labels", ""),
-        ("/image", "camera_1", "/labels", "camera_2"),
-        ("/image", "CAM_BACK", "/labels", "CAM_FRONT"),
-        ("/cam0/image", "", "/cam1/labels", ""),
-    ],
-)
-def test_the_only_camera_takes_no_truth_of_one_that_is_not_there(
-    tmp_path: Path, image: str, frame_id: str, label: str, its_frame_id: str
-) -> None:
-    path = rig(tmp_path, {image: frame_id}, {label: its_frame_id})
-    with pytest.raises(LogError, match="belongs to another camera"):
-        truth(path, image)
+    path, (image,), (label,) = rig(tmp_path, camera, labels), camera, labels
+    if belong:
+        assert truth(path, image) == label
+    else:
+        with pytest.raises(LogError, match="belongs to another camera"):
+            truth(path, image)
 
 
 def test_a_camera_whose_name_is_part_of_anothers_has_its_own_truth(tmp_path: Path) -> None:
