@@ -326,6 +326,7 @@ def _sources(word: str, base: Path) -> list[str]:
         scheme_of(word)
         if word.endswith("/"):
             raise FleetError(f"{shown(word)}: a folder; name its logs, or a manifest of them")
+        _no_manifest(Path(last_part(word)))
         return [word]
     path = base / Path(word).expanduser()
     if path.is_dir():
@@ -338,7 +339,13 @@ def _sources(word: str, base: Path) -> list[str]:
         found = _matches(word, base)
     else:
         raise FleetError(f"{visible(str(path))}: there is no such file or folder")
-    return [str(_absolute(each)) for each in found]
+    return [str(_absolute(each)) for each in map(_no_manifest, found)]
+
+
+def _no_manifest(path: Path) -> Path:
+    if path.suffix == MANIFEST:
+        raise FleetError(f"{visible(str(path))}: a manifest is named by itself, by its path")
+    return path
 
 
 def _below(folder: Path) -> list[Path]:

@@ -219,8 +219,10 @@ def _pose(
     if missing:
         return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
     # Adding 0 makes 0.0 of what would be read as -0.0.
-    shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (pitch, roll)]
-    text = f"camera {height:.2f} m above it, pitch {shown[0]} down, roll {shown[1]}"
+    assert pitch is not None
+    shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
+    way = "up" if pitch < 0 else "down"
+    text = f"camera {height:.2f} m above it, pitch {shown[0]} {way}, roll {shown[1]}"
     return (height, pitch, roll or 0.0), text + " (not given)" * (roll is None)
 
 

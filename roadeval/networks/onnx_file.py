@@ -26,6 +26,8 @@ Array = npt.NDArray[Any]
 
 QUOTED: Final = 240
 """Letters of onnxruntime's complaint that a message quotes."""
+LARGEST: Final = (1 << 31) - 1
+"""Bytes that a protobuf file can have; larger weights lie in files beside it."""
 _SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
@@ -110,6 +112,8 @@ def load(settings: NetSettings) -> OnnxFile:
     with _readable(path, "cannot read the network"):
         check_input(path)
         there = path.stat()
+    if there.st_size > LARGEST:
+        raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
     file = _opened(path, there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns)
     if settings.sha256 not in (None, file.sha256):
         raise file.error(

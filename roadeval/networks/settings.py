@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.errors import RoadevalError
@@ -47,10 +47,10 @@ class NetSettings:
     deviation: Annotated[tuple[Positive, ...], OfChannels] | None = None
     """The difference is divided by this: one number for each channel in the order of ``channels``,
     or one for all; by default 1."""
-    outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    outputs: tuple[str, ...] | None = None
     """Names of the outputs that show road; where there are several, road is what one of them calls
     road."""
-    road: Annotated[tuple[Class, ...], Field(min_length=1)] | None = None
+    road: tuple[Class, ...] | None = None
     """The numbers of the classes that are road, from 0."""
     activation: Literal["softmax", "sigmoid", "none"] | None = None
     """How probabilities are made of an output: ``softmax`` over its classes, ``sigmoid`` of each,
@@ -74,3 +74,10 @@ class NetSettings:
         if self.layout == "NCHW":
             return 1, self.channel_count, height, width
         return 1, height, width, self.channel_count
+
+    @field_validator("outputs", "road")
+    @classmethod
+    def _some(cls, named: tuple[object, ...] | None) -> tuple[object, ...] | None:
+        if named is not None and (not named or len(set(named)) < len(named)):
+            raise ValueError("must name at least one, and each once")
+        return named

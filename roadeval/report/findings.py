@@ -205,6 +205,7 @@ class Findings:
                 if len(errors):
                     low = high = None
                     if len(errors) >= settings.least_frames and np.ptp(errors):
-                        low, high = mean_distribution(errors).interval(settings.confidence)
+                        ends = mean_distribution(errors).interval(settings.confidence)
+                        low, high = np.clip(ends, 0, 1).tolist()
                     found[band, variant] = float(errors.mean()), low, high
         return found

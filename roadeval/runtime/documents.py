@@ -20,6 +20,8 @@ LONGEST: Final = 12_000
 LONG: Final = 1_000
 LONG_TOGETHER: Final = 500_000
 """Letters of all texts of more than `LONG` letters."""
+LISTED: Final = 1_000_000
+"""Letters of the texts of a list."""
 VALUES: Final = 2_000_000
 DEPTH: Final = 32
 """Tables and lists inside one another."""
@@ -114,6 +116,8 @@ def _check(document: Any, most: int, *, shown: bool = True) -> None:
                 inner += each.values()
             elif isinstance(each, list):
                 inner += each
+                if shown and sum(len(e) for e in each if isinstance(e, str)) > LISTED:
+                    raise ValueError(f"a list in it has more than {LISTED:,} letters")
         level = inner
     if shown:
         check_texts(texts)

@@ -351,9 +351,14 @@ def claimed(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
 def _locked(name: Path, *, wait: bool) -> tuple[int, bool]:
     """Open and lock a file; return also whether there are locks."""
     # A link in a folder from elsewhere is not followed: its target would be overwritten.
-    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+    here = getattr(os, "O_NOFOLLOW", 0)
     while True:
-        file = os.open(name, flags, 0o666)
+        try:
+            file = os.open(name, os.O_RDWR | os.O_CREAT | here, 0o666)
+        except PermissionError:
+            if not name.exists():
+                raise
+            file = os.open(name, os.O_RDONLY | here)  # another user's, left by a killed run
         try:
             certain = _lock(file)
             # The last owner may have removed the file meanwhile: then it protects nothing.

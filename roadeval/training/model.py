@@ -209,7 +209,8 @@ class _Header:
 
 def _model(content: dict[str, Any], arrays: Arrays, known: Mapping[str, Stage]) -> Model:
     """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
-    header = _Header(**content)
+    given: dict[str, Any] = {name: content.get(name) for name in get_type_hints(_Header)}
+    header = _Header(**given)
     prior = arrays.pop(PRIOR, None)
     parts: dict[str, dict[str, Arrays]] = {variant: {} for variant in header.settings}
     for name, array in arrays.items():

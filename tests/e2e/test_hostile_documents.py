@@ -66,6 +66,7 @@ def refused(*words):
     [
         ("verdict", "x" * 1_000_000, "a text of 1,000,000 letters, and at most 12,000 are read"),
         ("losses", [1] * 300_000, "more than 200,000 values"),
+        ("warnings", [LINE] * 20_000, "a list in it has more than 1,000,000 letters"),
         ("warnings", ["x" * 12_000] * 50, "its long texts have more than 500,000 letters"),
         ("health", {"filtered": {"x" * 20_000: 1}}, "a text of 20,000 letters"),
         ("totals", {f"v{n}": {"post": {}} for n in range(150_000)}, "more than 200,000 values"),

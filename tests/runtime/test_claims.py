@@ -82,6 +82,25 @@ def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_
             claim(tmp_path)
 
 
+def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkeypatch):
+    (tmp_path / ".out.lock").write_text("process 1 on elsewhere, since long ago")
+    usual = os.open
+
+    def forbidden(path, flags, *rest):
+        if flags & os.O_RDWR:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return usual(path, flags, *rest)
+
+    monkeypatch.setattr(os, "open", forbidden)
+    with claimed(tmp_path / "out", tmp_path) as certain:
+        assert certain
+        with pytest.raises(BlockingIOError, match="process 1 on elsewhere"):
+            claim(tmp_path)
+    assert names(tmp_path) == []
+    with pytest.raises(PermissionError):
+        claim(tmp_path)
+
+
 def no_locks_of_the_system(monkeypatch):
     monkeypatch.setitem(sys.modules, "fcntl", None)
 

@@ -23,7 +23,7 @@ are, also where they are too many to list, as pairs of one half's sets and the o
 References
 ----------
 .. [1] R. A. Fisher, The Design of Experiments, 1935, section 21.
-.. [2] J. A. Hartigan, Using Subsample Floats as Typical Floats, Journal of the American
+.. [2] J. A. Hartigan, Using Subsample Values as Typical Values, Journal of the American
    Statistical Association 64, 1969, 1303-1317.
 .. [3] E. Horowitz, S. Sahni, Computing Partitions with Applications to the Knapsack Problem,
    Journal of the ACM 21, 1974, 277-292.

@@ -339,7 +339,9 @@ def _chosen(result: DriveResult, count: int) -> list[int]:
     count = min(count, len(pictured))
     spread = evenly(pictured, count)
     if not variants:
-        return spread
+        unlabelled = result.facts.unlabelled
+        asked = [each for each in (unlabelled.look_at if unlabelled else ()) if each in pictured]
+        return list(dict.fromkeys([*asked, *spread]))[:count]
     own = rows.take(np.isin(rows["frame"], pictured))
     worst = score.worst(own, variants[0], count)["frame"].tolist()
     ranked = score.worst(own, variants[0], len(pictured), 0)["frame"].tolist()

@@ -259,6 +259,7 @@ def warnings(run: Run) -> tuple[str, ...]:
     return (
         *((unlabelled, *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
+        *(str(damage) for damage in run.log.damage if not damage.lossy),
         *run.frames.accounting.repeats,
         *tuple(warned),
         *_tuned(run),

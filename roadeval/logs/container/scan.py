@@ -8,6 +8,7 @@ doubt, for its end may be false. A chunk is taken when its checksum or the summa
 from __future__ import annotations
 
 import re
+import struct
 from array import array
 from bisect import bisect_right
 from collections import defaultdict
@@ -67,6 +68,8 @@ _CANDIDATE: Final = re.compile(
 _HEADS: Final = HEAD.size + MESSAGE_HEAD.size
 _NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that are never found inside a chunk, unlike messages and their descriptions."""
+CONFLICTS: Final = 64
+"""Descriptions that contradict others which are looked at: each is tried on messages."""
 RECORDS: Final = 1 << 18
 """Records that a chunk may hold beyond one for every few of its bytes: a bomb holds millions."""
 BYTES_PER_RECORD: Final = 4
@@ -121,6 +124,7 @@ class Scan:
         end = self.summary.start or inf
         self._borders = [0, *sorted(self._listed), *[end] * bool(self._listed), inf]
         self._sizes = {(chunk.size, chunk.data_size) for chunk in self._listed.values()}
+        self._records_left = RECORDS
         self._tries_left = DOUBTED + 4 * len(source)
         self._walk()
 
@@ -267,7 +271,9 @@ class Scan:
     def define(self, record: Any, offset: int | None = None) -> None:
         """Learn a description, unless it is known; of one from the data note a contradiction."""
         other = self.known(record).setdefault(record.id, record)
-        if offset is not None and record not in (other, *(each for _, each in self.conflicts)):
+        if offset is None or record == other or len(self.conflicts) >= CONFLICTS:
+            return
+        if record not in (each for _, each in self.conflicts):
             self.conflicts.append((offset, record))
 
     def look(self, number: int) -> Mapping[int, Entries]:
@@ -276,11 +282,12 @@ class Scan:
         records = self.reader.read(chunk)
         found: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         end, problem = 0, ""
-        allowed = chunk.data_size // BYTES_PER_RECORD + RECORDS * (self.reader.patience > 0)
+        usual = chunk.data_size // BYTES_PER_RECORD
+        allowed = usual + self._records_left // 2
         for count, (opcode, offset, body, after, _) in enumerate(walk(records)):
             if count == allowed:
                 problem = f"a chunk of so many records that only the first {allowed} were read"
-                self.reader.patience //= 2
+                self._records_left -= allowed - usual
                 break
             end = after
             if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
@@ -326,6 +333,13 @@ class Scan:
         """Read what a record says that is no chunk; of a message the channel and the log time."""
         opcode, offset, body, end, _ = record
         if opcode == Opcode.ATTACHMENT:
+            at, inner = body + 16, inf
+            with suppress(struct.error):
+                for _ in range(2):  # name and media type
+                    at += 4 + struct.unpack("<I", self.source[at : at + 4])[0]
+                inner = at + 8 + struct.unpack("<Q", self.source[at : at + 8])[0] + 4
+            if inner > end:
+                raise BadRecord("an attachment whose lengths contradict each other")
             return None
         if opcode == MESSAGE or opcode >= PRIVATE:
             fits = MESSAGE_HEAD.size <= end - body <= LARGEST

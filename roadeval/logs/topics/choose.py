@@ -73,7 +73,8 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
     if not cameras:
         raise LogError(_no_image(topics, images))
     raise LogError(
-        f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`"
+        f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or give "
+        "it once for each of several"
     )
 
 

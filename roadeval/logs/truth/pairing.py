@@ -179,6 +179,8 @@ def _images(folder: Path) -> list[Path]:
 REACH: Final = 4
 """Messages to look at on either side: topics are logged nearly, not always, in stamp order. Where
 the first ones are in order, those within so many frame periods: others cost a chunk each."""
+ALONE_NS: Final = 50_000_000
+"""Half the period of a camera of 10 Hz."""
 LOOKED_AT: Final = 10
 """First images of a log that decide by what labels are paired."""
 
@@ -254,10 +256,12 @@ def clock_of(reader: TopicReader) -> Clock:
 def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
     """Return the tolerance asked for, else half the frame period, in nanoseconds.
 
-    A single image has no period: its labels have its very stamp.
+    A single image has no period: its tolerance is `ALONE_NS`.
     """
     if asked_ms is not None:
         return round(asked_ms * 1e6)
+    if len(reader) == 1:
+        return ALONE_NS
     period = median_period(reader.log_times)
     if period == 0:
         stamps = sorted(reader.stamp(position) for position in range(min(LOOKED_AT, len(reader))))

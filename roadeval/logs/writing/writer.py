@@ -113,7 +113,7 @@ class LogWriter:
             self._writer.add_message(channel, log_time, data, stamp_ns, next(sequence))
 
     def finish(self) -> None:
-        """Write the end of the file, which has its name after the ``with`` statement.
+        """Write the end of the file; it gets its name when the ``with`` statement ends.
 
         A `LogError` if the disk is full.
         """

@@ -12,6 +12,7 @@ from tests.fixtures.broken import mended
 from tests.logs.making import CAMERA, FRAMES, START, small_log
 
 MESSAGE = b"\x05"
+CHUNK = b"\x06"
 INDEX = b"\x07"
 DATA_END = b"\x0f"
 DATA_END_LENGTH = 9 + 4
@@ -196,3 +197,16 @@ def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchun
     assert kept(unchunked) == [*range(FRAMES)]
     with open_log(unchunked) as log:
         assert "of a length that cannot be" in log.losses[0]
+
+
+@pytest.mark.parametrize("opcode", [0, 4, 5, 9, 0x0F, 0x87])
+def test_a_message_index_under_another_kind_costs_nothing(chunked: Path, opcode: int) -> None:
+    at = records(chunked.read_bytes(), INDEX)[3]
+    assert kept(changed(chunked, at, bytes([opcode]))) == [*range(FRAMES)]
+
+
+def test_a_chunk_that_calls_itself_an_attachment_is_read_without_any_summary(chunked: Path) -> None:
+    data = chunked.read_bytes()
+    chunked.write_bytes(data[: records(data, DATA_END)[0]])
+    at = records(data, CHUNK)[1]
+    assert kept(changed(chunked, at, b"\x09")) == [*range(FRAMES)]

@@ -112,7 +112,7 @@ COCO: Final = LabelFormat("COCO", ".json", _is_coco, _coco, _as_coco)
 
 # --- CVAT for images, one XML file ----------------------------------------------------------------
 
-_NO_AREAS: Final = ("polyline", "points", "tag", "skeleton", "point", "line", "linestrip")
+_NO_AREAS: Final = ("polyline", "points", "tag", "skeleton")
 
 
 def _cvat(path: Path, content: Element, _: Size | None) -> Iterator[Drawing]:
@@ -227,9 +227,12 @@ def _is_labelme(_: Path, content: Any) -> bool:
     return isinstance(content, dict) and {"shapes", "imageWidth", "imageHeight"} <= content.keys()
 
 
+_LINES: Final = ("point", "points", "line", "linestrip")
+
+
 def _labelme(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
     size = int(content["imageWidth"]), int(content["imageHeight"])
-    own = [each for each in content["shapes"] if each.get("shape_type") not in _NO_AREAS]
+    own = [each for each in content["shapes"] if each.get("shape_type") not in _LINES]
     yield Drawing(str(path), size, [_shape(each, path) for each in own])
 
 
