@@ -199,13 +199,13 @@ def _place(error: Exception) -> str:
     return "".join(f" ({Path(each.filename).name}:{each.lineno})" for each in own)
 
 
-KINDS: Final = {
-    LayerKind.MASK: "2[biu]",
-    LayerKind.LABELS: "2u1",
-    LayerKind.RGB: "3u1",
-    LayerKind.SCALAR: "2",
+KINDS: Final[Mapping[LayerKind, tuple[int, tuple[type[np.generic], ...]]]] = {
+    LayerKind.MASK: (2, (np.bool_, np.integer)),
+    LayerKind.LABELS: (2, (np.uint8,)),
+    LayerKind.RGB: (3, (np.uint8,)),
+    LayerKind.SCALAR: (2, (np.number, np.bool_)),
 }
-"""What a layer's array must be for a recording: its dimensions, and the start of its type."""
+"""Dimensions and types of the arrays that a recording can hold, by the kind of layer."""
 
 
 def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
@@ -217,20 +217,20 @@ def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSp
         raise TypeError("it handed out no mask (Packed.of makes one)")
     if output.mask is not None and output.mask.shape != size:
         raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
-    arrays: list[tuple[str, Any, str]] = [
-        ("image", output.image, "3u1"),
-        ("probability", output.probability, "2u2"),
+    arrays: list[tuple[str, Any, tuple[int, tuple[type[np.generic], ...]]]] = [
+        ("image", output.image, (3, (np.uint8,))),
+        ("probability", output.probability, (2, (np.uint16,))),
     ]
     for layer in output.layers:
         if layer.spec not in specs:
             raise ValueError(f"it handed out a layer {layer.spec.name!r} that it does not announce")
         arrays.append((f"layer {layer.spec.name!r}", layer.array, KINDS[layer.spec.kind]))
-    for what, array, kind in arrays:
+    for what, array, (dimensions, types) in arrays:
         if array is None:
             continue
-        fits = array.shape == view.image.shape[: array.ndim]
-        if not fits or not re.match(kind, f"{array.ndim}{array.dtype.str[1:]}"):
+        shape = view.image.shape[:dimensions]
+        if array.shape != shape or not any(np.issubdtype(array.dtype, each) for each in types):
+            wanted = " or ".join(each.__name__ for each in types)
             raise ValueError(
-                f"its {what} is {array.dtype} {array.shape}: it must be of the image's size "
-                f"{size}, and of a type that can be recorded"
+                f"its {what} is {array.dtype} {array.shape}: it must be {wanted} {shape}"
             )

@@ -71,10 +71,12 @@ def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
             for one, other in combinations(finals.items(), 2)
         ],
         "edges": [
-            (number, variant, finals[variant], measure, f"{at}m" if at else "ahead", *ends)
+            (
+                *(number, variant, finals[variant], measure, f"{at}m" if at else "ahead"),
+                *(round(end, 3) for end in ends),
+            )
             for variant, own in result.metres.items()
-            for (measure, at), found in zip(own.measures, own.ends[0].tolist(), strict=True)
-            for ends in [[round(end, 3) for end in found]]
+            for (measure, at), ends in zip(own.measures, own.ends[0].tolist(), strict=True)
         ],
     }
 

@@ -111,7 +111,7 @@ _KEY: Final = """\
 drive        text   the log's name; in a fleet, its own name there
 camera       text   the image topic"""
 KEY: Final = _columns(_KEY)
-"""What every row begins with."""
+"""The first columns of every table."""
 _IN_FRAME: Final = f"{_KEY}\nframe count position in the image topic by log time, from 0"
 _STAMP: Final = "stamp_ns time   header stamp"
 _VARIANT: Final = "variant  name   whose mask; `blind` is the baseline"

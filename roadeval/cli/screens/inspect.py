@@ -27,6 +27,8 @@ def show(name: str, found: Sequence[WorstFrame], out: Console, *, of_fleet: bool
     what, rule = "worst frames", "of neighbours only the worst"
     if not scored:
         what, rule = "without truth, frames to look at", "one a scene; a rank, and no error rate"
+    elif of_fleet:
+        rule = "of a drive at most three, a second apart"
     out.print(f"{name}: {what} of {mask} ({rule})")
     out.print()
     rates, rig = [*found[0].rates], any(each.camera for each in found)

@@ -115,10 +115,9 @@ class Unlabelled:
     def differing(self) -> dict[tuple[str, str], float]:
         """Return the mean share of pixels on which two variants differ, by pair, once each."""
         return {
-            pair: total / frames
+            pair: self._differ[pair][0] / self._differ[pair][1]
             for pair in combinations(self._stages, 2)
-            for total, frames in [self._differ[pair]]
-            if frames
+            if pair in self._differ
         }
 
 

@@ -53,9 +53,9 @@ def colour(scene: Scene) -> Named:
     red, blue = (scene.tones[i] - scene.middle[i] for i in (1, 2))
     channels = np.moveaxis(scene.image.astype(np.float32), 2, 0)
     projections = {
-        f"projection_{angle}": red * math.cos(turn) + blue * math.sin(turn)
+        f"projection_{angle}": red * math.cos(math.radians(angle))
+        + blue * math.sin(math.radians(angle))
         for angle in ANGLES
-        for turn in [math.radians(angle)]
     }
     return {
         **dict(zip(("red", "green", "blue"), channels, strict=True)),

@@ -31,7 +31,7 @@ SURROUNDINGS: Final = 31
 FAINT: Final = 0.02
 """Added to that square's mean edge: noise is no edge."""
 BARRIERS: Final = {"edge": 1.0, "relative_edge": 0.05, "hue_edge": 1.0, "yellow": 1.0, "dark": 1.0}
-"""What each adds to the cost of a path."""
+"""Weights of barriers in the cost of a path."""
 SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}
 """Weights of squared barriers in the costs of further paths. These go a long way through what is
 faint before they cross anything steep: around the end of a kerb, not over it."""
