@@ -57,6 +57,7 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     assert errors == sorted(errors, reverse=True)
     assert len({each["drive"] for each in listed}) == 3
     read = here("inspect", fleet, "--list").stdout
+    assert "(of a drive at most three, a second apart)" in " ".join(read.split())
     assert max(map(len, read.splitlines())) <= 80
     assert "Where no recording was kept, --worst K says how to make it." in read
 

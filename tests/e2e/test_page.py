@@ -324,6 +324,8 @@ def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
     first = frame(seen.tab)
     seen.tab.keyboard.press("ArrowRight")
     assert frame(seen.tab) > first
+    named = {f"frame-{each}" for each in unlabelled.summary["unlabelled"]["look_at"]}
+    assert named <= {each.get_attribute("id") for each in seen.tab.locator(".strip").all()}
 
 
 # --- Comparisons ----------------------------------------------------------------------------------

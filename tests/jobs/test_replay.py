@@ -239,3 +239,11 @@ def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
         for rate, values in rates.items():
             each = [run.summary["difference"][stage][rate]["mean"] for run in (alone, other)]
             assert values == each
+
+
+def test_damage_that_costs_no_message_is_a_warning(tmp_path):
+    path = write_log(tmp_path / "twice.mcap")
+    path.write_bytes(2 * path.read_bytes())
+    found = roadeval.replay(path, settings(jobs=1), save=tmp_path / "o.rrd", reports=tmp_path / "o")
+    assert any("another log begins here" in each for each in found.warnings)
+    assert not found.losses

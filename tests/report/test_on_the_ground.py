@@ -2,8 +2,12 @@
 
 from typing import Any
 
+import numpy as np
+
+from roadeval.data import Rows
 from roadeval.report.blocks import plain
 from roadeval.report.sections.ground import UNSURE, distance_table
+from tests.report.making import some_findings
 
 NAMES = ["filtered", "unfiltered"]
 
@@ -28,3 +32,14 @@ def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
     assert brief.columns == ["ERR, %", "0\N{EN DASH}10 m", "by area"]
     assert [plain(cell) for cell in brief.rows[0][1:]] == ["10.0", f"{UNSURE}10.0"]
     assert f"{UNSURE}: a camera that stands" in brief.caption
+
+
+def test_an_interval_of_errors_ends_at_what_an_error_can_be():
+    wrong = np.arange(40) % 20 == 0  # one frame in twenty, all of it
+    words = {"variant": "filtered", "stage": "post", "region": "0-10m"}
+    counts = {"N": 0 * wrong + 9, "FP": 9 * wrong, "FN": 0 * wrong}
+    rows = Rows({**{name: np.full(40, word) for name, word in words.items()}, **counts})
+    found = some_findings(table=lambda _: rows).by_distance
+    mean, low, high = found["0-10m", "filtered"]
+    assert (mean, low) == (0.05, 0.0)
+    assert 0.05 < high < 1

@@ -61,9 +61,9 @@ def worst_frames(findings: Findings) -> Iterator[Block]:
     if not findings.inspect:
         head.append(Text(NO_COMMAND, "note"))
     yield from _frames(findings, head, findings.worst)
-    helped, harmed = (
-        Heading(f"Frames that the filter {what} most", 2) for what in ("helped", "harmed")
-    )
+    helped = Heading("Frames that the filter helped most", 2)
+    # Those among the worst are above already.
+    harmed = Heading("Further frames that the filter harmed most", 2)
     yield from _frames(findings, [helped], findings.helped)
     yield from _frames(findings, [harmed], findings.harmed)
 
