@@ -7,6 +7,8 @@ import shutil
 import pandas as pd
 import pytest
 
+from roadeval.jobs.results import frames
+from roadeval.jobs.results.result import DriveResult
 from tests.e2e.commands import here
 from tests.fixtures.browser import missing, violations, wait_until
 from tests.results.fleet.making import fleet_of
@@ -324,8 +326,13 @@ def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
     first = frame(seen.tab)
     seen.tab.keyboard.press("ArrowRight")
     assert frame(seen.tab) > first
-    named = {f"frame-{each}" for each in unlabelled.summary["unlabelled"]["look_at"]}
-    assert named <= {each.get_attribute("id") for each in seen.tab.locator(".strip").all()}
+
+
+def test_without_truth_the_frames_to_look_at_are_pictured_first(unlabelled, monkeypatch):
+    monkeypatch.setattr(frames, "PICTURED", 3)
+    strips = frames.strips_of(DriveResult(unlabelled.recording), 10**9)
+    look_at = unlabelled.summary["unlabelled"]["look_at"]
+    assert [each.frame for each in strips] == sorted(look_at[:3])
 
 
 # --- Comparisons ----------------------------------------------------------------------------------
