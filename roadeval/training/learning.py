@@ -319,14 +319,14 @@ def _choose(
 
     following, lost = candidates(), dict[int, str]()
     if is_spread := settings.placement == "spread":
-        deque(following, 0)
+        deque(following, 0)  # to its end: `every` is whole then
         chosen = frozenset(evenly(every, settings.frames))
         following = (each for each in frames(chosen) if each.number in chosen)
     for frame in islice(decoded(following, lost), settings.frames):
         held.add(frame)
     gap = settings.gap or 0
     if not is_spread:
-        deque(islice(following, gap + 1), 0)
+        deque(islice(following, gap + 1), 0)  # so that the gap is in `every`, too
     elif settings.gap is None:
         gap = max(1, len(every) // max(4 * len(held.frames), 1))
     if lost and not held.frames:

@@ -188,7 +188,7 @@ class Container:
         """Check the checksum of all data, unless that was done or the file has none."""
         if self.data_is_right is None and self.scan.data_crc:
             with suppress(BadRecord):
-                deque(self._blocks(), 0)
+                deque(self._blocks(), 0)  # to their end, where the sum is compared
 
     def close(self) -> None:
         """Close the file."""
