@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path
 from typing import IO, Final
 
@@ -56,6 +57,14 @@ _SUFFIX: Final = re.compile(
 )
 """What data sets put after the name that an image and its label share: Cityscapes, BDD100K, ..."""
 _KITTI: Final = re.compile(r"^(uu|umm?)_(road|lane)_(?=\d)")
+_HASH: Final = r"(?P<hash>[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}|[0-9a-f]{8,64})"
+_HASHED: Final = (
+    re.compile(rf"{_HASH}[-_.](?P<name>.+)"),
+    re.compile(rf"(?P<name>.+?)(?:_[a-z]+[-_.]rf)?[-_.]{_HASH}"),
+)
+"""What Label Studio puts before names, and Roboflow behind them."""
+NUMBER: Final = "{number}"
+"""What stands for the frame's number in a pattern of names."""
 _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
 
 
@@ -218,13 +227,58 @@ def of_ids(labels: Sequence[Path]) -> Sequence[Path]:
 
 
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
-    """Find for each label the image of its name, as it is or as `bare`."""
+    """Find for each label the image of its name.
+
+    The name is taken as it is, or as `bare`, or without what all labels have before and after it.
+    """
     exact, loose = {each.stem: each for each in images}, {bare(each): each for each in images}
+    names = dict(zip(labels, without_hashes([*map(bare, labels)]), strict=True))
+    before = _shared([*names.values()])
+    behind = [len(part) for part in _shared([name[::-1] for name in names.values()])]
+    cut = max(
+        (
+            [loose.get(n.removeprefix(b)[: -e or None]) for n in names.values()]
+            for b in before
+            for e in behind
+        ),
+        key=lambda belong: len(belong) - belong.count(None),
+        default=[],
+    )
     found = {
-        label: exact.get(label.stem) or exact.get(bare(label)) or loose.get(bare(label))
-        for label in labels
+        label: exact.get(label.stem) or exact.get(bare(label)) or image
+        for label, image in zip(labels, cut, strict=True)
     }
     return {label: image for label, image in found.items() if image is not None}
+
+
+def _shared(names: Sequence[str]) -> list[str]:
+    """Return what all names begin with, up to each of its separators, the shortest first."""
+    pairs = zip(min(names, default=""), max(names, default=""), strict=False)
+    common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    return ["", *(common[: found.end()] for found in re.finditer(r"[^0-9A-Za-z]+", common))]
+
+
+def without_hashes(names: Sequence[str]) -> Sequence[str]:
+    """Return names without the hash that a tool put before or behind each of them, if it did.
+
+    >>> without_hashes(["0a1b2c3d-frame_7", "11223344-frame_8"])
+    ['frame_7', 'frame_8']
+    """
+    for pattern in _HASHED:
+        found = [match for match in map(pattern.fullmatch, names) if match]
+        hashes = "".join(match["hash"] for match in found)
+        one_length = len({len(match["hash"]) for match in found}) == 1
+        if one_length and len(found) == len(names) and re.search("[a-f]", hashes):
+            names = [match["name"] for match in found]
+    return names
+
+
+def matching(pattern: str, name: str) -> re.Match[str] | None:
+    """Match a whole name with a pattern: ``*`` any text, ``?`` any letter, `NUMBER` digits."""
+    kinds = {"*": ".*", "?": ".", NUMBER: r"(?<!\d)(\d+)"}
+    parts = re.split(rf"([*?]|{re.escape(NUMBER)})", pattern)
+    regex = "".join(kinds.get(part, re.escape(part)) for part in parts)
+    return re.fullmatch(regex, name, re.DOTALL)
 
 
 def bare(file: Path) -> str:

@@ -20,11 +20,11 @@ from roadeval.logs.frames import TRUTH, FrameStream, Selection, settle
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
-from roadeval.logs.topics.choose import choose_truth, named
+from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import TopicInfo, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
-from roadeval.logs.truth.pairing import frames_of, with_keys
+from roadeval.logs.truth.pairing import frames_of, shown_name, with_keys
 from roadeval.runtime.text import visible
 
 SMALL: Final = 50_000_000
@@ -223,7 +223,13 @@ class Log:
         camera = found.camera
         if log is None:
             origin = labels_in(Path(settings.path), camera.topic.size)
-            labels = with_keys(origin, settings.path, settings, self._limits)
+            if settings.names == "*" and settings.images is None:
+                names = [shown_name(label.path, settings.path) for label in origin.labels]
+                check_names(names, camera.topic, self.topics)
+            images = camera.images
+            is_whole = images.sure == images.expected() == len(images)
+            count = len(images) if is_whole else None
+            labels = with_keys(origin, settings.path, settings, self._limits, count)
             return beside_log(labels, settings, camera, lambda: labels.digest)
         other = open_log(log, LogConfig(frames=self.config.frames))
         self._beside.append(other)

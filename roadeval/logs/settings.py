@@ -156,18 +156,24 @@ class LabelPlace:
     Studio), or LOG.mcap:/topic. Images may be NPY files; there is one a frame. In the path
     ``{drive}`` is the name of the drive's file, without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
-    """How labels and frames belong together: by ``number``, the last one in the name of a label's
-    file; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
+    """How labels and frames belong together: by ``number``, the one by which the labels' names
+    differ; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
     since 1970). Default: stamps of a log, and of files whose names are all times of more than ten
     digits."""
-    first: Annotated[int, Interval(ge=0, le=1_000_000_000), Flag("--truth-first", "N")] = 0
-    """The number of the first frame's label."""
+    first: Annotated[int | None, Interval(ge=0, le=1_000_000_000), Flag("--truth-first", "N")] = (
+        None
+    )
+    """The number of the first frame's label. Default: what the numbers allow, if that is plain."""
+    names: Annotated[str, Flag("--truth-names", "PATTERN")] = "*"
+    """Only labels whose names match: ``left/*`` where those of several cameras lie together. In
+    ``*_{number}_v?.png`` the part ``{number}`` is the frame's number; ``*`` and ``?`` are any
+    text and any letter."""
     images: Annotated[str | None, Flag("--truth-images", "FOLDER")] = None
     """The folder of images that the log was made of, in their order: labels belong to the image of
     the same name, endings such as ``_mask`` aside. It may hold ``{drive}``, too."""
 
     def __post_init__(self) -> None:
-        if self.images is not None and (self.pair is not None or self.first):
+        if self.images is not None and (self.pair, self.first) != (None, None):
             raise ValueError("with images labels are paired by name: leave out pair and first")
 
 

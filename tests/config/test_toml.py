@@ -34,6 +34,7 @@ OTHER = {
     "truth.path": "labels/{drive}",
     "truth.pair": "stamp",
     "truth.first": 1,
+    "truth.names": "left_*",
     "truth.images": "frames/{drive}",
     "topics.image": "/left/image",
     "topics.truth": '/a "quoted" topic',

@@ -57,7 +57,7 @@ def replay(places: Path, out: Path, truth: str = "", only: tuple[str, ...] = (),
         {
             "masks": {"net": {"path": str(places / "net")}},
             "only": list(only),
-            "truth": {"path": str(places / truth)} if truth else {},
+            "truth": {"path": str(places / truth), "first": 0} if truth else {},
             "output": {"record": "none"},
         }
         | tables
@@ -149,7 +149,7 @@ def fleet(places, tmp_path):
 
 
 def test_a_label_that_has_changed_replays_its_drive_of_a_fleet(fleet, tmp_path):
-    truth = {"path": str(tmp_path / "labels" / "{drive}")}
+    truth = {"path": str(tmp_path / "labels" / "{drive}"), "first": 0}
     assert fleet(truth=truth)[0].counts == {"scored": 2}
     assert fleet(truth=truth)[1] == []
     label = tmp_path / "labels" / "two" / "5.png"
@@ -168,7 +168,7 @@ def test_a_manifest_says_where_the_truth_of_a_drive_lies(fleet, tmp_path, monkey
     monkeypatch.chdir(tmp_path / "labels")
     manifest = tmp_path / "fleet.toml"
     entries = [
-        f'[[drives]]\npath = "{name}.mcap"\ntruth = {{ path = "{own}" }}\n'
+        f'[[drives]]\npath = "{name}.mcap"\ntruth = {{ path = "{own}", first = 0 }}\n'
         for name, own in (("one", "one"), ("two", "2024"))
     ]
     manifest.write_text("\n".join(entries))

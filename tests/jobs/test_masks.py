@@ -81,7 +81,7 @@ def outcome(places, tmp_path_factory):
         named={"path": "named", "images": "images"},
         other={"path": "other.mcap:/seg"},
         order={"path": "other.mcap:/seg", "pair": "number"},
-        half={"path": "half"},
+        half={"path": "half", "first": 0},
     )
     config = settings(masks={"inside": IN_LOG}).override({"masks": beside})
     return roadeval.replay(drive, config, save=inside / "out.rrd", reports=inside / "reports")

@@ -175,16 +175,52 @@ def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]
         ("its path", label.name, image.name, [each.name for each in cameras]),
         ("its frame_id", label.frame_id, image.frame_id, [each.frame_id for each in cameras]),
     ):
-        known = frozenset[str]().union(*map(_camera_words, (ours, *others)))
-        of_label, of_image, *of_others = (
-            {w for w in _camera_words(text) if w in known | SIDES or re.fullmatch(r"camera\d+", w)}
-            for text in (theirs, ours, *others)
-        )
-        is_another = bool(of_image - {"camera"}) and not of_label <= of_image
-        nearer = any(len(of_label ^ each) < len(of_label ^ of_image) for each in of_others)
-        if of_label and ours and (is_another or nearer):
+        if ours and _is_another(*_cameras(theirs, ours, *others)):
             return what if theirs == label.name else f"{what} ({theirs}, not {ours})"
     return ""
+
+
+def _cameras(theirs: str, ours: str, *others: str) -> list[set[str]]:
+    """Return the words of each name that tell a camera from others."""
+    known = frozenset[str]().union(*map(_camera_words, (ours, *others)))
+    return [
+        {w for w in _camera_words(text) if w in known | SIDES or re.fullmatch(r"camera\d+", w)}
+        for text in (theirs, ours, *others)
+    ]
+
+
+def _is_another(of_label: set[str], of_image: set[str], *of_others: set[str]) -> bool:
+    is_another = bool(of_image - {"camera"}) and not of_label <= of_image
+    nearer = any(len(of_label ^ each) < len(of_label ^ of_image) for each in of_others)
+    return bool(of_label) and (is_another or nearer)
+
+
+def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicInfo]) -> None:
+    """Refuse, as a `LogError`, names of labels that carry another camera's name, or several ones'.
+
+    Numbers of frames are no part of a camera's name, as in ``cam_0012.png``.
+    """
+    ours, *others = (
+        f"{topic.name} {topic.frame_id}" for topic in (image, *_other_cameras(topics, image))
+    )
+    _, of_image, *of_others = _cameras("", ours, *others)
+    texts = (re.sub(r"(?i)(?<![a-z\d])\d+(?=[^/]*$)", "", name) for name in names)
+    of_labels = [_cameras(text, ours, *others)[0] for text in texts]
+    numbered = {word for words in of_labels for word in words if word[-1].isdigit()}
+    frames = numbered if len(numbered) == len(names) else set[str]()
+    shown = {frozenset(each - frames): name for each, name in zip(of_labels, names, strict=True)}
+    cameras = {words: name for words, name in shown.items() if words}
+    theirs = [
+        name for words, name in cameras.items() if _is_another({*words}, of_image, *of_others)
+    ]
+    if len(cameras) > 1:
+        problem = f"labels of several cameras, as {' and '.join(sorted(cameras.values())[:3])}"
+    elif theirs:
+        problem = f"{theirs[0]} is of another camera than {image.name}, by its name"
+    else:
+        return
+    pattern = re.sub(r"\d+[^/]*$", "*", min(cameras.values()))
+    raise LogError(f"{problem}: choose those that count by `truth.names`, as '{pattern}'")
 
 
 def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:

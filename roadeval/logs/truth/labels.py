@@ -388,10 +388,12 @@ def beside_log(
         check_times(pairing, labels.name, camera.clock)
     else:
         pairing = by_number(labels, settings, camera.images)
-    from_log = isinstance(labels, TopicReader)
-    words = camera.clock if from_log and settings.pair is None else by
+    notes: tuple[str, ...] = ()
+    if isinstance(labels, NamedLabels):
+        words, notes = f"{by}, from {labels.first}" if labels.first else by, labels.origin.notes
+    else:
+        words = by if settings.pair else camera.clock
     meaning = meaning_of(labels, settings, camera)
-    notes = labels.origin.notes if isinstance(labels, NamedLabels) else ()
     why = f"{count}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
 

@@ -22,13 +22,23 @@ import numpy.typing as npt
 
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.files import IMAGES, bare, images_of, listed, ordered, some, time_in
+from roadeval.logs.files import (
+    IMAGES,
+    NUMBER,
+    bare,
+    images_of,
+    listed,
+    matching,
+    ordered,
+    some,
+    time_in,
+    without_hashes,
+)
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.settings import LabelPlace, TopicSettings
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.runtime.text import visible
 
-_LAST_NUMBER: Final = re.compile(r"(\d+)\D*$")
 SHORT: Final = 10
 """Digits of what may be a time in seconds, or a frame's number with zeros before it."""
 _DIGITS: Final = 18
@@ -75,6 +85,8 @@ class NamedLabels:
     """``number``, ``stamp`` or ``name``: where the keys come from."""
     limits: Limits
     """On the images."""
+    first: int = 0
+    """The number in the name of the first frame's label."""
     nameless: int = 0
     """Further labels, whose name no image has."""
     images: int | None = None
@@ -119,14 +131,22 @@ class NamedLabels:
         return digest.hexdigest()
 
 
-def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits) -> NamedLabels:
+def with_keys(
+    origin: LabelSet, name: str, settings: LabelPlace, limits: Limits, frames: int | None = None
+) -> NamedLabels:
     """Find the key of each label by its name, as the settings ask.
 
-    A `LogError` if a name has no key, or two labels have the same.
+    ``frames`` is the number of frames of the log, if no loss leaves it open. A `LogError` if a name
+    has no key, two labels have the same, or it is not plain which digits or which first number
+    count.
     """
-    labels = origin.labels
+    shown = {label.path: shown_name(label.path, name) for label in origin.labels}
+    labels = [label for label in origin.labels if matching(settings.names, shown[label.path])]
+    if not labels:
+        theirs = some([*shown.values()])
+        raise LogError(f"{name}: no label has a name as `truth.names` {settings.names}: {theirs}")
     named = None if settings.images is None else _images(Path(settings.images))
-    by, keys = _keys([label.path for label in labels], settings, named)
+    by, keys = _keys({label.path: shown[label.path] for label in labels}, settings, named)
     if named is not None and not keys:
         raise LogError(
             f"{name}: none of them has the name of an image in {settings.images}: theirs are "
@@ -140,32 +160,84 @@ def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits)
             both = f"{visible(str(first))} and {visible(str(second))}"
             raise LogError(f"{name}: {both} belong to the same frame, by {by}")
     in_order = np.array([keys[label.path] for label in found], np.int64)
+    first_number = settings.first or 0
+    if by == "number" and settings.first is None:
+        first_number = _first_number(in_order, frames, name)
+        if 1 == first_number < in_order[0]:
+            guess = f"the last label is number {frames}, as many as there are frames: so the first "
+            guess += "frame is taken for number 1; `truth.first` says otherwise"
+            origin = replace(origin, notes=(*origin.notes, guess))
     nameless, images = len(labels) - len(found), None if named is None else len(named)
-    return NamedLabels(visible(name), tuple(found), origin, in_order, by, limits, nameless, images)
+    in_order -= first_number if by == "number" else 0
+    place = visible(name), tuple(found), origin, in_order, by
+    return NamedLabels(*place, limits, first_number, nameless, images)
+
+
+def shown_name(file: Path, folder: str) -> str:
+    """Return the name of a label's file as seen from the folder of all."""
+    inside = file.relative_to(folder) if file.is_relative_to(folder) else file
+    return inside.as_posix()
 
 
 def _keys(
-    files: Sequence[Path], settings: LabelPlace, named: Sequence[Path] | None
+    files: Mapping[Path, str], settings: LabelPlace, named: Sequence[Path] | None
 ) -> tuple[str, dict[Path, int]]:
     """Return what the keys are, and that of each file that has one."""
     if named is not None:
         places = {image: place for place, image in enumerate(named)}
-        return "name", {file: places[image] for file, image in images_of(files, named).items()}
+        return "name", {file: places[image] for file, image in images_of([*files], named).items()}
     times = {file: time for file in files if (time := time_in(bare(file))) is not None}
     are_times = len(times) == len(files) and all(len(bare(file)) > SHORT for file in files)
     if settings.pair == "number" or (settings.pair is None and not are_times):
-        return "number", {file: _number(file) - settings.first for file in files}
+        return "number", _numbers(files, settings.names)
     for file in files:
         if file not in times:
             raise LogError(f"{file}: its name is not a time, so its frame cannot be found")
     return "stamp", times
 
 
-def _number(file: Path) -> int:
-    found = _LAST_NUMBER.search(bare(file))
-    if found is None or len(found[1]) > _DIGITS:
-        raise LogError(f"{file}: its name has no number: pair by names, with `truth.images`")
-    return int(found[1])
+def _numbers(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
+    """Return the number in the name of each file: the group of digits by which the names differ.
+
+    A pattern with `NUMBER` says where it is. A `LogError` if the names differ otherwise, too.
+    """
+    first, *_, last = *files, *files
+    if NUMBER in pattern:
+        digits = (*(found[1] for name in files.values() if (found := matching(pattern, name))),)
+    else:
+        parts = [re.split(r"(\d+)", name) for name in without_hashes([*map(bare, files)])]
+        groups = [*zip(*(part[1::2] for part in parts), strict=False)]
+        varied = [group for group in groups if len({text.lstrip("0") for text in group}) > 1]
+        digits, *others = varied or groups[-1 if len(files) > 1 else 0 :] or [()]
+        other = next(
+            (f for f, p in zip(files, parts, strict=True) if p[::2] != parts[0][::2]), None
+        )
+        if others or other:
+            raise LogError(
+                f"{some(sorted({first, other or last}))}: the names do not tell which digits are "
+                f"the frame's number: show them by `truth.names`, as frame_{NUMBER}_*; or name the "
+                "folder of the log's images by `truth.images`"
+            )
+    if max(map(len, digits), default=_DIGITS + 1) > _DIGITS:
+        raise LogError(f"{first}: its name has no number: pair by names, with `truth.images`")
+    return dict(zip(files, map(int, digits), strict=True))
+
+
+def _first_number(numbers: npt.NDArray[np.int64], frames: int | None, name: str) -> int:
+    """Return the number of the first frame, by the numbers of labels in rising order.
+
+    A label of number 0 tells it, and labels up to as many as there are frames do, and a label for
+    every frame. A `LogError` if nothing does.
+    """
+    low, high = int(numbers[0]), int(numbers[-1])
+    if low == 0:
+        return 0
+    if frames is not None and (high == frames or len(numbers) == frames == high - low + 1):
+        return high - frames + 1
+    raise LogError(
+        f"{name}: its labels have the numbers {low} to {high}, which does not tell whether the "
+        "first frame is number 0 or 1: give `truth.first` 0 or `truth.first` 1"
+    )
 
 
 def _images(folder: Path) -> list[Path]:
@@ -459,16 +531,16 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     """Pair by frame numbers.
 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
-    certain number, and no label. A `LogError` if no number is a frame's, or the numbers look
-    shifted by one.
+    certain number, and no label. A `LogError` if no number is a frame's.
     """
-    first, frames = settings.first, len(images)
+    frames = len(images)
     if isinstance(labels, TopicReader):
+        first = settings.first or 0
         known = labels.sure - first if labels.sure < len(labels) else frames
         unsure = frames - max(0, min(images.sure, known))
         numbers = Times(range(-first, labels.sure - first))
         return Pairing(Times(range(frames), images.sure), numbers, 0, unsure=unsure)
-    name, keys = labels.name, labels.log_times
+    name, keys, first = labels.name, labels.log_times, labels.first
     named, cut = labels.images, images.expected() != frames
     if named is not None and (named < frames or (named > frames and not cut)):
         raise LogError(
@@ -476,11 +548,9 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
             "made of all of them: leave `truth.images` out, and pair by number or stamp"
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
-    is_shifted = named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames)
-    if not inside or is_shifted:
-        which = "only some" if inside else "none"
+    if not inside:
         raise LogError(
-            f"{name}: {which} of them belong to a frame by {labels.by}: theirs are "
+            f"{name}: none of them belongs to a frame by {labels.by}: theirs are "
             f"{keys[0] + first} to {keys[-1] + first} ({some([e.path for e in labels.labels])}), "
             f"the frames' {first} to {first + frames - 1}: if {keys[0] + first} is the first "
             "frame's, set `truth.first` to it; or name the folder of the images that the log was "

@@ -87,12 +87,31 @@ def replay(drive: Path, path: Path, *words: Any):
 # --- Names ----------------------------------------------------------------------------------------
 
 
-def test_numbers_from_one_are_refused_with_the_setting_that_shifts_them(drive, tmp_path):
-    path = images(tmp_path / "truth", *(f"{number}.png" for number in range(1, FRAMES + 1)))
+def test_numbers_up_to_the_number_of_frames_begin_with_one(drive, tmp_path):
+    path = images(tmp_path / "truth", *(f"{number}.png" for number in (1, 2, 3, 6)))
+    selection, labelled, _ = select(drive, path)
+    assert labelled == [0, 1, 2, 5]
+    assert selection.truth.why == "4 labels, paired by number, from 1"
+
+
+def test_numbers_that_fit_from_zero_and_from_one_are_asked_about(drive, tmp_path):
+    path = images(tmp_path / "truth", "2.png", "4.png")
     message = refusal(drive, path)
-    assert "theirs are 1 to 6 (1.png, 2.png, 3.png, ...), the frames' 0 to 5" in message
-    assert "if 1 is the first frame's, set `truth.first` to it" in message
-    assert select(drive, path, first=1)[1] == [*range(FRAMES)]
+    assert message.endswith("number 0 or 1: give `truth.first` 0 or `truth.first` 1")
+    assert select(drive, path, first=0)[1] == [2, 4]
+    assert select(drive, path, first=1)[1] == [1, 3]
+
+
+def test_labels_of_several_cameras_are_refused_until_one_is_chosen(drive, tmp_path):
+    path = tmp_path / "truth"
+    for side, count in (("left", 4), ("right", 6)):
+        path.mkdir(exist_ok=True)
+        images(path / side, *(f"{number}.png" for number in range(count)))
+    message = refusal(drive, path)
+    assert "labels of several cameras, as left/3.png and right/5.png" in message
+    assert message.endswith("choose those that count by `truth.names`, as 'left/*'")
+    assert select(drive, path, names="left/*")[1] == [0, 1, 2, 3]
+    assert "no label has a name as `truth.names` rear/*" in refusal(drive, path, names="rear/*")
 
 
 def test_names_of_no_image_are_refused_with_three_of_each(drive, tmp_path):
@@ -153,7 +172,7 @@ def test_a_note_beside_label_images_is_no_label(drive, tmp_path):
     path = images(tmp_path / "truth", "1.png")
     (path / "notes.txt").touch()
     (path / "about.json").write_text('{"by": "us"}')
-    assert select(drive, path)[1] == [1]
+    assert select(drive, path, first=0)[1] == [1]
 
 
 def test_labels_lie_below_a_list_of_names(drive, tmp_path):

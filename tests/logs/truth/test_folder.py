@@ -26,6 +26,7 @@ def folder(tmp_path, *names):
 
 
 def opened(path: Path, size=None, **settings) -> NamedLabels:
+    settings = {"first": None if "images" in settings else 0, **settings}
     return with_keys(
         labels_in(path, size), str(path), MaskSettings(str(path), **settings), Limits()
     )
@@ -37,9 +38,9 @@ def keys(path, **settings):
     return found.by, dict(zip(names, found.log_times.tolist(), strict=True))
 
 
-def test_the_last_number_of_a_name_is_its_frame(tmp_path):
-    path = folder(tmp_path, "0016E5_10.png", "0016E5_2_mask.png", "x7_L.npy", "notes.txt")
-    expected = {"0016E5_2_mask.png": 2, "x7_L.npy": 7, "0016E5_10.png": 10}
+def test_the_number_by_which_names_differ_is_the_frame(tmp_path):
+    path = folder(tmp_path, "0016E5_10.png", "0016E5_2_mask.png", "0016E5_007_L.npy", "notes.txt")
+    expected = {"0016E5_2_mask.png": 2, "0016E5_007_L.npy": 7, "0016E5_10.png": 10}
     assert keys(path) == ("number", expected)
     assert list(keys(path)[1]) == list(expected)
 
@@ -71,7 +72,7 @@ def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
     [
         ((), {}, "no image in it"),
         (("road.png",), {}, "road.png: its name has no number"),
-        (("1.png", "a1.npy"), {}, "a1.npy and 1.png belong to the same frame, by number"),
+        (("1.png", "01.npy"), {}, "1.png belong to the same frame, by number"),
         (("1.png",), {"pair": "stamp"}, "1.png: its name is not a time"),
     ],
 )
