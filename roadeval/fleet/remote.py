@@ -15,12 +15,11 @@ import os
 import re
 from base64 import b64encode
 from collections.abc import Callable
-from concurrent.futures import Future, wait
+from concurrent.futures import wait
 from dataclasses import dataclass
 from datetime import timedelta
 from os import PathLike
 from pathlib import Path
-from threading import Thread
 from typing import IO, Any, Final, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 
@@ -34,6 +33,7 @@ from roadeval.fleet.drives import (
     shown,
 )
 from roadeval.logs import RemoteLog
+from roadeval.runtime.threads import in_thread
 
 Answer = TypeVar("Answer")
 
@@ -190,15 +190,7 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
 
     It runs in a thread of its own, for obstore does not notice Ctrl-C while it waits for a server.
     """
-    answer: Future[Answer] = Future()
-
-    def call() -> None:
-        try:
-            answer.set_result(function(*arguments, **options))
-        except BaseException as error:
-            answer.set_exception(error)
-
-    Thread(target=call, name="roadeval-url", daemon=True).start()
+    answer = in_thread(lambda: function(*arguments, **options))
     # In pieces: a signal that another thread receives does not end one long wait.
     while not wait([answer], _PATIENCE_S).done:
         pass

@@ -12,7 +12,8 @@ import math
 import os
 import shutil
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from concurrent.futures import wait
 from contextlib import suppress
 from operator import itemgetter
 from pathlib import Path
@@ -40,7 +41,8 @@ from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import indexed_messages
-from roadeval.runtime.files import NewFile, writing
+from roadeval.runtime.files import NewFile, own_name, remove, writing
+from roadeval.runtime.threads import in_thread
 
 
 class EncodedFrame(NamedTuple):
@@ -192,9 +194,10 @@ HELD: Final = 256 << 20
 WORTH_SAYING: Final = 100_000_000
 """Bytes of a recording whose expected size is said."""
 
-PATIENCE_S: Final = 10.0
-PATIENCE: Final = 30
-"""How often, and for how long each time, a slow disk is waited for."""
+PATIENCE_S: Final = 30.0
+"""How long a disk is waited for that takes nothing."""
+LOOK_S: Final = 0.5
+"""Between two looks at what a slow disk has taken."""
 
 
 class Recorder:
@@ -248,7 +251,8 @@ class Recorder:
             self._stream = stream = rr.RecordingStream(
                 at.APPLICATION, recording_id=identity, send_properties=False
             )
-            stream.save(self.partial, default_blueprint=views.arrange(layouts))
+            blueprint = views.arrange(layouts)
+            self._watch(lambda: stream.save(self.partial, default_blueprint=blueprint))
             first, *_ = layouts.values()
             stream.send_recording_name(first.drive)
             if "" not in layouts:
@@ -409,7 +413,7 @@ class Recorder:
             self._log_static([(at.SHOWN, [rr.TextDocument(pictured)])], each.prefix)
         self._close()
         if indexed_messages(self.partial) < self._chunks:
-            raise self._incomplete() from _failure(errno.EIO)
+            raise self._incomplete()
         self._finished = True
 
     def check_disk_space(self) -> None:
@@ -471,21 +475,42 @@ class Recorder:
 
     def _flush_stream(self) -> None:
         self._unwritten = 0
-        stream = self._open_stream()
-        for _ in range(PATIENCE):
-            try:
-                stream.flush(timeout_sec=PATIENCE_S)
-                return
-            except OSError as error:
-                raise self._incomplete() from error
-            except RuntimeError as error:
-                if "timed out" not in str(error) or self._is_disk_full():
-                    break
-        # Its thread has ended. Rerun may wait for that for ever, here and when the process ends.
-        atexit.unregister(rr.rerun_shutdown)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(stream))
-        self._failed, self._stream = True, None
-        raise self._incomplete() from _failure(errno.ENOSPC if self._is_disk_full() else errno.EIO)
+        self._watch(self._open_stream().flush)
+
+    def _watch(self, call: Callable[[], object]) -> None:
+        """Make a call that waits for Rerun's writer, which ends where the file cannot grow.
+
+        Rerun waits for it without end then, in such a call and when the process ends.
+        """
+        answer, size, looks = in_thread(call), -1, 0
+        while not wait([answer], LOOK_S).done and not self._refusal():
+            before, size = size, self._size()
+            looks = looks + 1 if size == before else 0
+            if looks * LOOK_S >= PATIENCE_S:
+                break
+        if not answer.done() or answer.exception():
+            atexit.unregister(rr.rerun_shutdown)
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
+            self._failed, self._stream = True, None
+            raise self._incomplete()
+
+    def _size(self) -> int:
+        return self.partial.stat().st_size if self.partial.exists() else 0
+
+    def _refusal(self) -> OSError | None:
+        """Return the error with which one more byte is refused, as at a limit or a full quota."""
+        if self._is_disk_full():
+            return _failure(errno.ENOSPC)
+        probe = own_name(self.partial)
+        try:
+            with probe.open("wb") as file:
+                file.seek(self._size())
+                file.write(b"\0")
+        except OSError as error:
+            return error
+        finally:
+            remove(probe)
+        return None
 
     def _close(self) -> None:
         if self._stream is None:
@@ -496,11 +521,14 @@ class Recorder:
             self._send_all()
         finally:
             if self._stream is not None:
-                self._stream.disconnect()
+                self._watch(self._stream.disconnect)
                 self._stream = None
 
     def _incomplete(self) -> RecordingError:
-        return RecordingError(f"{self.partial}: cannot be written any further; is the disk full?")
+        refusal = self._refusal() or _failure(errno.EIO)
+        error = RecordingError(f"{self.path}: cannot be written any further: {refusal.strerror}")
+        error.__cause__ = refusal
+        return error
 
 
 def _failure(number: int) -> OSError:

@@ -1,4 +1,4 @@
-"""An ordered, bounded map over worker threads."""
+"""An ordered, bounded map over worker threads, and single calls that may never return."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from threading import Thread
 from typing import Final, TypeVar
 
 T = TypeVar("T")
@@ -34,6 +35,20 @@ def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R
                 yield waiting.popleft().result()
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def in_thread(call: Callable[[], R]) -> Future[R]:
+    """Make a call in a thread of its own; the end of the process does not wait for it."""
+    answer: Future[R] = Future()
+
+    def run() -> None:
+        try:
+            answer.set_result(call())
+        except BaseException as error:
+            answer.set_exception(error)
+
+    Thread(target=run, daemon=True).start()
+    return answer
 
 
 @contextmanager

@@ -7,11 +7,13 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import rerun as rr
 
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
 from roadeval.recording.recorder import LEAST_FREE
@@ -148,7 +150,7 @@ from roadeval.recording import RecordingError
 from roadeval.recording import recorder
 from tests.recording.making import record, some_frames
 
-recorder.PATIENCE_S = 1.0
+recorder.LOOK_S = 0.2
 recorder.Recorder.check_disk_space = lambda self: None
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
@@ -167,14 +169,32 @@ def recorded_with_too_little_room(path, limit):
     done = subprocess.run(
         command, cwd=root, check=False, capture_output=True, text=True, timeout=60
     )
-    assert "is the disk full" in done.stdout, done.stderr
+    assert "cannot be written any further: File too large" in done.stdout, done.stderr
     assert not path.exists()
+    assert len(list(path.parent.iterdir())) < 2
     return done.stdout.splitlines()[-1]
 
 
-def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording, tmp_path):
-    limit = recording.path.stat().st_size * 9 // 10
-    assert recorded_with_too_little_room(tmp_path / "out.rrd", limit) == os.strerror(errno.EIO)
+@pytest.mark.parametrize("share", [0.001, 0.02, 0.3, 0.6, 0.9, 0.99])
+def test_a_file_that_may_not_grow_ends_the_run_and_does_not_get_its_name(
+    recording, tmp_path, share
+):
+    limit = int(recording.path.stat().st_size * share)
+    assert recorded_with_too_little_room(tmp_path / "out.rrd", limit) == os.strerror(errno.EFBIG)
+
+
+@pytest.mark.parametrize("hung", ["save", "flush", "disconnect"])
+def test_no_wait_for_a_hung_disk_is_without_end(drive, tmp_path, monkeypatch, hung):
+    monkeypatch.setattr("roadeval.recording.recorder.PATIENCE_S", 0.4)
+    monkeypatch.setattr("roadeval.recording.recorder.LOOK_S", 0.1)
+    monkeypatch.setattr(rr.RecordingStream, hung, lambda *_, **__: time.sleep(60))
+    begun = time.monotonic()
+    with (
+        pytest.raises(RecordingError, match="written any further: Input/output error"),
+        _recorder(tmp_path / "out.rrd") as recorder,
+    ):
+        recorder.write(recorder.encode(drive[3], 0), lines(drive[3]))
+    assert time.monotonic() - begun < 10
 
 
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
