@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 
@@ -34,6 +35,33 @@ class Calibration:
     """The camera's name in the log's transforms."""
     mounting: Mounting | None = None
     """None where no static transform tells it."""
+
+    @property
+    def problem(self) -> str:
+        """What no camera can have, as "focal length is 0": the setting first; empty if nothing."""
+        k = self.matrix if len(self.matrix) == 9 else (math.nan,) * 9
+        across, down, less, more = k[0], k[4], min(k[0], k[4]), max(k[0], k[4])
+        short, long = sorted((self.width, self.height))
+        pixels = f"{self.width}x{self.height} pixels"
+        aside = abs(k[2] - self.width / 2), abs(k[5] - self.height / 2)
+        checks = {
+            f"size is {pixels}": 1 <= short <= long <= 65_536,
+            "focal length is not known: its matrix is not nine numbers": len(self.matrix) == 9,
+            "focal length is 0: the camera was never calibrated": across or down,
+            f"focal length is {across:.6g} and {down:.6g} for {pixels}": (
+                0.02 * short <= less <= more <= min(200 * long, 5 * less)
+            ),
+            "focal length is not clear: its matrix is not fx 0 cx, 0 fy cy, 0 0 1": (
+                abs(k[1]) <= across and (k[3], *k[6:]) == (0, 0, 0, 1)
+            ),
+            f"centre is {k[2]:.6g}, {k[5]:.6g} in {pixels}": all(
+                length <= 10 * long for length in aside
+            ),
+            "distortion has a number that is not finite, or beyond a million": all(
+                abs(number) <= 1e6 for number in self.distortion
+            ),
+        }
+        return next((text for text, holds in checks.items() if not holds), "")
 
     def scaled(self, width: int, height: int) -> Calibration:
         """Return the calibration of the same image in another size, in pixels."""

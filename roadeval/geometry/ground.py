@@ -30,6 +30,10 @@ _COEFFICIENTS: Final = {
 """How many numbers the models have, by their names."""
 STATED: Final = (10, 40)
 """Metres ahead at which it is said how much of the way a pixel covers."""
+LOWEST, HIGHEST = 0.01, 1000.0
+"""Metres of a camera above the ground, at least and at most."""
+SAME_SHAPE: Final = 0.02
+"""Images of one shape may differ by this in the ratio of their sides: sizes are rounded."""
 TOLERANCE: Final = 1e-4
 """A distorted ray must lead back to itself within this, in units of the focal length: a polynomial
 bends rays from far outside the picture back into it."""
@@ -192,6 +196,11 @@ def _lens(
         known = replace(known, model=given.model, distortion=given.distortion)
     if known is None:
         return None, "the focal length is missing: give fov, or focal, with `ground`"
+    if problem := known.problem:
+        raise GroundError(f"`ground.{problem.split()[0]}`: its {problem}: no camera has that")
+    if abs(known.width * size[1] / (known.height * size[0]) - 1) > SAME_SHAPE:
+        shape = f"{known.width}x{known.height}, have another shape than the images"
+        raise GroundError(f"`ground.size`: its images, {shape}, {size[0]}x{size[1]}")
     wanted = _COEFFICIENTS.get(known.model)
     if any(known.distortion) and (wanted is None or len(known.distortion) not in wanted):
         model = f"{known.model or 'without a name'} of {len(known.distortion)} numbers"
@@ -211,8 +220,9 @@ def _pose(
         if height is None and mounting.parent in GROUND_FRAMES:
             height = mounting.translation[2]
     missing = []
-    if height is None or height <= 0:
+    if height is None or not LOWEST <= height <= HIGHEST:
         above = f": the log has it above {mounting.parent} alone" if mounting else ""
+        above = above if height is None else f": the log says {height:.6g} m"
         missing.append(f"the camera's height above the ground{above}")
     if pitch is None:
         missing.append("its pitch")
@@ -230,7 +240,7 @@ def _of_homography(
     given: GroundSettings, lens: Calibration | None
 ) -> tuple[tuple[float, ...], bool, str]:
     to_ground = np.reshape(given.homography, (3, 3))
-    if not np.isfinite(to_ground).all() or abs(np.linalg.det(to_ground)) < 1e-30:
+    if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
         raise GroundError("`ground.homography` cannot be inverted")
     matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
     plane = np.linalg.inv(to_ground @ matrix)

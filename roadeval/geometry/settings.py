@@ -9,6 +9,9 @@ from annotated_types import Interval, Len
 
 Degrees = Annotated[float, Interval(gt=-90, lt=90)]
 Length = Annotated[float, Interval(gt=0, le=1_000_000)]
+Number = Annotated[float, Interval(ge=-1_000_000, le=1_000_000)]
+Entry = Annotated[float, Interval(ge=-1e12, le=1e12)]
+Pixels = Annotated[int, Interval(ge=1, le=65_536)]
 
 
 @dataclass(frozen=True)
@@ -20,26 +23,26 @@ class GroundSettings:
     in metres, too.
     """
 
-    height: Annotated[float | None, Interval(gt=0, le=1000)] = None
+    height: Annotated[float | None, Interval(ge=0.01, le=1000)] = None
     """Metres from the ground to the camera."""
     pitch: Degrees | None = None
     """Degrees that it looks down; negative ones look up."""
     roll: Annotated[float, Interval(ge=-180, le=180)] | None = None
     """Degrees that it leans to the right. Default: of the log's transforms, else 0."""
-    fov: Annotated[float | None, Interval(gt=0, lt=180)] = None
+    fov: Annotated[float | None, Interval(ge=0.5, le=175)] = None
     """Degrees from the left edge of the image to the right one, of a lens without distortion."""
     focal: Annotated[tuple[Length, ...], Len(max_length=2)] = ()
     """Focal length in pixels, or two: across and down."""
-    centre: Annotated[tuple[float, ...], Len(max_length=2)] = ()
+    centre: Annotated[tuple[Number, ...], Len(max_length=2)] = ()
     """Column and row of the principal point. Default: the middle of the image."""
-    size: Annotated[tuple[int, ...], Len(max_length=2)] = ()
+    size: Annotated[tuple[Pixels, ...], Len(max_length=2)] = ()
     """Width and height of the images that focal length, centre and homography are for. Default: the
     log's images."""
     model: str = ""
     """Of the distortion: ``plumb_bob``, ``rational_polynomial`` or ``equidistant`` (a fisheye)."""
-    distortion: Annotated[tuple[float, ...], Len(max_length=14)] = ()
+    distortion: Annotated[tuple[Number, ...], Len(max_length=14)] = ()
     """Its coefficients, in the order of ROS and OpenCV."""
-    homography: Annotated[tuple[float, ...], Len(max_length=9)] = ()
+    homography: Annotated[tuple[Entry, ...], Len(max_length=9)] = ()
     """Nine numbers, row by row: from column, row and 1 to metres ahead, metres to the left, and 1
     (times any factor); of a lens with distortion, from pixels without it. It replaces height, pitch
     and roll."""

@@ -57,8 +57,8 @@ class Selection:
     """Why there is no road truth; empty if there is."""
     calibration: Calibration | None = None
     """The camera's, of the size in which it was logged."""
-    no_calibration: str = ""
-    """Why there is none although the log has some; else empty."""
+    calibration_why: str = ""
+    """What is to be said of it; if there is none although the log has some, why."""
     ground: Ground | None = None
     """The ground before the camera, for images of the size in which it was logged."""
     ground_why: str = ""
@@ -115,8 +115,8 @@ class Selection:
         if known := self.calibration:
             place = f", mounted in {known.mounting.parent}" if known.mounting else ""
             lines.append(f"calibration: {known.topic} ({known.model or 'no distortion'}{place})")
-        elif self.no_calibration:
-            lines.append(f"no calibration: {self.no_calibration}")
+        if self.calibration_why:
+            lines.append(f"{'' if known else 'no '}calibration: {self.calibration_why}")
         if self.ground_why:
             lines.append(self.ground_why)
         if self.no_truth:
@@ -171,9 +171,9 @@ def settle(
             meaning = meaning_of(reader, own)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     no_truth = "" if truth.topic else truth.why
-    known, unknown = calibration_of(image, topics, readers)
-    ground = ground_of(known, config.ground, image.size)
-    return Selection(*(camera, why, labels, config.frames.scale, no_truth, known, unknown), *ground)
+    known = calibration_of(image, topics, readers)
+    ground = ground_of(known[0], config.ground, image.size)
+    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, *ground)
 
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:

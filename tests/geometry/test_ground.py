@@ -1,6 +1,7 @@
 """Pixels to metres and back, against the synthetic world's camera and against OpenCV."""
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.world.camera import Camera, Pose
+from roadeval.config import ConfigError, log_config
 from roadeval.data import Calibration, Mounting
 from roadeval.geometry.ground import Ground, GroundError, ground_of
 from roadeval.geometry.plan import OUTSIDE, Plan
@@ -151,7 +153,8 @@ def test_intrinsics_may_be_for_images_of_another_size():
     ("known", "given", "said"),
     [
         (mounted("base_link", (1.5, 0, 1.3), 4), {}, "height above the ground: the log has it"),
-        (mounted("base_footprint", (1.5, 0, -1.3), 4), {}, "the camera's height above the ground"),
+        (mounted("base_footprint", (1.5, 0, -1.3), 4), {}, "above the ground: the log says -1.3 m"),
+        (mounted("base_footprint", (1.5, 0, 1e8), 4), {}, "above the ground: the log says 1e+08 m"),
         (None, {"height": 1.4, "pitch": 1.0}, "the focal length is missing"),
         (None, {"height": 1.4, "fov": 60.0}, "missing: its pitch"),
         (None, {"fov": 60.0}, "the camera's height above the ground, and its pitch"),
@@ -187,6 +190,47 @@ def test_settings_that_do_not_go_together_are_refused(given: dict[str, float], s
 def test_a_homography_of_zeros_is_refused():
     with pytest.raises(GroundError, match="cannot be inverted"):
         ground_of(None, GroundSettings(homography=(0.0,) * 9), SIZE)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"size": (0, 0), "focal": (150.0,)},
+        {"size": (-640, -480), "focal": (150.0,)},
+        {"size": (640, 360), "focal": (150.0,)},
+        {"focal": (1e-300,)},
+        {"focal": (-500.0,)},
+        {"focal": (500.0, 50_000.0)},
+        {"centre": (math.nan, 2.0), "focal": (150.0,)},
+        {"centre": (1e18, 0.0), "focal": (150.0,)},
+        {"distortion": (math.nan, 0.0, 0.0, 0.0), "model": "plumb_bob", "focal": (500.0,)},
+        {"distortion": (1e300, 0.0, 0.0, 0.0), "model": "plumb_bob", "focal": (500.0,)},
+        {"homography": (1e300, 0.0, 0.0, 0.0, 1e300, 0.0, 0.0, 0.0, 1.0)},
+        {"homography": (math.nan, *(1.0,) * 8)},
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused_by_the_name_of_its_setting(given: dict[str, Any]):
+    with pytest.raises(GroundError, match=rf"^`ground\.{next(iter(given))}`"):
+        ground_of(None, GroundSettings(**given), SIZE)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("size", [0, 0]),
+        ("size", [-640, -480]),
+        ("centre", [math.nan, 2.0]),
+        ("centre", [0.0, -math.inf]),
+        ("distortion", [1e300]),
+        ("homography", [math.nan] * 9),
+        ("height", math.nan),
+        ("pitch", math.nan),
+        ("fov", 1e-300),
+    ],
+)
+def test_a_file_with_a_number_that_no_camera_has_is_refused(name: str, content: object):
+    with pytest.raises(ConfigError, match=rf"ground\.{name}"):
+        log_config({"ground": {name: content}})
 
 
 def test_a_plan_shows_the_pixel_in_which_each_cell_lies():

@@ -22,10 +22,12 @@ from roadeval.logs.topics.reader import TopicInfo, TopicReader
 
 LOOKED_AT: Final = 100
 """Messages of static transforms that are read, at most, of each topic."""
+FARTHEST, NOT_UNIT = 1e9, 0.01
+"""Metres between two frames, and how far a quaternion's length may be from 1, at most."""
 DEEPEST: Final = 50
 """Frames on the way from a camera to the root, at most: more are a loop."""
 
-_UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError
+_UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError, OverflowError
 Transform = tuple[str, Vector, Vector]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
 
@@ -61,8 +63,8 @@ def calibration_of(
         names = ", ".join(each.topic for each in found)
         return None, f"none of {names} is clearly of {image.name}" if found else ""
     (made,) = best
-    if not made.matrix[0] or not made.matrix[4]:
-        return None, f"{made.topic}: its focal length is 0: the camera was never calibrated"
+    if made.problem:
+        return None, f"{made.topic}: its {made.problem}"
     if image.size not in (None, (made.width, made.height)):
         return None, f"{made.topic}: it is for images of {made.width}x{made.height}"
     with suppress(*_UNREADABLE):
@@ -71,7 +73,10 @@ def calibration_of(
             return None, f"{made.topic}: it changes within the log"
     static = [each for each in topics if each.kind is TopicKind.TRANSFORMS]
     transforms = dict(_transforms(readers[each.name] for each in static))
-    return replace(made, mounting=_mounting(made.frame_id, transforms)), ""
+    try:
+        return replace(made, mounting=_mounting(made.frame_id, transforms)), ""
+    except ValueError as error:
+        return made, f"its place is not known: the transform of {error}"
 
 
 def _shared(one: str, other: str) -> int:
@@ -89,8 +94,6 @@ def _read(topic: str, message: Any, image: str) -> Calibration:
 
     header = getattr(message, "header", message)
     matrix = numbers("k")
-    if len(matrix) != 9 or not np.isfinite(matrix).all():
-        raise ValueError(topic)
     lens = str(message.distortion_model), numbers("d")
     if is_rectified(image):
         p, lens = numbers("p"), ("", ())
@@ -113,18 +116,14 @@ def _transform(each: Any) -> tuple[str, Transform]:
     moved = getattr(each, "transform", each)
     at = np.array([getattr(moved.translation, axis) for axis in "xyz"], np.float64)
     turn = np.array([getattr(moved.rotation, axis) for axis in "xyzw"], np.float64)
-    length = np.linalg.norm(turn)
-    if not np.isfinite([*at, *turn]).all() or not length:
-        raise ValueError(each)
-    if hasattr(each, "header"):
-        return str(each.child_frame_id), (str(each.header.frame_id), at, turn / length)
-    return str(each.child_frame_id), (str(each.parent_frame_id), at, turn / length)
+    parent = each.header.frame_id if hasattr(each, "header") else each.parent_frame_id
+    return str(each.child_frame_id), (str(parent), at, turn)
 
 
 def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | None:
     """Follow the transforms from a camera's frame to the root; None if they begin nowhere.
 
-    A loop has no root: then there is none, too.
+    A loop has no root: then there is none, too. A `ValueError` names a transform that is none.
     """
     names = {name.lstrip("/"): transform for name, transform in transforms.items()}
     at, turn, name = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), frame.lstrip("/")
@@ -134,6 +133,12 @@ def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | Non
                 return None
             return Mounting(name, tuple(at.tolist()), tuple(turn.tolist()))
         parent, offset, rotation = names[name]
+        length = np.linalg.norm(rotation)
+        if not (np.abs(offset) < FARTHEST).all():
+            raise ValueError(f"{name} is moved by {', '.join(f'{each:.6g}' for each in offset)} m")
+        if not abs(length - 1) < NOT_UNIT:
+            raise ValueError(f"{name} has a quaternion of length {length:.6g}, not 1")
+        rotation = rotation / length
         at, turn, name = (
             offset + _turned(rotation, at),
             _product(rotation, turn),

@@ -1,8 +1,10 @@
 """The calibration of a camera and its mounting, in the messages of three kinds of writers."""
 
 import json
+import math
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -75,9 +77,14 @@ def image() -> bytes:
     return cv2.imencode(".jpg", np.zeros((*SIZE[::-1], 3), np.uint8))[1].tobytes()
 
 
-def info(frame_id: str = "cam", k: list[float] = K, size: tuple[int, int] = SIZE) -> dict[str, Any]:
+def info(
+    frame_id: str = "cam",
+    k: list[float] = K,
+    size: tuple[int, int] = SIZE,
+    d: list[float] = D,
+) -> dict[str, Any]:
     width, height = size
-    lens = {"distortion_model": "plumb_bob", "d": D, "k": k, "r": [0.0] * 9, "p": [0.0] * 12}
+    lens = {"distortion_model": "plumb_bob", "d": d, "k": k, "r": [0.0] * 9, "p": [0.0] * 12}
     return {"header": header(frame_id), "height": height, "width": width, **lens}
 
 
@@ -123,7 +130,7 @@ def ros2(
 def found(path: Path, topic: str | None = None) -> tuple[Calibration | None, str]:
     with open_log(path, LogConfig(topics=TopicSettings(image=topic))) as log:
         selection = log.select()
-        return selection.calibration, selection.no_calibration
+        return selection.calibration, selection.calibration_why
 
 
 def test_a_camera_of_ros_2_is_known_with_its_place_on_the_vehicle(tmp_path: Path):
@@ -218,6 +225,13 @@ def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
     ("infos", "said"),
     [
         ({"/front/camera_info": info(k=[0.0] * 9)}, "focal length is 0"),
+        ({"/front/camera_info": info(k=[-50.0, *K[1:]])}, "its focal length is -50 and 51"),
+        ({"/front/camera_info": info(k=[1e-300, *K[1:]])}, "its focal length is 1e-300"),
+        ({"/front/camera_info": info(k=[math.nan, *K[1:]])}, "its focal length is nan"),
+        ({"/front/camera_info": info(k=[*K[:5], 1e300, *K[6:]])}, "its centre is 32, 1e+300"),
+        ({"/front/camera_info": info(k=[*K[::3], *K[1::3], *K[2::3]])}, "length is not clear"),
+        ({"/front/camera_info": info(d=[math.inf] * 5)}, "its distortion has a number"),
+        ({"/front/camera_info": info(size=(0, 0))}, "its size is 0x0"),
         ({"/front/camera_info": info(size=(128, 96))}, "images of 128x96"),
         ({"/rear/camera_info": info("cam_rear")}, "none of /rear/camera_info is clearly of"),
         ({}, ""),
@@ -242,6 +256,27 @@ def test_a_place_that_no_transform_leads_to_is_not_known(tmp_path: Path, tree: l
     known, _ = found(ros2(tmp_path / "a.mcap", {"/front/camera_info": info()}, tree))
     assert known is not None
     assert known.mounting is None
+
+
+@pytest.mark.parametrize(
+    ("at", "turn", "said"),
+    [
+        ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.5), "mast has a quaternion of length 0.5, not 1"),
+        ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0), "mast has a quaternion of length 0, not 1"),
+        ((1.0, 0.0, 1.0), (math.nan, 0.0, 0.0, 1.0), "mast has a quaternion of length nan"),
+        ((1.0, math.nan, 1.0), (0.0, 0.0, 0.0, 1.0), "mast is moved by 1, nan, 1 m"),
+        ((1.0, 0.0, 1e300), (0.0, 0.0, 0.0, 1.0), "mast is moved by 1, 0, 1e+300 m"),
+    ],
+)
+def test_a_transform_that_is_none_is_said_and_not_used(
+    tmp_path: Path, at: tuple[float, ...], turn: tuple[float, ...], said: str
+):
+    rotation = SimpleNamespace(as_quat=lambda: np.array(turn))
+    tree = [TREE[0], ("mast", "base_link", at, cast("Rotation", rotation))]
+    known, why = found(ros2(tmp_path / "a.mcap", {"/front/camera_info": info()}, tree))
+    assert known is not None
+    assert known.mounting is None
+    assert why.startswith(f"its place is not known: the transform of {said}")
 
 
 def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
