@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any, Final
 
-from benchmarks.tables import idd, idd_filters, reach_weights, taught
+from benchmarks.tables import idd, idd_filters, overlap, reach_weights, taught
 from benchmarks.tables.drives import DRIVES, Drive
 from benchmarks.tables.measure import REPLAYS, STRANGERS, TEACHER, command
 from roadeval.results.sentences import CLAIMED
@@ -623,6 +623,25 @@ def flicker(numbers: Numbers) -> str:
     return f"Pixels that change from one frame of {DRIVES[drive].title} to the next: {words}."
 
 
+def overlap_numbers(numbers: Numbers) -> str:
+    """Return every overlap number with its definition and both of its values."""
+    found = numbers["overlap"]
+    head = ["number", "stands in", "definition", "is that of", "demo, %", "again, %", "again by"]
+    rows, apart = [], 0.0
+    for number in overlap.NUMBERS:
+        own, other = (found["values"][number.name][whose] for whose in ("roadeval", "library"))
+        apart = max(apart, abs(own - other))
+        values = (f"{100 * value:.4f}" for value in (own, other))
+        words = number.stands, number.definition, number.reported_by
+        rows.append([number.name, *words, *values, number.library])
+    tail = (
+        f"Of {found['evaluated']} frames of the demo drive with `robust`. The two values of a "
+        f"number differ by {apart:.0e} at most, and may differ by {overlap.CLOSE:.0e}. The "
+        f"definitions of others are those of {overlap.READ}."
+    )
+    return "\n".join((_table(head, rows), "", textwrap.fill(tail, 110)))
+
+
 MEASURE: Final = "python -m benchmarks.tables --measure"
 PAPER, GATED, ROBUST, SPREAD, PATCH = map(command, ("paper", "gated", "robust", "spread", "patch"))
 BLOCKS: Final = {
@@ -647,6 +666,7 @@ BLOCKS: Final = {
     "taught": Block(taught_by, (f"{MEASURE} taught",)),
     "reach_weights": Block(weights, (f"{MEASURE} reach_weights",)),
     "tuned": Block(tuned_network, (f"{MEASURE} tuned --net NETWORK.onnx --idd idd20k_lite",)),
+    "overlap": Block(overlap_numbers, (f"{MEASURE} overlap",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }
 """By the names in the marks."""

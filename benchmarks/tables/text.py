@@ -17,6 +17,7 @@ DOCUMENTS: Final = (
     ROOT / "benchmarks" / "PRESETS.md",
     ROOT / "docs" / "explanation" / "presets.md",
     ROOT / "docs" / "explanation" / "paper.md",
+    ROOT / "docs" / "explanation" / "overlap.md",
 )
 
 END: Final = "<!-- end -->"

@@ -16,7 +16,7 @@ MASK = Change(
     drives=1,
     frames=12,
     base={"ERR": 0.100, "IoU": 0.8},
-    new={"ERR": 0.106, "IoU": 0.7, "FNR": math.nan},
+    new={"ERR": 0.106, "IoU": 0.7, "pooled_IoU": 0.7, "FNR": math.nan},
     difference={},
 )
 
@@ -77,6 +77,7 @@ def test_an_unknown_rate_is_told_with_those_that_there_are():
         ("post.filtered.ERR >= 10%", True),
         ("post.filtered.ERR > 11%", False),
         ("post.filtered.IoU < 75%", True),
+        ("post.filtered.pooled_IoU < 75%", True),
         ("post.filtered.IoU < -9.9pp", True),
     ],
 )

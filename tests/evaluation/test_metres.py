@@ -164,7 +164,7 @@ def devkit(truth: Mask, confidence: npt.NDArray[Any]) -> dict[str, float]:
     f = [2 * p * r / (p + r) for p, r in points]
     most = [max((p for p, r in points if r >= k / 10), default=0) for k in range(11)]
     precision, recall = points[int(np.argmax(f))]
-    names = "MaxF", "AP", "precision", "recall"
+    names = "MaxF", "AP11", "precision", "recall"
     return dict(zip(names, (max(f), np.mean(most), precision, recall), strict=True))
 
 

@@ -61,4 +61,24 @@ def test_totals_sum_counts_average_rates_and_count_the_undefined() -> None:
     assert totals["ERR"] == (1 / 5 + 4 / 8) / 2
     assert totals["pooled_ERR"] == 5 / 13
     assert totals["TPR"] == 0.75
-    assert totals["undefined"] == {"ACC": 0, "ERR": 0, "TPR": 1, "FNR": 1, "TNR": 0, "FPR": 0}
+    none = dict.fromkeys(("ACC", "ERR", "TNR", "FPR", "IoU", "mIoU", "F1", "precision"), 0)
+    assert totals["undefined"] == {"TPR": 1, "FNR": 1, **none}
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "pooled"),
+    [
+        ("IoU", (3 / 4 + 1 / 3) / 2, 4 / 7),
+        ("mIoU", (5 / 8 + 5 / 12) / 2, (4 / 7 + 7 / 10) / 2),
+        ("F1", (6 / 7 + 2 / 4) / 2, 8 / 11),
+        ("precision", (1 + 1 / 3) / 2, 4 / 6),
+    ],
+)
+def test_totals_have_overlap_as_mean_of_frames_and_of_all_pixels(
+    name: str, mean: float, pooled: float
+) -> None:
+    """A frame without road in mask and truth is in no mean, and counted as undefined."""
+    totals = sum_up(np.array([[3, 1, 0, 1], [0, 4, 0, 0], [1, 2, 2, 0]]))
+    assert totals[name] == pytest.approx(mean, abs=1e-15)
+    assert totals[f"pooled_{name}"] == pytest.approx(pooled, abs=1e-15)
+    assert totals["undefined"][name] == 1

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from benchmarks.tables import overlap
 from benchmarks.tables.__main__ import main
 from benchmarks.tables.drives import DRIVES
 from benchmarks.tables.measure import REPLAYS, SEEDS
@@ -71,3 +72,17 @@ def test_every_drive_has_every_replay_with_every_seed():
             assert found["seeds"] == [*range(replay.seeds)], (name, key)
             assert all(len(each["ERR"]) == replay.seeds for each in found["variants"].values())
     assert {*numbers["drives"]} == {*DRIVES}
+
+
+def test_libraries_of_others_compute_the_overlap_numbers_that_are_printed():
+    """`measured` refuses two values that are not equal."""
+    found = overlap.measured(frames=12)
+    assert found["evaluated"] == 2
+    assert {*found["values"]} == {*load()["overlap"]["values"]}
+
+
+def test_a_library_that_computes_another_number_is_told(monkeypatch):
+    wrong = overlap.NUMBERS[0]._replace(again=lambda _: 0.5)
+    monkeypatch.setattr(overlap, "NUMBERS", (wrong,))
+    with pytest.raises(overlap.DifferentNumberError, match=r"0\.5 by a library"):
+        overlap.measured(frames=12)

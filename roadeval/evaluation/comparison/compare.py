@@ -329,7 +329,8 @@ def _over(own: Sequence[_OnDrive], totals: Sequence[Total]) -> dict[str, float]:
         return {}
     counts = np.array([sum(each[name] for each in totals) for name in OUTCOMES])
     rates = {name: _mean(own, totals, name) for name in METRICS}
-    return rates | metrics.pooled(counts) | metrics.overlap(Counts(*counts.tolist()))
+    overlap = metrics.overlap(Counts(*counts.tolist()))
+    return rates | overlap | metrics.pooled(counts, metrics.ALL)
 
 
 class _Against:

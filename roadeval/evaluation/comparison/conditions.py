@@ -8,6 +8,7 @@ A condition is a quantity, an operator and a limit, and may ask for certainty::
                | number "%"         the rate of the new result itself, percent
     number    := ["+" | "-"] digits ["." digits]
     RATE      := ACC ERR TPR FNR TNR FPR, each also as pooled_..., IoU mIoU F1 precision
+                 (of all pixels together, with or without pooled_)
 
 A change is that of the frames that both results evaluated, a level that of all frames of the new
 result. Of several drives both are means over drives, each group of drives alike. Nothing is ever
@@ -37,7 +38,7 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
-from roadeval.evaluation.metrics import COMPARED, METRICS, OVERLAP
+from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
@@ -46,7 +47,7 @@ OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     "<": operator.lt,
     "<=": operator.le,
 }
-QUANTITIES: Final = (*METRICS, *(f"pooled_{name}" for name in METRICS), *OVERLAP)
+QUANTITIES: Final = (*METRICS, *(f"pooled_{name}" for name in ALL), *OVERLAP)
 _GRAMMAR: Final = re.compile(
     r"\s*(?P<stage>[\w-]+)\.(?P<variant>[\w-]+)\.(?P<rate>\w+)"
     r"\s*(?P<operator>>=|<=|>|<)"

@@ -51,9 +51,10 @@ def of(counts: Counts) -> dict[str, float]:
     return {name: metric.function(counts) for name, metric in METRICS.items()}
 
 
-def pooled(counts: Sums) -> dict[str, float]:
-    """Compute the tabled metrics of summed counts, ``(4,)``, by names as ``pooled_ERR``."""
-    return {f"pooled_{name}": value for name, value in of(Counts(*counts.tolist())).items()}
+def pooled(counts: Sums, metrics: Mapping[str, Metric] = METRICS) -> dict[str, float]:
+    """Compute metrics of summed counts, ``(4,)``, by names as ``pooled_ERR``."""
+    sums = Counts(*counts.tolist())
+    return {f"pooled_{name}": metric.function(sums) for name, metric in metrics.items()}
 
 
 def overlap(counts: Counts) -> dict[str, float]:
@@ -61,12 +62,12 @@ def overlap(counts: Counts) -> dict[str, float]:
     return {name: metric.function(counts) for name, metric in OVERLAP.items()}
 
 
-def table(counts: Sums) -> Floats:
-    """Compute the tabled metrics of many frames at once, exactly as `of` does.
+def table(counts: Sums, metrics: Mapping[str, Metric] = METRICS) -> Floats:
+    """Compute metrics of many frames at once, exactly as `of` does.
 
     ``counts`` are ``(n, 4)``: TP, TN, FP, FN. Returned is ``(n, m)`` float64 in the order of
-    `METRICS`; NaN where a metric is undefined.
+    ``metrics``; NaN where a metric is undefined.
     """
     columns = Counts(*counts.T)
     with np.errstate(invalid="ignore"):
-        return np.stack([metric.function(columns) for metric in METRICS.values()], axis=1)
+        return np.stack([metric.function(columns) for metric in metrics.values()], axis=1)

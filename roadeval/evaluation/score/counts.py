@@ -167,12 +167,20 @@ class RegionSums:
 def sum_up(counts: FourCounts) -> Total:
     """Sum up a drive: frames, counts, mean rates (the paper's), pooled rates, undefined ones.
 
-    A rate that is undefined on a frame is left out of its mean, and counted in ``undefined``.
+    A rate that is undefined on a frame is left out of its mean, and counted in ``undefined``. IoU
+    and its like, which are no columns of tables, are among both kinds of rates.
     """
-    rates = metrics.table(counts)
+    rates, overlap = metrics.table(counts), metrics.table(counts, metrics.OVERLAP)
     known = ~np.isnan(rates)
     sums = np.where(known, rates, 0.0).sum(axis=0)
-    return _total(len(counts), counts.sum(axis=0), sums, known.sum(axis=0))
+    total = _total(len(counts), counts.sum(axis=0), sums, known.sum(axis=0))
+    undefined = dict(zip(metrics.OVERLAP, np.isnan(overlap).sum(axis=0).tolist(), strict=True))
+    return {
+        **total,
+        **means(overlap, metrics.OVERLAP),
+        **metrics.pooled(counts.sum(axis=0), metrics.OVERLAP),
+        "undefined": total["undefined"] | undefined,
+    }
 
 
 def over_cameras(totals: Sequence[Total]) -> Total:
@@ -185,15 +193,17 @@ def over_cameras(totals: Sequence[Total]) -> Total:
     return {**found, **means(means_of), "undefined": undefined}
 
 
-def means(rates: Floats) -> dict[str, float]:
-    """Average rates over frames, ``(n, m)``; NaN where a rate is defined on none."""
+def means(rates: Floats, names: Iterable[str] = metrics.METRICS) -> dict[str, float]:
+    """Average the named rates over frames, ``(n, m)``; NaN where a rate is defined on none."""
     known = ~np.isnan(rates)
-    return _means(np.where(known, rates, 0.0).sum(axis=0), known.sum(axis=0))
+    return _means(np.where(known, rates, 0.0).sum(axis=0), known.sum(axis=0), names)
 
 
-def _means(sums: Floats, defined: Cells) -> dict[str, float]:
+def _means(
+    sums: Floats, defined: Cells, names: Iterable[str] = metrics.METRICS
+) -> dict[str, float]:
     average = np.divide(sums, defined, out=np.full(len(sums), np.nan), where=defined > 0)
-    return dict(zip(metrics.METRICS, average.tolist(), strict=True))
+    return dict(zip(names, average.tolist(), strict=True))
 
 
 def _total(frames: int, counts: FourCounts, sums: Floats, defined: Cells) -> Total:

@@ -78,7 +78,7 @@ class MetreSums:
         """Yield the rows of ``metres``, variant by variant.
 
         ``curves`` are of the ground seen from above: where a final mask is a threshold on how
-        probable road is, they give MaxF and AP.
+        probable road is, they give MaxF and AP11.
         """
         for cells in self._rows({variant: own for (variant, _), own in curves.counts.items()}):
             yield dict(zip(_COLUMNS, cells, strict=True))
@@ -136,8 +136,8 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
 
     Of a mask, ``(4,)`` TP, TN, FP and FN: its ``F1``, ``precision`` and ``recall``. Given the cells
     by how probable road is, ``(2, 256)`` as of `Survey.levels`: ``MaxF``, the greatest F1 of 256
-    thresholds, with the precision and recall there; and ``AP``, the mean over eleven recalls from 0
-    to 1 of the greatest precision at that recall or more. NaN without road.
+    thresholds, with the precision and recall there; and ``AP11``, the mean over eleven recalls from
+    0 to 1 of the greatest precision at that recall or more. NaN without road.
 
     References
     ----------
@@ -158,7 +158,7 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     reached = [precision[recall >= least] for least in RECALLS]
     return {
         "MaxF": float(f[best]),
-        "AP": float(np.mean([each.max() if len(each) else 0.0 for each in reached])),
+        "AP11": float(np.mean([each.max() if len(each) else 0.0 for each in reached])),
         "precision": float(precision[best]),
         "recall": float(recall[best]),
     }

@@ -18,7 +18,7 @@ METRES: Final = "metres: "
 """Begins the sentence on how the camera is known."""
 UNSURE: Final = "\N{ALMOST EQUAL TO}"
 """Before a number that a wrong camera could explain."""
-KITTI: Final = (("MaxF", "F1"), ("AP", ""), ("precision",) * 2, ("recall",) * 2)
+KITTI: Final = (("MaxF", "F1"), ("AP11", ""), ("precision",) * 2, ("recall",) * 2)
 """Measures of KITTI's benchmark, each with its counterpart of a mask without probabilities."""
 Row = Mapping[str, Any]
 
@@ -97,12 +97,12 @@ def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = F
         "Errors by distance, and on the ground seen from above, where each square metre counts once"
     )
     if not brief:
-        caption += "; MaxF of a mask without probabilities is its F1"
+        caption += "; MaxF of a mask without probabilities is its F1; AP11: over eleven recalls"
     elif marked:
         caption += f". {UNSURE}: a camera that stands a little otherwise could explain the "
         caption += f"difference from {first}"
     return Table(
-        ["ERR, %", *heads, "by area", *([] if brief else ["MaxF", "AP", "prec.", "rec."])],
+        ["ERR, %", *heads, "by area", *([] if brief else ["MaxF", "AP11", "prec.", "rec."])],
         lines,
         breaks=breaks[1:],
         groups=[("", 1), ("ahead", len(heads)), ("seen from above, %", 1 if brief else 5)],
