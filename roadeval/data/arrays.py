@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, Self
+from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
@@ -141,6 +142,10 @@ class TruthBits:
     def labelled(self) -> Bits:
         """The pixels that are not ignored."""
         return self.road | self.other
+
+    def checksum(self) -> int:
+        """Return the CRC-32 of its road and its other pixels: it tells the truth from another."""
+        return crc32(self.other.tobytes(), crc32(self.road.tobytes()))
 
     def bits_of(self, masks: Iterable[Packed]) -> Bits:
         """Stack the bits of masks of the truth's shape: ``(K, H, words)``.

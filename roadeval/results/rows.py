@@ -54,8 +54,9 @@ def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
     frame, tallies = result.frame, result.tallies
     number, finals = frame.number, {tally.variant: tally.stage for tally in tallies}
     when = number, frame.stamp_ns, frame.log_time_ns
+    truth = result.truth_bits.checksum() if result.truth_bits else 0
     return {
-        "frames": [(*when, each.variant, each.stage, *_numbers(each)) for each in tallies],
+        "frames": [(*when, each.variant, each.stage, *_numbers(each), truth) for each in tallies],
         "regions": [
             (number, each.variant, each.stage, region, *counts, counts.n)
             for each in tallies

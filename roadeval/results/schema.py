@@ -150,6 +150,7 @@ log_time_ns  time   when the recorder logged it
 {_MASK}
 {_COUNTS}
 {_EACH_RATE}
+truth        count  checksum of the truth's pixels, of all masks of the frame
 
 regions: A row per evaluated frame, variant, stage and region.
 {_IN_FRAME}

@@ -82,6 +82,7 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
                         "FN": counts.fn,
                         "N": counts.n,
                         **metrics.of(counts),
+                        "truth": 7,
                     }
                 )
     return pd.DataFrame(rows)

@@ -75,7 +75,12 @@ def test_final_masks_are_matched_whatever_their_stages_are_called():
     assert masks_of(longer, {("a", "svm"): [1]}) == [("a", "smooth", "svm", True)]
 
 
-def test_another_truth_is_noticed_whatever_the_masks_made_of_it():
-    mine = np.array([[50, 40, 10, 0], [50, 40, 10, 0]])
-    missed, relabelled = [45, 40, 10, 5], [50, 35, 10, 5]
-    assert truth_differs(mine, np.array([missed, relabelled])).tolist() == [False, True]
+def rows_with(*truths, first=0):
+    """Rows of two masks a frame, each frame with the checksum of its truth."""
+    table = a_table({("a", "svm"): [1] * len(truths), ("a", "post"): [1] * len(truths)})
+    return rows_of(table.assign(truth=np.repeat(truths, 2), frame=table["frame"] + first))
+
+
+def test_another_truth_is_noticed_by_its_checksum_on_the_frames_that_both_have():
+    assert truth_differs(rows_with(7, 8, 9), rows_with(7, 8, 9, 1, first=5)) == 0
+    assert truth_differs(rows_with(7, 8, 9), rows_with(7, 5, 6, 1)) == 2

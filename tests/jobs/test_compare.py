@@ -5,15 +5,18 @@ import re
 import shutil
 import sys
 
+import cv2
+import numpy as np
 import pytest
 
-from roadeval import compare, replay, replay_fleet
+from roadeval import compare, configure, replay, replay_fleet
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import stages
 from roadeval.results.fleet import FleetFolder, frames_path
 from tests.e2e.test_fleet import Here
-from tests.jobs.making import settings, write_log
+from tests.jobs.making import FRAMES, settings, write_log
 from tests.results.fleet.making import fleet_of
+from tests.training.making import frame
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +58,37 @@ def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
         (changed,) = compare([tmp_path / base, tmp_path / new]).content["changed"]
         said = r"Changed settings: code of grey \(greyroad:road\) \w{8} to \w{8}\."
         assert re.fullmatch(said, changed)
+
+
+@pytest.mark.parametrize(
+    ("moved", "frames"),
+    [
+        (lambda truth: np.roll(truth, 3, axis=1), 16),
+        (lambda truth: truth[:, ::-1], 16),
+        (lambda truth: truth[::-1], 16),
+        (lambda truth: truth, 0),
+    ],
+    ids=["3 columns to the right", "mirrored", "upside down", "as it was"],
+)
+def test_labels_that_moved_are_told_and_no_change_is_judged(tmp_path, moved, frames):
+    """A move and a mirror leave the number of road pixels as it was."""
+    drive = write_log(tmp_path / "drive.mcap", truth=False)
+    for name, move in (("base", lambda truth: truth), ("new", moved)):
+        (tmp_path / f"{name}_labels").mkdir()
+        for number in range(FRAMES):
+            truth = 255 * frame(number).truth
+            truth[:, :5] = 0
+            cv2.imwrite(str(tmp_path / f"{name}_labels" / f"{number}.png"), move(truth))
+        labels = {"path": str(tmp_path / f"{name}_labels")}
+        config = configure({"truth": labels, "output": {"record": "none"}})
+        replay(drive, config, reports=tmp_path / name)
+    limits = ["post.filtered.ERR > 1pp", "post.filtered.ERR > 99%"]
+    found = compare([tmp_path / "base", tmp_path / "new"], fail_if=limits)
+    told = [each for each in found.comparison.warnings if "the truth differs" in each]
+    assert [each.partition(" between")[0] for each in told] == [
+        f"the truth differs on {frames} frames"
+    ] * bool(frames)
+    assert len(found.unjudged) == bool(frames)
 
 
 def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):

@@ -75,7 +75,7 @@ OF = "street,/camera/image,"
 def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path: Path) -> None:
     write(tmp_path)
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
-    assert line == f"{OF}6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
+    assert line.startswith(f"{OF}6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5,")
     assert math.isnan(ResultsFolder(tmp_path).table("frames").loc[2, "TPR"])
 
 

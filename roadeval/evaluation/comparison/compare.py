@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, OUTCOMES, UNFILTERED, Counts
+from roadeval.data import BASELINE, OUTCOMES, UNFILTERED, Counts, Rows
 from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics
@@ -44,6 +44,7 @@ from roadeval.evaluation.score import (
     FrameCounts,
     Name,
     Total,
+    camera_masks,
     final_stages,
     means,
     sum_up,
@@ -85,6 +86,8 @@ class ComparedResult:
     """Evaluated frames of the drives that are compared."""
     scale: float | None
     """``frames.scale``, where it is known and one for all drives."""
+    relabelled: int = 0
+    """Frames whose truth is another than the base's."""
 
 
 @dataclass(frozen=True)
@@ -235,10 +238,11 @@ def compare(
             raise ComparisonError(_apart(base, new))
         found.append(_Against(own, new, match, settings, across=across_variants))
     frames = [found[0].frames[0], *(each.frames[1] for each in found)]
+    relabelled = [0, *(each.relabelled for each in found)]
     regions = [row for each in found for row in each.regions()]
     corrected = holm([row.difference for row in regions])
     return Comparison(
-        results=tuple(_result(*each) for each in zip(sides, frames, strict=True)),
+        results=tuple(map(_result, sides, frames, relabelled)),
         changed_settings={each.label: each.changed for each in found if each.changed},
         changes=tuple(_corrected([row for each in found for row in each.changes(each.masks)])),
         levels=tuple(row for each in found for row in each.changes(each.levels)),
@@ -262,7 +266,7 @@ def _apart(base: Side, new: Side) -> str:
     )
 
 
-def _result(side: Side, frames: int) -> ComparedResult:
+def _result(side: Side, frames: int, relabelled: int) -> ComparedResult:
     only = side.parts[0] if len(side.parts) == 1 else None
     scales = {part.asked.get("frames.scale") for part in side.scored}
     return ComparedResult(
@@ -273,6 +277,7 @@ def _result(side: Side, frames: int) -> ComparedResult:
         log_digest=only.digest if only else None,
         frames=frames,
         scale=scales.pop() if len(scales) == 1 else None,
+        relabelled=relabelled,
     )
 
 
@@ -348,7 +353,7 @@ class _Against:
         self.changed = _changed_settings(pairs)
         self.frames, self._lost = [0, 0], [0, 0]
         """Of the base and of the new result: evaluated frames, and those that the other lacks."""
-        self._relabelled = 0
+        self.relabelled = 0
         self._apart: list[str] = []
         self.levels, self.masks, self._regions = _Masks(list), _Masks(list), _Masks(list)
         self._known: dict[str, None] = {}  # the regions of all drives
@@ -357,7 +362,8 @@ class _Against:
         firsts = {part.digest: part.drive for part in reversed(new.scored)}
         before = {id(own): other for other, own in pairs}
         for part in new.scored:
-            masks, other = new.masks(part), before.get(id(part))
+            rows, other = new.rows(part, "frames"), before.get(id(part))
+            masks = camera_masks(rows)
             # Copies of a log count as one drive.
             group = part.group or (other and other.group) or firsts[part.digest]
             last = final_stages(mask.name for mask in masks)
@@ -366,16 +372,17 @@ class _Against:
                 self.levels[mask.name].append(_OnDrive(part, group, final, sum_up(mask.counts)))
             self.frames[1] += _frames(masks)
             if other is not None:
-                self._add(other, part, group, masks)
+                self._add(other, part, group, rows)
         if not self.masks:
             raise ComparisonError(
                 f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
                 "nothing can be compared; replay the same range into both"
             )
 
-    def _add(self, base: Part, new: Part, group: str, after: Sequence[FrameCounts]) -> None:
-        """Add a drive that both have."""
-        before = self._base.masks(base)
+    def _add(self, base: Part, new: Part, group: str, rows: Rows) -> None:
+        """Add a drive that both have, and the new result's rows of its frames."""
+        old_rows = self._base.rows(base, "frames")
+        before, after = camera_masks(old_rows), camera_masks(rows)
         self.frames[0] += _frames(before)
         pairs = common_masks(before, after)
         if not pairs:
@@ -383,10 +390,7 @@ class _Against:
             return
         self._lost[0] += _frames(before) - _frames([pair.base for pair in pairs])
         self._lost[1] += _frames(after) - _frames([pair.new for pair in pairs])
-        relabelled = [
-            pair.base.frames[truth_differs(pair.base.counts, pair.new.counts)] for pair in pairs
-        ]
-        self._relabelled += len(np.unique(np.concatenate(relabelled)))
+        self.relabelled += truth_differs(old_rows, rows)
         for pair in pairs:
             tested = pair.final and pair.new.variant != BASELINE
             self.masks[pair.new.name].append(self._on_drive(new, group, pair, tested=tested))
@@ -502,10 +506,10 @@ class _Against:
                 f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
                 " part of the change may be theirs"
             )
-        if self._relabelled:
+        if self.relabelled:
             guess = "" if of_the_log else " (other labels or topics?)"
             yield (
-                f"the truth differs on {self._relabelled} frames between {base} and {new}{guess}: "
+                f"the truth differs on {self.relabelled} frames between {base} and {new}{guess}: "
                 "part of the change may be the truth's"
             )
 

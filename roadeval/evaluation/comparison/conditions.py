@@ -21,8 +21,8 @@ surely; without room, at +0 pp, seven still do. Only the mean change of ACC, ERR
 interval.
 
 A condition that cannot be judged is never taken for one that is kept: where a rate is undefined, a
-change is asked for between different scales, certainty without an interval, and where frames are
-too few. They must be at least as many as an interval needs
+change is asked for between different scales or truths, certainty without an interval, and where
+frames are too few. They must be at least as many as an interval needs
 (``evaluation.least_frames``), and for a change at least half of the frames of the shorter result;
 where several drives are compared, half of the scored drives of the smaller one.
 """
@@ -188,6 +188,11 @@ def _unjudged(
         return (
             f"{names} were replayed with `frames.scale` {base.scale:g} and {new.scale:g}; replay "
             "both at one scale, or limit in %"
+        )
+    if new.relabelled:
+        return (
+            f"the truth differs on {new.relabelled} frames between {names}, and the change may be "
+            "the labels'; replay both with the same truth, or limit in %"
         )
     unit, common, smaller = "evaluated frames", mask.frames, min(base.frames, new.frames)
     if min(base.scored, new.scored) > 1:

@@ -20,7 +20,6 @@ from roadeval.evaluation.score import (
     Camera,
     FourCounts,
     FrameCounts,
-    camera_masks,
     counts_of,
     final_stages,
     most_changed,
@@ -79,10 +78,6 @@ class Side:
         own = rows.take(np.isin(rows["variant"], [*self.variants]))
         names = [self.variants[name] for name in own["variant"].tolist()]
         return own.replace(variant=np.array(names, str))
-
-    def masks(self, part: Part) -> Camera:
-        """Return the counts of a part's masks, under the names of the comparison."""
-        return camera_masks(self.rows(part, "frames"))
 
     def own_name(self, variant: str) -> str:
         """Return what the result itself calls a variant."""
@@ -196,8 +191,17 @@ _LABELS: Final = np.array([[1, 1], [1, 0], [1, 0], [1, 1]])
 """Makes labelled pixels and road of TP, TN, FP and FN."""
 
 
-def truth_differs(base: FourCounts, new: FourCounts) -> Flags:
-    """Return on which frames the truth's road or labelled pixels differ, ``(n,)``."""
+def truth_differs(base: Rows, new: Rows) -> int:
+    """Return on how many frames the truth is another, of two results' rows of ``frames``."""
+    mine, theirs = (
+        rows.take(np.unique(rows["frame"], return_index=True)[1]) for rows in (base, new)
+    )
+    there, here = matched(mine["stamp_ns"], theirs["stamp_ns"])
+    return int(np.count_nonzero(mine["truth"][there] != theirs["truth"][here]))
+
+
+def _labels_differ(base: FourCounts, new: FourCounts) -> Flags:
+    """Return on which frames as many pixels are not labelled, or not road, ``(n,)``."""
     return np.asarray((base @ _LABELS != new @ _LABELS).any(axis=1))
 
 
@@ -298,5 +302,5 @@ def common_regions(
     """
     for name in titles([*base]):
         known = np.asarray(base[name].any(axis=1))
-        if name in new and known.any() and not truth_differs(base[name], new[name]).any():
+        if name in new and known.any() and not _labels_differ(base[name], new[name]).any():
             yield name, known

@@ -208,6 +208,7 @@ def _write_frames(folder, drive, masks):
         **dict(zip(("TP", "TN", "FP", "FN"), counts.T, strict=True)),
         "N": counts.sum(axis=1),
         **dict(zip(METRICS, metrics.table(counts).T, strict=True)),
+        "truth": np.tile(np.arange(n), len(masks)),
     }
     path = frames_path(folder, drive)
     path.parent.mkdir(parents=True, exist_ok=True)
