@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from heapq import heappushpop
@@ -343,7 +343,10 @@ class FrameStream:
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
-        self._iterator = map(self._frame, self._with_truth() if labelled else numbers)
+        read: Iterable[int] = numbers
+        if labelled:
+            read = with_label(truth, images, numbers) if (truth := selection.truth) else ()
+        self._iterator = map(self._frame, read)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
         return self
@@ -358,18 +361,6 @@ class FrameStream:
     def log_times(self) -> npt.NDArray[np.int64]:
         """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
         return self._selection.camera.images.log_times[np.asarray(self._numbers, np.intp)]
-
-    def _with_truth(self) -> Iterator[int]:
-        """Yield the numbers of the frames that have truth, found by their labels, in order."""
-        if TRUTH not in self._labels:
-            return
-        source, partners = self._labels[TRUTH]
-        partners.of(self._numbers[0])
-        wanted = frozenset(self._numbers)
-        found = (each for each in frames_of(source.pairing, partners.near) if each in wanted)
-        waiting = sorted(islice(found, 2 * REACH))  # labels may be logged nearly in order
-        yield from (heappushpop(waiting, number) for number in found)
-        yield from sorted(waiting)
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
@@ -397,6 +388,28 @@ class FrameStream:
         with suppress(FrameError):
             return first != number and images.message(first).data == images.message(number).data
         return False
+
+
+def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int]) -> Iterator[int]:
+    """Yield those of some frames, in order, that have a label, and read no more than that takes.
+
+    They are looked for image by image, or label by label where fewer chunks are read for that.
+    """
+    ends = []
+    for number in (*numbers[-2:], numbers[0]):  # of the last two one may have a damaged stamp
+        partners = source.partners(int(images.log_times[number]))
+        partners.of(number)
+        ends.append(partners.near)
+    *last, first = ends
+    begin, end = max(first - REACH, 0), max(last) + REACH
+    if images.chunks_of(numbers) <= 2 * (end - begin):  # a label's and its image's
+        yield from (number for number in numbers if partners.of(number) is not None)
+        return
+    wanted = frozenset(numbers)
+    found = (each for each in frames_of(source.pairing, begin, end) if each in wanted)
+    waiting = sorted(islice(found, 2 * REACH))  # labels may be logged nearly in order
+    yield from (heappushpop(waiting, number) for number in found)
+    yield from sorted(waiting)
 
 
 def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:

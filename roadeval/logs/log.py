@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -16,7 +17,7 @@ from roadeval.images import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import check_content, files_of
-from roadeval.logs.frames import TRUTH, FrameStream, Selection, settle
+from roadeval.logs.frames import TRUTH, FrameStream, Selection, settle, with_label
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
@@ -24,7 +25,7 @@ from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import TopicInfo, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
-from roadeval.logs.truth.pairing import frames_of, shown_name, with_keys
+from roadeval.logs.truth.pairing import shown_name, with_keys
 from roadeval.runtime.text import visible
 
 SMALL: Final = 50_000_000
@@ -275,8 +276,9 @@ class Log:
             )
         numbers: Sequence[int] = range(first, last)
         if asked.labelled:
-            found = frames_of(selection.truth.pairing) if selection.truth else ()
-            numbers = sorted(each for each in found if first <= each < last)
+            truth, most = selection.truth, asked.every * (asked.max_frames or last)
+            found = with_label(truth, selection.camera.images, numbers) if truth else ()
+            numbers = [*islice(found, most)]
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")

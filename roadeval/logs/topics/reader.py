@@ -306,6 +306,12 @@ class TopicReader:
         _, number, chunk = self._places[position].tolist()
         return self.channels[number].container.is_bad(chunk)
 
+    def chunks_of(self, positions: Sequence[int]) -> int:
+        """Count the chunks in which some messages lie; one outside of all counts for itself."""
+        places = self._places[np.asarray(positions, np.intp)]
+        inside = places[places[:, 2] != OUTSIDE, 1:]
+        return len(np.unique(inside, axis=0)) + len(places) - len(inside)
+
     def expected(self) -> int:
         """Return how many messages there should be, by the files' own statistics."""
         return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)

@@ -398,11 +398,11 @@ class Partners:
         )
 
 
-def frames_of(pairing: Pairing, near: int = 0) -> Iterator[int]:
-    """Yield the position of each label's image, in the order of the labels, from one of them on."""
+def frames_of(pairing: Pairing, begin: int = 0, end: int | None = None) -> Iterator[int]:
+    """Yield the position of each label's image, in the order of the labels from ``begin`` on."""
     images, labels = pairing.images, pairing.labels
     forth, back = Partners(pairing), Partners(replace(pairing, images=labels, labels=images))
-    for label in range(max(near - 2 * REACH, 0), len(labels)):
+    for label in range(len(labels))[begin:end]:
         image = back.of(label)
         # Where many stamps are equal or out of order, two labels may find the same image.
         if image is not None and forth.of(image) == label:
