@@ -222,6 +222,8 @@ def network_variant(name: str, path: str) -> Variant:
     settings = {key: value for key, value in tables.items() if key != "post"}
     is_trained = settings.get("decide") == TRAINED
     if is_trained:
+        if "threshold" in settings:
+            raise ConfigError(f'{path}: threshold says nothing where decide = "{TRAINED}"')
         del settings["decide"]
     file, post = settings.get("file"), tables.get("post", {})
     if not isinstance(file, str) or not file:

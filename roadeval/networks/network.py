@@ -12,7 +12,7 @@ import numpy as np
 from roadeval.data import CERTAIN, Mask, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import Array, OnnxFile, load, tried
-from roadeval.networks.settings import NetSettings
+from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.text import visible
 
 
@@ -37,6 +37,8 @@ class Network:
 
     settings: NetSettings
     file: OnnxFile
+    shapes: tuple[tuple[int, ...], ...]
+    """Of its outputs, which hold for every frame."""
 
     @classmethod
     def of(cls, settings: NetSettings) -> Self:
@@ -46,21 +48,28 @@ class Network:
         either.
         """
         file = load(settings)
-        return cls(completed(settings, file), file)
+        settings = completed(settings, file)
+        return cls(settings, file, tuple(array.shape for array in _tried(settings, file)))
 
     def road(self, image: Rgb) -> Road:
         """Find the road in an ``(H, W, 3)`` uint8 RGB image.
 
         The probability of road is computed on the network's own grid and interpolated linearly to
         the frame's size; classes are brought there by the nearest pixel. With several outputs it is
-        the greatest of theirs. A `NetworkError` if the network fails on it, or gives NaN.
+        the greatest of theirs. A `NetworkError` if the network fails on it, or gives NaN or another
+        shape than for other images.
         """
         settings = self.settings
         frame = image.shape[1], image.shape[0]
         values = input_values(placed(image, settings), settings, self.file.inputs[0].dtype)
-        outputs = self.file.run(values, settings.outputs or ())
+        outputs = self.file.run(values, settings.outputs or (), settings.seconds)
+        if (shapes := tuple(output.shape for output in outputs)) != self.shapes:
+            raise self.file.error(
+                f"its output's shape depends on the image: {shapes} instead of {self.shapes}; "
+                "export it with a fixed one"
+            )
         codes = np.maximum.reduce([self._codes(output, frame, settings) for output in outputs])
-        limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * CERTAIN)
+        limit = round((0.5 if settings.threshold is None else settings.threshold) * CERTAIN)
         mask = (codes > limit).astype(np.uint8)
         graded = not any(map(is_labels, outputs))
         alone = [replace(settings, road=(each,)) for each in settings.road or ()]
@@ -90,8 +99,8 @@ class Network:
         if is_labels(output):
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
             return brought_back(CERTAIN * road, frame, settings, cv2.INTER_NEAREST_EXACT)
-        shares = road_probability(scores.astype(np.float32), settings)
-        if not np.isfinite(shares).all():
+        shares = road_probability(scores.astype(np.float32, copy=False), settings)
+        if np.isnan(scores).any() or not np.isfinite(shares).all():
             raise self.file.error("gives NaN")
         framed = brought_back(shares, frame, settings, cv2.INTER_LINEAR)
         return np.rint(np.clip(framed, 0, 1) * CERTAIN).astype(np.uint16)
@@ -193,9 +202,17 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     if unknown := [name for name in outputs if name not in known]:
         raise file.question(f"has no output {unknown[0]!r}: see `net.outputs`")
     settings = replace(settings, outputs=outputs)
-    for name, array in zip(outputs, tried(file, settings.input_shape, outputs), strict=True):
+    arrays = _tried(settings, file)
+    if len({is_labels(array) for array in arrays}) > 1:
+        raise file.question("gives scores and classes: name outputs of one kind by `net.outputs`")
+    for name, array in zip(outputs, arrays, strict=True):
         settings = _meaning(settings, file, name, array)
     return settings
+
+
+def _tried(settings: NetSettings, file: OnnxFile) -> list[Array]:
+    limits = settings.seconds, settings.megabytes * MIB
+    return tried(file, settings.input_shape, settings.outputs or (), *limits)
 
 
 def is_labels(output: Array) -> bool:
@@ -214,7 +231,7 @@ def as_scores(output: Array, layout: str | None) -> Array | None:
         array = array.transpose(2, 0, 1)
     if array.ndim == 2:
         array = array[None]
-    return array if array.ndim == 3 and min(array.shape[1:]) > 1 else None
+    return array if array.ndim == 3 and len(array) and min(array.shape[1:]) > 1 else None
 
 
 def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
@@ -263,11 +280,17 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, output: Array) ->
     if not is_map or (is_labels(output) and count != 1):
         raise file.question(f"its output {name!r} is no map of the image, but {output.shape}")
     made: dict[str, Any] = {"activation": "none", "decide": "argmax"}
+    if is_labels(output) and settings.threshold is not None:
+        raise file.question(f"its output {name!r} is of classes alone: leave `net.threshold` out")
     if not is_labels(output):
         is_probability = file.makers.get(name, "").lower() in ("softmax", "sigmoid")
         usual = "none" if is_probability else "sigmoid" if count == 1 else "softmax"
-        decide = settings.decide or ("threshold" if count == 1 else "argmax")
-        made = {"activation": settings.activation or usual, "decide": decide}
+        above = settings.threshold is not None or count == 1
+        made = {
+            "activation": settings.activation or usual,
+            "decide": settings.decide or ("threshold" if above else "argmax"),
+            "threshold": 0.5 if settings.threshold is None else settings.threshold,
+        }
     road = settings.road or ((count - 1,) if count <= 2 and not is_labels(output) else ())
     if not road:
         of = "" if is_labels(output) else f" of its {count}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import lru_cache
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
@@ -17,10 +18,11 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.words import first_of
-from roadeval.networks.settings import NetSettings, NetworkError
+from roadeval.networks.settings import MIB, NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
+from roadeval.runtime.threads import ended, ordered
 
 Array = npt.NDArray[Any]
 
@@ -30,6 +32,9 @@ LARGEST: Final = (1 << 31) - 1
 """Bytes that a protobuf file can have; larger weights lie in files beside it."""
 _SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
+_LATE: Final = (
+    "takes longer than {:g} s to {}, or has no end: mend it, or allow more by `net.seconds`"
+)
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
 _PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
 _PROBE: Final = """
@@ -79,11 +84,27 @@ class OnnxFile:
     makers: Mapping[str, str]
     """By output: the operator that makes its numbers, see `maker`."""
 
-    def run(self, values: Array, outputs: tuple[str, ...]) -> list[Array]:
-        """Compute some outputs for the values of the one input; a `NetworkError` if that fails."""
-        with _explained(self.path):
-            found = self.session.run(outputs, {self.inputs[0].name: values})
-        return [np.asarray(each) for each in found]
+    def run(self, values: Array, outputs: tuple[str, ...], seconds: float) -> list[Array]:
+        """Compute some outputs for the values of the one input, within some seconds.
+
+        A `NetworkError` if that fails, or an output is no array of numbers.
+        """
+        from onnxruntime import RunOptions
+
+        options = RunOptions()
+        options.log_severity_level = 4
+        with ended(partial(setattr, options, "terminate", True), seconds) as late:
+            try:
+                with _explained(self.path):
+                    arrays = self.session.run(outputs, {self.inputs[0].name: values}, options)
+            except NetworkError as error:
+                if late.is_set():
+                    raise self.error(_LATE.format(seconds, "run")) from error
+                raise
+        for name, array in zip(outputs, arrays, strict=True):
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf":
+                raise self.question(f"its output {name!r} is no array of numbers")
+        return list(arrays)
 
     def error(self, problem: str) -> NetworkError:
         """Return an error about the file."""
@@ -96,9 +117,33 @@ class OnnxFile:
 
 
 @lru_cache(maxsize=8)
-def tried(file: OnnxFile, shape: tuple[int, ...], outputs: tuple[str, ...]) -> list[Array]:
-    """Return some outputs for an input of zeros, which show every frame's shapes and types."""
-    return file.run(np.zeros(shape, file.inputs[0].dtype), outputs)
+def tried(
+    file: OnnxFile, shape: tuple[int, ...], outputs: tuple[str, ...], seconds: float, limit: int
+) -> list[Array]:
+    """Return arrays of the shapes and types of some outputs, found by an input of zeros.
+
+    A `NetworkError` if one takes more than ``limit`` bytes: before it runs, where the file says so.
+    """
+    named = {tensor.name: tensor for tensor in file.outputs}
+    declared = [replace(file.inputs[0], shape=shape), *(named[name] for name in outputs)]
+    for tensor in declared:
+        _check_size(file, tensor, limit)
+    # In a thread, so that a signal is heard meanwhile.
+    values = np.zeros(shape, file.inputs[0].dtype)
+    (arrays,) = ordered(lambda _: file.run(values, outputs, seconds), [None], 1)
+    for name, array in zip(outputs, arrays, strict=True):
+        _check_size(file, Tensor(name, str(array.dtype), array.shape), limit)
+    return [np.broadcast_to(array.dtype.type(), array.shape) for array in arrays]
+
+
+def _check_size(file: OnnxFile, tensor: Tensor, limit: int) -> None:
+    with suppress(TypeError):  # a type that NumPy lacks; such an output is refused once it is there
+        size = math.prod(n or 1 for n in tensor.shape) * np.dtype(tensor.dtype).itemsize
+        if size > limit:
+            raise file.error(
+                f"{tensor} takes {size / MIB:,.0f} MiB, more than the {limit / MIB:g} of "
+                "`net.megabytes`: export it smaller, or allow more"
+            )
 
 
 def load(settings: NetSettings) -> OnnxFile:
@@ -114,7 +159,8 @@ def load(settings: NetSettings) -> OnnxFile:
         there = path.stat()
     if there.st_size > LARGEST:
         raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
-    file = _opened(path, there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns)
+    state = there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns
+    file = _opened(path, settings.seconds, *state)
     if settings.sha256 not in (None, file.sha256):
         raise file.error(
             f"is another network than was asked for: its SHA-256 is {file.sha256}, and "
@@ -124,7 +170,7 @@ def load(settings: NetSettings) -> OnnxFile:
 
 
 @lru_cache(maxsize=4)
-def _opened(path: Path, *_state: int) -> OnnxFile:
+def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
     import onnxruntime
 
     with _readable(path, "cannot read the network"):
@@ -148,7 +194,11 @@ def _opened(path: Path, *_state: int) -> OnnxFile:
     # -P: an onnxruntime.py that lies beside the network must not be what is imported.
     probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
     # 1 is an exception, which is raised again below.
-    if subprocess.run(probe, check=False, capture_output=True).returncode not in (0, 1):
+    try:
+        ending = subprocess.run(probe, check=False, capture_output=True, timeout=seconds)
+    except subprocess.TimeoutExpired as error:
+        raise NetworkError(f"{path}: {_LATE.format(seconds, 'open')}") from error
+    if ending.returncode not in (0, 1):
         raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
@@ -201,16 +251,35 @@ PASSING: Final = frozenset(
 )
 """Operators whose output holds the numbers of their input."""
 NODES: Final = (7, 1)
-EXTERNAL_DATA: Final = (7, 5, 13)
-"""Fields of the graph, and of its initializers."""
+HOLDING: Final[Mapping[str, Mapping[int, str]]] = {
+    "model": {7: "graph", 20: "training", 25: "function"},
+    "graph": {1: "node", 5: "tensor", 15: "sparse"},
+    "function": {7: "node", 11: "attribute"},
+    "training": {1: "graph", 2: "graph"},
+    "node": {5: "attribute"},
+    "attribute": {**dict.fromkeys((5, 10), "tensor"), **dict.fromkeys((6, 11), "graph")}
+    | dict.fromkeys((22, 23), "sparse"),
+    "sparse": {1: "tensor", 2: "tensor"},
+    "tensor": {13: "entry"},
+}
+"""Messages that lead to tensors, and what their fields hold."""
 
 
 def weight_files(model: memoryview) -> Iterator[str]:
-    """Yield the names of the files beside it that hold a model's weights."""
-    for entry in _all(model, *EXTERNAL_DATA):
-        key, value = ("".join(map(_text, _all(entry, number))) for number in (1, 2))
-        if key == "location":
-            yield value
+    """Yield the names of the files beside it that hold weights, wherever in a model they are used.
+
+    That is by the graph, by nodes and their inner graphs, and by functions.
+    """
+    waiting = [("model", model)]
+    while waiting:
+        kind, message = waiting.pop()
+        if kind == "entry":
+            key, value = ([*map(_text, _all(message, number))][-1:] for number in (1, 2))
+            yield from value if key == ["location"] else ()
+            continue
+        for number, value in protobuf_fields(message):
+            if (inner := HOLDING[kind].get(number)) and isinstance(value, memoryview):
+                waiting.append((inner, value))
 
 
 def makers(model: memoryview) -> dict[str, tuple[str, list[str]]]:

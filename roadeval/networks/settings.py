@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
@@ -14,6 +14,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 OfChannels = Field(min_length=1, max_length=3)
 Side = Annotated[int, Field(ge=1, le=16384)]
 Class = Annotated[int, Field(ge=0, le=65535)]
+MIB: Final = 1 << 20
 
 
 class NetworkError(RoadevalError):
@@ -50,7 +51,7 @@ class NetSettings:
     outputs: tuple[str, ...] | None = None
     """Names of the outputs that show road; where there are several, road is what one of them calls
     road."""
-    road: tuple[Class, ...] | None = None
+    road: Annotated[tuple[Class, ...], Field(max_length=64)] | None = None
     """The numbers of the classes that are road, from 0."""
     activation: Literal["softmax", "sigmoid", "none"] | None = None
     """How probabilities are made of an output: ``softmax`` over its classes, ``sigmoid`` of each,
@@ -58,8 +59,13 @@ class NetSettings:
     decide: Literal["argmax", "threshold"] | None = None
     """Road is where a class of ``road`` beats all others (``argmax``), or where the probability of
     road is above ``threshold``."""
-    threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
-    """Between 0 and 1; ``argmax`` does not use it."""
+    threshold: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Between 0 and 1, by default 0.5; without ``decide`` it stands for ``decide = "threshold"``.
+    With ``argmax`` it is held against the share of road's best class in the best two."""
+    seconds: Positive = 30.0
+    """A network that takes longer to open, or for an image, is ended: a failure."""
+    megabytes: Annotated[int, Field(ge=1, le=65536)] = 512
+    """Memory that its input or an output may take, in MiB."""
 
     @property
     def channel_count(self) -> int:

@@ -23,7 +23,7 @@ from roadeval.evaluation.score import final_stages
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
-from roadeval.results.sentences import marked_interval, spread_in_words
+from roadeval.results.sentences import marked_interval, overconfident, spread_in_words
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 """The rates whose differences stand beside that of ERR."""
@@ -189,25 +189,27 @@ def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
 
 
 def thresholds_table(curves: Totals, totals: Totals) -> Table:
-    """Tabulate AP and MaxF over all thresholds beside F1 of the mask as it is."""
+    """Tabulate AP and MaxF over all thresholds and ECE beside F1 of the mask as it is."""
     rows: list[list[Cell | str]] = [
         [
             variant_cell(variant, [*totals]),
             stage,
             percent(own["AP"]),
             Cell(percent(own["MaxF"]), bold=True),
-            percent(own["threshold"]),
+            f"{own['threshold']:.3g}" if defined(own["threshold"]) else DASH,
+            percent(own.get("ECE")),
             percent(score.overlap(totals[variant][stage])["F1"]),
         ]
         for variant, stages in curves.items()
         for stage, own in stages.items()
     ]
     return Table(
-        ["variant", "stage", "AP", "MaxF", "threshold", "F1 as it is"],
+        ["variant", "stage", "AP", "MaxF", "threshold", "ECE", "F1 as it is"],
         rows,
         text_columns=(0, 1),
-        caption="Percent. Of road's probability: average precision over all thresholds, the best "
-        "F1 with its threshold, and F1 of the mask as it is.",
+        caption="Percent, and the threshold from 0 to 1. Of road's probability: average precision "
+        "over all thresholds, the best F1 with its threshold, the expected calibration error, and "
+        "F1 of the mask as it is. " + " ".join(overconfident(curves)),
         small=True,
     )
 

@@ -215,10 +215,10 @@ class Facts(Document):
     """Of each final mask: how well it follows the edge, how much it flickers, error episodes."""
     curves: Totals = field(default_factory=dict)
     """Over all thresholds, by variant and stage that says how probable road is."""
-    thresholds: dict[str, dict[str, float]] = field(default_factory=dict)
+    thresholds: dict[str, dict[str, Any]] = field(default_factory=dict)
     """By a variant that learns nothing: its ``own`` threshold on how probable road is, the
     ``threshold`` that errs least on the training frames, and the evaluated frames' ``ERR`` at it,
-    of all pixels together."""
+    of all pixels together; and the ``lines`` of its settings that make it so."""
     difference: Differences = field(default_factory=dict)
     """Filtered minus unfiltered, by stage."""
     against_unfiltered: Differences = field(default_factory=dict)

@@ -32,6 +32,8 @@ ROUNDING: Final = 5e-4
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are stated together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
+OVERCONFIDENT: Final = 0.01
+"""Least difference of errors and stated errors that is told, see `overconfident`."""
 NAMED: Final = 5
 """Frames without truth that a verdict names."""
 _OF_FILTER: Final = "The filter "
@@ -195,7 +197,7 @@ def verdict(
     totals: Mapping[str, Rates],
     effects: Sequence[Effect],
     claims: Mapping[str, Mapping[str, int]] | None = None,
-    thresholds: Mapping[str, Mapping[str, float]] | None = None,
+    thresholds: Mapping[str, Mapping[str, Any]] | None = None,
     *,
     unlabelled: UnlabelledFacts | None = None,
     estimated: EstimateFacts | None = None,
@@ -287,7 +289,7 @@ def from_labels(found: EstimateFacts | None, variant: str) -> Iterator[str]:
 
 
 def at_thresholds(
-    thresholds: Mapping[str, Mapping[str, float]], rates: Mapping[str, Rates]
+    thresholds: Mapping[str, Mapping[str, Any]], rates: Mapping[str, Rates]
 ) -> Iterator[str]:
     """Yield what the threshold of the training frames would bring to each method, in a sentence.
 
@@ -302,10 +304,26 @@ def at_thresholds(
         now = rates.get(name, {}).get(f"pooled_{TESTED}", math.nan)
         if abs(now - found[TESTED]) >= ROUNDING:
             digits = 1 if abs(now - found[TESTED]) >= FINE else 2
+            lines = "` and `".join(found.get("lines", "").splitlines())
             yield (
                 f"{name} at {found['threshold']:.2g} instead of {found['own']:.2g}, which the "
                 f"training frames choose: {in_percent(found[TESTED]):.{digits}f} instead of "
-                f"{in_percent(now):.{digits}f} %."
+                f"{in_percent(now):.{digits}f} %{f' (write `{lines}`)' if lines else ''}."
+            )
+
+
+def overconfident(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
+    """Yield a sentence on each variant that errs twice as often as its probabilities say, or more.
+
+    ``curves`` are as in `roadeval.results.facts.Facts`. Less than a point of difference is none.
+    """
+    for variant, stages in curves.items():
+        *_, last = stages.values()
+        stated, wrong = (1 - last.get(name, math.nan) for name in ("confidence", "right"))
+        if wrong >= max(2 * stated, stated + OVERCONFIDENT):
+            yield (
+                f"{variant} is over-confident: by its probabilities {percent(stated, 1)} % of the "
+                f"pixels are wrong, and {percent(wrong, 1)} % are."
             )
 
 

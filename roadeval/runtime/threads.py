@@ -1,11 +1,14 @@
-"""An ordered, bounded map over worker threads, and single calls that may never return."""
+"""An ordered, bounded map over worker threads, and an end to calls of libraries that have none."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from threading import Thread
 from typing import Final, TypeVar
 
@@ -14,6 +17,10 @@ R = TypeVar("R")
 
 AHEAD: Final = 2
 """Items in the queue beyond those in work, so that no worker waits for the consumer."""
+WATCHED_S: Final = 0.05
+"""Seconds between two looks of `ended` at the clock."""
+_LOCAL: Final = threading.local()
+"""In a thread of `ordered`: the event ``stopped``."""
 
 
 def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R]:
@@ -22,9 +29,11 @@ def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R
     The items are drawn as results are taken, at most ``jobs + 2`` ahead (back-pressure: memory
     does not grow with their number). The first exception, of ``work`` or of ``items``, is
     raised at its place in the order, after the items in work have finished. The same happens when
-    the caller stops early.
+    the caller stops early: work within `ended` is then ended at once.
     """
-    with one_thread_each(), ThreadPoolExecutor(jobs, thread_name_prefix="roadeval") as pool:
+    stopped = threading.Event()
+    told = partial(setattr, _LOCAL, "stopped", stopped)
+    with one_thread_each(), ThreadPoolExecutor(jobs, "roadeval", initializer=told) as pool:
         waiting: deque[Future[R]] = deque()
         try:
             for item in items:
@@ -34,6 +43,7 @@ def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R
             while waiting:
                 yield waiting.popleft().result()
         finally:
+            stopped.set()
             pool.shutdown(wait=True, cancel_futures=True)
 
 
@@ -49,6 +59,33 @@ def in_thread(call: Callable[[], R]) -> Future[R]:
 
     Thread(target=run, daemon=True).start()
     return answer
+
+
+@contextmanager
+def ended(end: Callable[[], None], seconds: float) -> Iterator[threading.Event]:
+    """Call ``end`` where the work within takes longer than some seconds; the event is then set.
+
+    It is called, too, where `ordered`, of which this is a thread, is stopped: no exception reaches
+    what a library computes.
+    """
+    done, late = threading.Event(), threading.Event()
+    stopped, until = getattr(_LOCAL, "stopped", done), time.monotonic() + seconds
+
+    def watch() -> None:
+        while not done.wait(WATCHED_S):
+            if time.monotonic() > until:
+                late.set()
+            if late.is_set() or stopped.is_set():
+                end()
+                return
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield late
+    finally:
+        done.set()
+        watcher.join()
 
 
 @contextmanager

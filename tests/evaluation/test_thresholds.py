@@ -7,7 +7,7 @@ import pytest
 from sklearn.metrics import average_precision_score, f1_score, precision_recall_curve
 
 from roadeval.data import CODES, histogram
-from roadeval.evaluation.score import Thresholds, at_levels
+from roadeval.evaluation.score import Thresholds, at_levels, calibration
 
 TOP = CODES - 1
 
@@ -38,6 +38,25 @@ def test_areas_and_f_are_scikit_learns(seed, levels):
     best = found.max_f()
     assert best["MaxF"] == pytest.approx(f1_score(y, p >= best["threshold"]), abs=1e-12)
     assert 2 / (1 / best["precision"] + 1 / best["recall"]) == pytest.approx(best["MaxF"])
+
+
+@pytest.mark.parametrize(("seed", "levels"), CASES)
+def test_ece_is_that_of_256_bins_of_the_pixels_themselves(seed, levels):
+    """As torchmetrics 1.8 has it: BinaryCalibrationError(n_bins=256, norm="l1")."""
+    codes, truth = drawn(seed, levels)
+    found, (y, p) = calibration(histogram(codes, truth)), flat(codes, truth)
+    place = np.minimum((p * 256 * TOP / CODES).astype(int), 255)
+    bins = [place == level for level in range(256)]
+    ece = sum(abs(y[own].mean() - p[own].mean()) * own.mean() for own in bins if own.any())
+    assert found["ECE"] == pytest.approx(ece, abs=1e-12)
+    assert found["confidence"] == pytest.approx(np.maximum(p, 1 - p).mean(), abs=1e-12)
+    assert found["right"] == pytest.approx(((p > (TOP + 1) / 2 / TOP) == y).mean(), abs=1e-12)
+
+
+def test_probabilities_that_come_true_have_no_calibration_error():
+    counts = np.zeros((2, CODES), np.int64)
+    counts[:, [0, TOP // 5, TOP]] = [[7, 80, 0], [0, 20, 9]]
+    assert calibration(counts)["ECE"] == pytest.approx(0)
 
 
 @pytest.mark.parametrize(("seed", "levels"), CASES)

@@ -1,5 +1,6 @@
 """A method that errs in the shade, and what ten frames of the drive make of it."""
 
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -153,9 +154,31 @@ def test_the_headline_says_what_the_training_frames_threshold_would_bring(at_tra
         "own": 0.59,
         "threshold": pytest.approx(threshold),
         "ERR": pytest.approx(then),
+        "lines": found["mine"]["lines"],
     }
     told = f"mine at {threshold:.2g} instead of 0.59, which the training frames choose: "
-    assert f"{told}{100 * then:.1f} instead of {100 * now:.1f} %." in outcome.summary["verdict"]
+    told = (
+        f"{told}{100 * then:.1f} instead of {100 * now:.1f} % (write `{found['mine']['lines']}`)."
+    )
+    assert told in outcome.summary["verdict"]
+
+
+@pytest.mark.parametrize("brought", ["masks", "network"])
+def test_the_lines_of_the_verdict_keep_their_promise(brought, folder, tmp_path):
+    given, own = confidences(tmp_path / "a"), tmp_path / "own.toml"
+
+    def replayed(lines):
+        masks = {"mine": {**given, **tomllib.loads(lines)}} if brought == "masks" else {}
+        config = configure({**SMALL, "masks": masks, "output": {"record": "none"}})
+        if not masks:
+            own.write_text(f'file = "{folder / "red.onnx"}"\n{lines}')
+            config = config.with_variants([network_variant("mine", str(own))])
+        outcome, _ = replay(folder / "drive.mcap", config, tmp_path / "r")
+        *_, final = outcome.summary["totals"]["mine"].values()
+        return outcome.summary["thresholds"]["mine"], final["pooled_ERR"]
+
+    found, before = replayed("")
+    assert replayed(found["lines"])[1] == pytest.approx(found["ERR"]) != before
 
 
 def test_decide_trained_takes_that_threshold(at_trained):

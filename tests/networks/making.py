@@ -74,6 +74,51 @@ def network(
     return path
 
 
+def written(path: Path, nodes: list, values: dict | None = None, **opened) -> Path:
+    """Write the network of some nodes, which make ``road`` of the image, a float of 0 to 1.
+
+    ``opened`` are the ``shape`` and the type ``kind`` of ``road`` as the file states them, and
+    ``functions`` of the model.
+    """
+    kind, shape = opened.get("kind", TensorProto.FLOAT), opened.get("shape")
+    graph = helper.make_graph(
+        nodes,
+        "written",
+        [helper.make_tensor_value_info(IMAGE, TensorProto.FLOAT, (1, 3, SIZE[1], SIZE[0]))],
+        [helper.make_tensor_value_info(ROAD, kind, shape)],
+        [numpy_helper.from_array(np.array(value), name) for name, value in (values or {}).items()],
+    )
+    model = helper.make_model(
+        graph,
+        opset_imports=[helper.make_opsetid(name, 17 - 16 * bool(name)) for name in ("", "own")],
+        ir_version=8,
+        functions=opened.get("functions", ()),
+    )
+    onnx.save(model, path)
+    return path
+
+
+def without_end(condition: str) -> onnx.NodeProto:
+    """A loop that makes ``road`` of the image, and goes on for as long as a condition holds."""
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["go"], ["on"]),
+            helper.make_node("Identity", ["was"], ["is"]),
+        ],
+        "body",
+        [
+            helper.make_tensor_value_info("turn", TensorProto.INT64, ()),
+            helper.make_tensor_value_info("go", TensorProto.BOOL, ()),
+            helper.make_tensor_value_info("was", TensorProto.FLOAT, None),
+        ],
+        [
+            helper.make_tensor_value_info("on", TensorProto.BOOL, ()),
+            helper.make_tensor_value_info("is", TensorProto.FLOAT, None),
+        ],
+    )
+    return helper.make_node("Loop", ["", condition, IMAGE], [ROAD], body=body)
+
+
 def scores(values: dict[str, np.ndarray], planes: np.ndarray) -> np.ndarray:
     """What the network makes of ``(3, H, W)``: ``(C, H / 2, W / 2)``."""
     wide = np.pad(planes, ((0, 0), (1, 1), (1, 1)))

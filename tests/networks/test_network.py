@@ -5,10 +5,12 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 import numpy as np
 import pytest
+from onnx import helper
 
 from roadeval.data import CERTAIN
 from roadeval.networks import NetSettings, Network, NetworkError
-from tests.networks.making import SIZE, balanced, network, scores
+from tests.networks.making import IMAGE as MADE
+from tests.networks.making import ROAD, SIZE, balanced, network, scores, without_end, written
 
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
 """Of the input's size."""
@@ -39,6 +41,23 @@ def test_the_mask_is_where_the_probability_is_above_the_threshold(tmp_path):
     road = opened(path, decide="threshold", threshold=0.7).road(FRAME)
     assert np.array_equal(road.mask, road.codes > round(0.7 * CERTAIN))
     assert road.graded
+
+
+@pytest.mark.parametrize("classes", [1, 2, 3])
+@pytest.mark.parametrize("decide", [None, "threshold", "argmax"])
+def test_a_threshold_is_heeded_whatever_decides(classes, decide, tmp_path):
+    path = network(tmp_path / "n.onnx", classes=classes, values=balanced(IMAGE, classes))
+    if classes == 1 and decide == "argmax":
+        return
+    found = opened(path, threshold=0.7, decide=decide, road=(classes - 1,))
+    road = found.road(FRAME)
+    assert found.settings.decide == (decide or "threshold")
+    assert np.array_equal(road.mask, road.codes > round(0.7 * CERTAIN))
+
+
+def test_a_threshold_on_classes_alone_is_refused(tmp_path):
+    with pytest.raises(NetworkError, match=r"`net\.threshold`"):
+        opened(network(tmp_path / "n.onnx", last="ArgMax"), road=(1,), threshold=0.7)
 
 
 def test_of_three_classes_road_is_where_it_beats_the_others(tmp_path):
@@ -134,6 +153,54 @@ def test_numbers_that_are_none_are_an_error(tmp_path):
     path = network(tmp_path / "n.onnx", values=values)
     with pytest.raises(NetworkError, match="NaN"):
         opened(path).road(FRAME)
+
+
+def _depending(path, *nodes, **values):
+    """A network of two classes whose output an image changes that is not black."""
+    first = [
+        helper.make_node("ReduceMax", [MADE], ["most"], keepdims=0),
+        helper.make_node("Slice", [MADE, "zero", "two", "zero1"], ["scores"]),
+    ]
+    given = {"zero": [0], "one": [1], "zero1": [1], "two": [2], "none": np.float32(0), **values}
+    return written(path, [*first, *nodes], given)
+
+
+def test_numbers_that_are_none_are_an_error_of_a_network_with_a_softmax_inside(tmp_path):
+    nodes = [
+        helper.make_node("Greater", ["scores", "high"], ["is high"]),
+        helper.make_node("Where", ["is high", "nan", "scores"], ["unclean"]),
+        helper.make_node("Softmax", ["unclean"], [ROAD], axis=1),
+    ]
+    path = _depending(tmp_path / "n.onnx", *nodes, high=np.float32(0.9), nan=np.float32(np.nan))
+    found = opened(path)
+    assert found.settings.activation == "none"
+    with pytest.raises(NetworkError, match="NaN"):
+        found.road(FRAME)
+
+
+def test_a_shape_that_depends_on_the_image_is_an_error(tmp_path):
+    nodes = [
+        helper.make_node("Greater", ["most", "none"], ["bright"]),
+        helper.make_node("Cast", ["bright"], ["more"], to=7),
+        helper.make_node("Reshape", ["more", "one"], ["one more"]),
+        helper.make_node("Add", ["one more", "two"], ["count"]),
+        helper.make_node("Slice", [MADE, "zero", "count", "zero1"], [ROAD]),
+    ]
+    found = opened(_depending(tmp_path / "n.onnx", *nodes))
+    with pytest.raises(NetworkError, match="shape depends on the image"):
+        found.road(FRAME)
+
+
+def test_a_loop_that_ends_on_black_images_alone_is_ended(tmp_path):
+    nodes = [
+        helper.make_node("ReduceMax", [MADE], ["most"], keepdims=0),
+        helper.make_node("Greater", ["most", "none"], ["bright"]),
+        without_end("bright"),
+    ]
+    path = written(tmp_path / "n.onnx", nodes, {"none": np.float32(0)})
+    found = opened(path, seconds=0.5, road=(0,))
+    with pytest.raises(NetworkError, match=r"takes longer than 0\.5 s"):
+        found.road(FRAME)
 
 
 def _everywhere(classes):

@@ -6,9 +6,11 @@ import numpy as np
 import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
+from onnx.external_data_helper import set_external_data
 
 from roadeval.networks import NetSettings, Network, NetworkError
-from tests.networks.making import network
+from roadeval.networks.onnx_file import weight_files
+from tests.networks.making import IMAGE, ROAD, SIZE, network, without_end, written
 
 
 def read(path):
@@ -41,6 +43,120 @@ def test_weights_beside_the_file_are_part_of_the_digest(tmp_path):
     path = with_weights_beside(tmp_path)
     both = path.read_bytes() + (tmp_path / "n.data").read_bytes()
     assert read(path).sha256 == hashlib.sha256(both).hexdigest()
+
+
+def _beside(value: float = 1.0) -> onnx.TensorProto:
+    """A weight that lies in n.data."""
+    tensor = numpy_helper.from_array(np.float32([value]), "w")
+    set_external_data(tensor, "n.data")
+    tensor.ClearField("raw_data")
+    return tensor
+
+
+def _constant(output: str = "w") -> onnx.NodeProto:
+    return helper.make_node("Constant", [], [output], value=_beside())
+
+
+def _in_a_branch(path, deep: bool) -> None:
+    result = [helper.make_tensor_value_info("made", TensorProto.FLOAT, None)]
+    add = helper.make_node("Add", [IMAGE, "w"], ["made"])
+    held = ([_constant(), add], [], result) if deep else ([add], [], result, [_beside()])
+    branch = helper.make_graph(held[0], "branch", *held[1:])
+    choice = helper.make_node("If", ["yes"], [ROAD], then_branch=branch, else_branch=branch)
+    written(path, [choice], {"yes": True})
+
+
+def _in_a_function(path) -> None:
+    nodes = [_constant(), helper.make_node("Add", ["x", "w"], ["y"])]
+    opset = [helper.make_opsetid("", 17)]
+    function = helper.make_function("own", "plus", ["x"], ["y"], nodes, opset)
+    call = helper.make_node("plus", [IMAGE], [ROAD], domain="own")
+    written(path, [call], functions=[function])
+
+
+REACHED = {
+    "a constant": lambda path: written(
+        path, [_constant(), helper.make_node("Add", [IMAGE, "w"], [ROAD])]
+    ),
+    "a branch": lambda path: _in_a_branch(path, deep=False),
+    "a constant in a branch": lambda path: _in_a_branch(path, deep=True),
+    "a function": _in_a_function,
+}
+
+
+@pytest.mark.parametrize("by", REACHED)
+def test_weights_beside_the_file_are_part_of_the_digest_however_they_are_reached(by, tmp_path):
+    path, digests = tmp_path / "n.onnx", []
+    REACHED[by](path)
+    for value in (1, 2):
+        (tmp_path / "n.data").write_bytes(np.float32([value]).tobytes())
+        path.touch()
+        both = hashlib.sha256(path.read_bytes() + (tmp_path / "n.data").read_bytes())
+        digests.append(both.hexdigest())
+        settings = NetSettings(file=str(path), size=SIZE, road=(0,))
+        assert Network.of(settings).file.sha256 == digests[-1]
+    assert len(set(digests)) == 2
+
+
+def test_sparse_weights_beside_the_file_are_found():
+    sparse = helper.make_sparse_tensor(
+        _beside(), helper.make_tensor("i", TensorProto.INT64, [1], [0]), [4]
+    )
+    model = helper.make_model(helper.make_graph([], "g", [], [], sparse_initializer=[sparse]))
+    assert [*weight_files(memoryview(model.SerializeToString()))] == ["n.data"]
+
+
+@pytest.mark.parametrize("where", ["here", "in a branch"])
+def test_a_loop_without_end_is_ended(where, tmp_path):
+    nodes = [without_end("yes")]
+    if where == "in a branch":
+        result = [helper.make_tensor_value_info(ROAD, TensorProto.FLOAT, None)]
+        branch = helper.make_graph(nodes, "branch", [], result)
+        nodes = [helper.make_node("If", ["yes"], [ROAD], then_branch=branch, else_branch=branch)]
+    path = written(tmp_path / "n.onnx", nodes, {"yes": True})
+    with pytest.raises(NetworkError, match=r"takes longer than 0\.5 s to run.*net\.seconds"):
+        Network.of(NetSettings(file=str(path), seconds=0.5))
+
+
+def test_a_network_that_takes_too_long_to_open_is_refused(tmp_path):
+    path = network(tmp_path / "n.onnx")
+    with pytest.raises(NetworkError, match=r"takes longer than 0\.001 s to open.*net\.seconds"):
+        Network.of(NetSettings(file=str(path), seconds=0.001))
+
+
+SIZES = {
+    "rows and columns, stated": ((12000, 16000), True, "takes 732 MiB"),
+    "rows and columns": ((12000, 16000), False, "takes 732 MiB"),
+    "classes, stated": ((9999, 120, 160), True, "takes 732 MiB"),
+    "nothing": ((0, 12, 16), False, "no map of the image, but (1, 0, 12, 16)"),
+    "five lengths": ((2, 3, 12, 16), False, "no map of the image, but (1, 2, 3, 12, 16)"),
+}
+
+
+@pytest.mark.parametrize("what", SIZES)
+def test_an_output_that_is_too_large_or_no_map_is_refused(what, tmp_path):
+    shape, stated, said = SIZES[what]
+    node = helper.make_node("ConstantOfShape", ["shape"], ["zeros"])
+    keep = helper.make_node("ReduceMax", [IMAGE], ["most"], keepdims=0)
+    nodes = [node, keep, helper.make_node("Add", ["zeros", "most"], [ROAD])]
+    values = {"shape": np.int64([1, *shape])}
+    path = written(tmp_path / "n.onnx", nodes, values, shape=[1, *shape] if stated else None)
+    assert said in refused(path)
+
+
+@pytest.mark.parametrize("operator", ["SequenceConstruct", "ArgMax to text"])
+def test_an_output_without_numbers_is_refused(operator, tmp_path):
+    node = helper.make_node("Cast", [IMAGE], [ROAD], to=TensorProto.STRING)
+    path = tmp_path / "n.onnx"
+    written(path, [node], kind=TensorProto.STRING)
+    if operator == "SequenceConstruct":
+        model = onnx.load(path)
+        model.graph.node[0].CopyFrom(helper.make_node(operator, [IMAGE], [ROAD]))
+        kind = helper.make_tensor_type_proto(TensorProto.FLOAT, None)
+        sequence = helper.make_sequence_type_proto(kind)
+        model.graph.output[0].CopyFrom(helper.make_value_info(ROAD, sequence))
+        onnx.save(model, path)
+    assert "no array of numbers" in refused(path)
 
 
 def test_a_missing_file(tmp_path):

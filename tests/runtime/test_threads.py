@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from roadeval.runtime.threads import AHEAD, ordered
+from roadeval.runtime.threads import AHEAD, ended, ordered
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
@@ -49,3 +49,18 @@ def test_no_thread_outlives_a_caller_that_stops_early():
     next(results)
     results.close()
     assert not [t for t in threading.enumerate() if t.name.startswith("roadeval")]
+
+
+def test_work_without_end_is_ended_where_the_map_is_stopped_early():
+    endless = threading.Event()
+
+    def work(item: int) -> int:
+        if item:
+            with ended(endless.set, 600):
+                endless.wait()
+        return item
+
+    results = ordered(work, range(3), 2)
+    assert next(results) == 0
+    results.close()
+    assert endless.is_set()

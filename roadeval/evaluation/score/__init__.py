@@ -57,6 +57,7 @@ from roadeval.evaluation.score.thresholds import (
     HeatMap,
     Thresholds,
     at_levels,
+    calibration,
     changes,
 )
 from roadeval.evaluation.score.unlabelled import SIGNS, Unlabelled, chosen, doubts_of, sign_of

@@ -11,6 +11,8 @@ References
 ----------
 .. [1] J. Fritsch, T. Kuehnl, A. Geiger, A New Performance Measure and Evaluation Benchmark for
    Road Detection Algorithms, ITSC 2013.
+.. [2] M. P. Naeini, G. F. Cooper, M. Hauskrecht, Obtaining Well Calibrated Probabilities Using
+   Bayesian Binning, AAAI 2015; torchmetrics' ``BinaryCalibrationError(n_bins=256, norm="l1")``.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from roadeval.data import (
+    CERTAIN,
     CODES,
     Change,
     Histogram,
@@ -105,6 +108,24 @@ class Thresholds(NamedTuple):
         return dict(zip(names, map(float, at), strict=True))
 
 
+def calibration(counts: Sums) -> dict[str, float]:
+    """Return how far probabilities are what they say, from ``(2, 65536)`` counts by code.
+
+    ``ECE`` is the expected calibration error ``sum_b n_b / n |r_b - p_b|`` over 256 levels of equal
+    width: ``n_b`` pixels of a level, the share ``r_b`` of road among them, and ``p_b`` the mean of
+    their probabilities [2]_. ``confidence`` is the mean of ``max(p, 1 - p)``, and ``right`` the
+    share of pixels that are right where road is what is more probable than one half.
+    """
+    pixels, p = counts.sum(axis=0), np.arange(CODES) / CERTAIN
+    road, stated = (own.reshape(LEVELS, -1).sum(axis=1) for own in (counts[1], pixels * p))
+    found = {
+        "ECE": np.abs(road - stated).sum(),
+        "confidence": (pixels * np.maximum(p, 1 - p)).sum(),
+        "right": pixels.sum() - wrong_above(counts)[round(CERTAIN / 2)],
+    }
+    return {name: float(value / pixels.sum()) for name, value in found.items()}
+
+
 class Curves:
     """The labelled pixels of a drive by how probable road is, for each variant and stage."""
 
@@ -134,12 +155,13 @@ class Curves:
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return by variant and stage what is quoted of curves, fit for JSON.
 
-        The ``frames``, ``AP``, and what `Thresholds.max_f` finds.
+        The ``frames``, ``AP``, and what `Thresholds.max_f` and `calibration` find.
         """
         found = {}
         for name, counts in self.counts.items():
             own, frames = Thresholds.of(counts), self._frames[name]
-            found[name] = {"frames": frames, "AP": own.average_precision, **own.max_f()}
+            area = {"frames": frames, "AP": own.average_precision}
+            found[name] = {**area, **own.max_f(), **calibration(counts)}
         return as_tree(found.items())
 
 

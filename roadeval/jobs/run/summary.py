@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.config import AS_IT_IS
-from roadeval.data import BASELINE, FINAL_STAGE, TUNED, Role, as_tree
+from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import (
     Scoreboard,
@@ -151,11 +151,13 @@ def _not_random(run: Run, picks: Picks) -> str:
     return ""
 
 
-def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, float]]]:
+def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield what the threshold of the training frames would bring to methods that learn nothing."""
     found = run.board.thresholds()
     masks = [(name, each.threshold) for name, each in run.config.masks.items()]
     own = {name: at for name, at in masks if at is not None and name not in run.chains}
+    # Five digits tell codes apart; road is what exceeds a code, but what reaches masks' threshold.
+    lines = dict.fromkeys(own, ("threshold = {:.5f}", 0.5 / CERTAIN))
     for variant in run.variants:
         stages = variant.pipeline.settings
         post = stages[FINAL_STAGE]
@@ -163,11 +165,14 @@ def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, float]]]:
         if is_final and not variant.pipeline.learning():
             net = stages.get("net")
             own[variant.name] = 0.5
-            if net is not None and net.decide == "threshold":
+            if net is not None and net.threshold is not None:
                 own[variant.name] = net.threshold
+                decided = 'decide = "argmax"\n' * (net.decide == "argmax")
+                lines[variant.name] = (f"{decided}threshold = {{:.5f}}", 0)
     for name, threshold in own.items():
+        line, more = lines.get(name, ("", 0))
         for at in found.get(name, {}).values():
-            yield name, {"own": threshold, **at}
+            yield name, {"own": threshold, **at, "lines": line.format(at["threshold"] + more)}
 
 
 def of_cameras(

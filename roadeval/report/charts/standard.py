@@ -320,6 +320,30 @@ MOST: Final = 101.0
 """Percent at which axes end, so that a line along the edge is seen."""
 
 
+BINS: Final = 16
+"""Parts of the range of probabilities in a chart of reliability."""
+
+
+def reliability(levels: Rows, totals: Totals) -> Chart:
+    """Return the share of road among the pixels that are called so probable, a line a variant.
+
+    Arguments are as of `precision_over_recall`.
+    """
+    drawn = looks([*totals])
+    lines = [series("as it says", Look(FAINT, "dotted"), [0, 100], [0, 100])]
+    for (name, _), places in levels.groups("variant", "stage"):
+        rows = levels.take(places)
+        pixels = rows["other"] + rows["road"]
+        part = rows["level"] * BINS // score.LEVELS
+        stated = rows["level"] / (score.LEVELS - 1) * pixels
+        sums = (np.bincount(part, each, BINS) for each in (pixels, stated, rows["road"]))
+        count, said, road = (own[np.unique(part)] for own in sums)
+        lines.append(series(name, drawn[name], 100 * said / count, 100 * road / count))
+    ends = (0.0, MOST)
+    title, across = "share that is road", "probability of road"
+    return Chart(title, ChartKind.LINES, lines, across=across, x_range=ends, y_range=ends)
+
+
 def precision_over_recall(levels: Rows, totals: Totals) -> Chart:
     """Return a curve for each variant that says how probable road is, and a mark for each mask.
 

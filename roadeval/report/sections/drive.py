@@ -336,9 +336,13 @@ def thresholds(findings: Findings) -> Iterator[Block]:
         return
     yield Heading("Over thresholds")
     chart = Figure(
-        [charts.precision_over_recall(levels, findings.totals)],
+        [
+            charts.precision_over_recall(levels, findings.totals),
+            charts.reliability(levels, findings.totals),
+        ],
         "Precision over recall: a curve belongs to a variant that says how probable road is; a "
-        "mark is a mask at its own threshold. Axes begin where the masks lie.",
+        "mark is a mask at its own threshold. Axes begin where the masks lie. Reliability: below "
+        "the grey line road is said to be more probable than it is.",
     )
     meanings = Text(
         "All labelled pixels of the evaluated frames together. F is the harmonic mean of precision "

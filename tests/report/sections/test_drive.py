@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from roadeval.report.blocks import Figure, Text
+from roadeval.report.blocks import Figure, Table, Text
 from roadeval.report.sections.drive import filter_effect, regions, thresholds
 from tests.evaluation.making import rows_of
 from tests.report.making import (
@@ -46,10 +46,25 @@ def findings(**quoted):
     )
 
 
+@pytest.mark.parametrize(
+    ("stated", "wrong", "told"),
+    [(0.02, 0.08, True), (0.02, 0.03, False), (0.002, 0.006, False), (0.1, 0.05, False)],
+)
+def test_a_variant_that_errs_twice_as_often_as_it_says_is_called_over_confident(
+    stated, wrong, told
+):
+    own = {"ECE": 0.05, "confidence": 1 - stated, "right": 1 - wrong, "threshold": 0.00757}
+    (table,) = (block for block in opened(thresholds(findings(**own))) if isinstance(block, Table))
+    assert ("filtered is over-confident: by its probabilities" in table.caption) == told
+    assert table.rows[0][4:6] == ["0.00757", "5.00"]
+
+
 def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
     (figure,) = (block for block in opened(thresholds(findings())) if isinstance(block, Figure))
-    (recall,) = figure.charts
+    recall, reliable = figure.charts
     curve, mask, *_ = recall.series
+    assert reliable.series[1].x == pytest.approx([100 * 20 / 255, 100 * 230 / 255])
+    assert reliable.series[1].y == pytest.approx([100 * 2 / 10, 100 * 4 / 5])
     # Of 6 road and 9 other pixels, 4 and 1 are of the higher level.
     assert curve.x == pytest.approx([100 * 4 / 6, 100])
     assert curve.y == pytest.approx([80, 100 * 6 / 15])
