@@ -196,7 +196,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
             stage,
             percent(own["AP"]),
             Cell(percent(own["MaxF"]), bold=True),
-            f"{own['threshold']:.3g}" if defined(own["threshold"]) else DASH,
+            f"{own['threshold']:.5g}" if defined(own["threshold"]) else DASH,
             percent(own.get("ECE")),
             percent(score.overlap(totals[variant][stage])["F1"]),
         ]
