@@ -223,7 +223,7 @@ class Log:
         log, topic = log_and_topic(settings.path)
         camera = found.camera
         if log is None:
-            origin = labels_in(Path(settings.path), camera.topic.size)
+            origin = labels_in(Path(settings.path), camera.topic.size, settings)
             if settings.names == "*" and settings.images is None:
                 names = [shown_name(label.path, settings.path) for label in origin.labels]
                 check_names(names, camera.topic, self.topics)

@@ -153,8 +153,8 @@ class LabelPlace:
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
     """A folder of label images, files of an annotation tool (COCO, CVAT, LabelMe, YOLO, Label
-    Studio), or LOG.mcap:/topic. Images may be NPY files; there is one a frame. In the path
-    ``{drive}`` is the name of the drive's file, without its ending."""
+    Studio, Cityscapes, BDD100K, VIA), or LOG.mcap:/topic. Images may be NPY files; there is one a
+    frame. In the path ``{drive}`` is the name of the drive's file, without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
     """How labels and frames belong together: by ``number``, the one by which the labels' names
     differ; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
@@ -171,6 +171,9 @@ class LabelPlace:
     images: Annotated[str | None, Flag("--truth-images", "FOLDER")] = None
     """The folder of images that the log was made of, in their order: labels belong to the image of
     the same name, endings such as ``_mask`` aside. It may hold ``{drive}``, too."""
+    skip_roadless: Annotated[bool, Flag("--skip-roadless")] = False
+    """Leave out drawn labels with shapes of other classes, but none of road. Without it such an
+    image counts as one without road."""
 
     def __post_init__(self) -> None:
         if self.images is not None and (self.pair, self.first) != (None, None):

@@ -103,14 +103,20 @@ def write_drive(path: Path) -> None:
 
 
 def write_polygons(folder: Path) -> None:
-    """The road of `frame` as Cityscapes has it; its last one is damaged."""
+    """The road of `frame` as Supervisely has it; its last one is damaged."""
     folder.mkdir()
-    sky = {"label": "sky", "polygon": [[0, 0], [64, 0], [64, 16], [0, 16]]}
-    road = {"label": "road", "polygon": [[20, 16], [44, 16], [44, 48], [20, 48]]}
-    text = json.dumps({"imgWidth": 64, "imgHeight": 48, "objects": [sky, road]})
+    outlines = {
+        "sky": [[0, 0], [64, 0], [64, 16], [0, 16]],
+        "road": [[20, 16], [44, 16], [44, 48], [20, 48]],
+    }
+    figures = [
+        {"classTitle": name, "points": {"exterior": points, "interior": []}}
+        for name, points in outlines.items()
+    ]
+    text = json.dumps({"size": {"width": 64, "height": 48}, "objects": figures})
     for number in range(FRAMES):
         cut = text[:-9] if number == FRAMES - 1 else text
-        (folder / f"street_{number:06d}_gtFine_polygons.json").write_text(cut)
+        (folder / f"street_{number:06d}.png.json").write_text(cut)
 
 
 @pytest.fixture(scope="module")
@@ -244,9 +250,7 @@ def test_the_encoding_is_read(recording):
 def test_the_label_format_gives_the_same_truth(workshop):
     code, _, err = workshop.runs["labels"]
     assert code == 3
-    assert (
-        f"lost: frame {FRAMES - 1}: polygons/street_000021_gtFine_polygons.json: cannot be" in err
-    )
+    assert f"lost: frame {FRAMES - 1}: polygons/street_000021.png.json: cannot be" in err
     whole = workshop.table("frames").query("variant == 'filtered'")
     drawn = pd.read_csv(workshop.folder / "drawn" / "frames.csv").query("variant == 'filtered'")
     there = whole[whole["frame"] < FRAMES - 1].reset_index(drop=True)

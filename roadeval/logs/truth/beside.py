@@ -6,8 +6,10 @@ import io
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache, partial
 from itertools import chain, islice
+from json import JSONDecodeError
 from pathlib import Path
 from typing import Any, Final
 from xml.etree.ElementTree import ParseError, XMLParser, fromstring
@@ -19,8 +21,9 @@ from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, listed, of_ids, some
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
+from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import Drawing, LabelFormat, Size
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Meant, Size, settled
 from roadeval.logs.truth.pairing import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
 from roadeval.runtime.discovery import found_in
@@ -35,15 +38,17 @@ _TRIED: Final = 8
 """Files of an ending, of a folder, that are tried for a format."""
 _NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
 """What a reader raises for a file that is not as its format asks."""
+_WRONG: Final = (*_NOT_SO, LogError, BadMessage, ImageError)
 
 
-def labels_in(path: Path, size: Size | None) -> LabelSet:
+def labels_in(path: Path, size: Size | None, asked: MaskSettings | None = None) -> LabelSet:
     """List the labels in a folder or a file; of picked frames those in their folder of labels.
 
     In a folder, files of an annotation tool come before images: these may be the ones that were
     annotated. A folder without any of both, or with lists of names alone, is searched with all
     below it. ``size`` is the width and height of the log's images, if known: some formats have
-    shares of it. A `LogError` if there is no label, or the file of labels cannot be read.
+    shares of it. What drawn shapes mean decides which is on top, and what can be left out. A
+    `LogError` if there is no label, or the file of labels cannot be read.
     """
     if (path / PICK).is_file():
         path /= LABELS
@@ -53,27 +58,32 @@ def labels_in(path: Path, size: Size | None) -> LabelSet:
     endings = IMAGES | {NPY} | _readers().keys()
     files = [path] if path.is_file() else listed(path, endings, below=True)
     own = [file for file in files if path in (file, file.parent)]
-    found = _labels_of(own, path, size) or _labels_of(files, path, size)
-    if found is None:
-        raise LogError(f"{path}: no label in it that roadeval can read")
-    return found
+    problems: list[LogError] = []
+    for some_files in (own, files):
+        labels = _labels_of(some_files, size, asked or MaskSettings(), problems)
+        if labels is not None:
+            return labels
+    raise next(iter(problems), LogError(f"{path}: no label in it that roadeval can read"))
 
 
-def _labels_of(files: Sequence[Path], path: Path, size: Size | None) -> LabelSet | None:
-    """Return the labels that some files hold, of a folder or alone; None if they hold none."""
-    for ending in _readers():
+def _labels_of(
+    files: Sequence[Path], size: Size | None, asked: MaskSettings, problems: list[LogError]
+) -> LabelSet | None:
+    """Return the labels that some files hold; None if they hold none, with the problems of some."""
+    images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
+    with_ids = of_ids(images)
+    # Cityscapes has polygons beside the ids that were made of them.
+    for ending in _readers() if with_ids is images else ():
         own = [file for file in files if file.suffix.lower() == ending]
         filled = (file for file in own if file.is_file() and file.stat().st_size)
         for file in islice(filled, _TRIED):
             try:
                 format_ = _format_of(file)
-            except LogError:
-                if path.is_file():
-                    raise
+            except LogError as error:
+                problems.append(error)
             else:
-                return _drawn(own, format_, size)
-    images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
-    labels = tuple(map(file_label, of_ids(images)))
+                return _drawn(own, format_, size, asked)
+    labels = tuple(map(file_label, with_ids))
     return LabelSet(labels) if labels else None
 
 
@@ -89,8 +99,8 @@ def _readers() -> dict[str, list[LabelFormat]]:
 def _format_of(file: Path) -> LabelFormat:
     """Return the format of a file; a `LogError` if it is of no known one."""
     content, known = _parsed(file), _readers()[file.suffix.lower()]
-    with suppress(*_NOT_SO):
-        for each in known:
+    for each in known:
+        with suppress(*_NOT_SO):
             if each.holds(file, content):
                 return each
     raise LogError(f"{file}: not labels of {' or '.join(each.name for each in known)}")
@@ -113,51 +123,88 @@ def _parsed(file: Path) -> Any:
     except OSError as error:
         raise LogError(f"{file}: {error.strerror}") from error
     except (ValueError, ParseError) as error:
-        raise LogError(f"{file}: cannot be read as labels: {error}") from error
+        raise LogError(f"{file}: cannot be read as labels: {_damage(error)}") from error
 
 
-def _drawn(files: Sequence[Path], format_: LabelFormat, size: Size | None) -> LabelSet:
-    """Read all files of a format. One of several that cannot be read is an unreadable label."""
+def _damage(error: Exception) -> str:
+    """Return in words what a parser found."""
+    match error:
+        case JSONDecodeError(lineno=line, colno=column):
+            return f"it is no JSON, or ends early (line {line}, column {column})"
+        case ParseError(position=(line, column)):
+            return f"it is no XML, or ends early (line {line}, column {column + 1})"
+        case UnicodeDecodeError():
+            return "it is not in UTF-8"
+        case _ if "integer string conversion" in str(error):
+            return "a number in it has thousands of digits"
+    return str(error)
+
+
+def _drawn(
+    files: Sequence[Path], format_: LabelFormat, size: Size | None, asked: MaskSettings
+) -> LabelSet:
+    """Read all files of a format. An image whose label cannot be read is an unreadable label.
+
+    A `LogError` if a file of several images cannot be read, or there is no label.
+    """
     drawn: list[Drawing] = []
-    problems: dict[Path, str] = {}
+    broken: dict[str, str] = {}
     others: list[str] = []
     for file in files:
         try:
             content = _parsed(file)
-            if format_.holds(file, content):
-                drawn += format_.read(file, content, size)
-            else:
+            if not format_.holds(file, content):
                 others.append(file.name)
-        except (LogError, ImageError) as error:
-            problems[file] = str(error).removeprefix(f"{file}: ")
-        except _NOT_SO as error:
-            problems[file] = f"not as {format_.name} files are: {type(error).__name__} {error}"
-    labelled = [each for each in drawn if each.shapes]
-    if not labelled:
-        file, problem = next(iter(problems.items()), (files[0], f"{format_.name} without a shape"))
-        raise LogError(f"{file}: {problem}")
-    found = Counter(sorted(name for each in labelled for name in each.classes))
-    classes = {name: value for value, name in enumerate(found, 1)}
-    broken = [NamedLabel(each, bytes, partial(_raise, why)) for each, why in problems.items()]
+                continue
+            for drawing in format_.read(file, content, size):
+                try:
+                    shapes = tuple(drawing.shapes)
+                    drawn.append(replace(drawing, size=drawing.size or size, shapes=shapes))
+                except _WRONG as error:
+                    broken[drawing.image] = _in_words(error, format_)
+        except _WRONG as error:
+            problem = _in_words(error, format_).removeprefix(f"{file}: ")
+            if not format_.one_image:
+                raise LogError(f"{file}: {problem}") from error
+            broken[str(file)] = problem
+    labelled = [drawing for drawing in drawn if drawing.shapes]
     notes = []
     if others:
         notes.append(f"{some(others)}: of another format than the other labels, not read")
     if bare := len(drawn) - len(labelled):
         notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
-    labels = [*(_label(each, classes) for each in labelled), *broken]
-    return LabelSet(labels, classes, occurring=found, notes=tuple(notes))
+    occurring = Counter(sorted(name for drawing in labelled for name in drawing.classes))
+    road = asked.labels.road or (tuple(occurring) if len(occurring) == 1 else ())
+    meant = Meant({*map(str, road)}, {*map(str, asked.labels.ignore)}, asked.skip_roadless)
+    labelled = settled(labelled, meant, broken, notes)
+    if not labelled:
+        image, problem = next(iter(broken.items()), (files[0], f"{format_.name} without a shape"))
+        where = "" if str(files[0]) == str(image) else f"{files[0]}: "
+        raise LogError(f"{where}{image}: {problem}")
+    classes = {name: value for value, name in enumerate(occurring, 1)}
+    unread = [NamedLabel(Path(name), bytes, partial(_raise, why)) for name, why in broken.items()]
+    labels = [*(_label(drawing, classes, format_) for drawing in labelled), *unread]
+    return LabelSet(labels, classes, occurring=occurring, notes=tuple(notes))
+
+
+def _in_words(error: Exception, format_: LabelFormat) -> str:
+    """Return what is wrong with a file, or with the label of an image."""
+    if not isinstance(error, _NOT_SO) or isinstance(error, ImageError):
+        return str(error)
+    lacking = f" (it has no {error})" if isinstance(error, KeyError) else ""
+    return f"an annotation is not as {format_.name} writes it{lacking}"
 
 
 def _raise(problem: str, *_: Any) -> Picture:
     raise BadMessage(problem)
 
 
-def _label(drawn: Drawing, classes: dict[str, int]) -> NamedLabel:
+def _label(drawn: Drawing, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
     def picture(_content: bytes, limits: Limits) -> Picture:
         try:
             pixels = drawn.pixels(classes, limits)
         except _NOT_SO as error:
-            raise BadMessage(str(error)) from error
+            raise BadMessage(_in_words(error, format_)) from error
         height, width = pixels.shape
         data = pixels.astype("<u2").tobytes()
         return RawPicture(0, width, height, "mono16", 0, big_endian=False, data=data)

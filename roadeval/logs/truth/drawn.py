@@ -2,14 +2,18 @@
 
 One rule turns an outline into pixels, whichever tool wrote it: a pixel belongs to it if the pixel's
 centre lies inside, by the even-odd rule; the corner of the image is at 0,0 and the centre of its
-first pixel at 0.5,0.5. Where shapes overlap, the later one covers the earlier one.
+first pixel at 0.5,0.5. Where shapes overlap, the later one covers the earlier one, and a class that
+is ignored covers all others.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -19,12 +23,15 @@ import numpy.typing as npt
 
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage
+from roadeval.logs.files import some
 
 Mask = npt.NDArray[np.bool_]
 Size = tuple[int, int]
 """Width and height in pixels."""
 FARTHEST: Final = 1e6
 """Pixels from the image's corner at which a point may lie."""
+_CORNERS: Final = 90
+"""Points of an ellipse."""
 
 
 class Outline(NamedTuple):
@@ -52,15 +59,54 @@ class Outline(NamedTuple):
 
     def points(self) -> npt.NDArray[np.float64]:
         """Return the ``(n, 2)`` points of the ring, from the centre of the first pixel."""
-        flat = np.asarray(self.ring, np.float64)
+        try:
+            flat = np.asarray(self.ring, np.float64)
+        except (TypeError, ValueError, OverflowError):
+            flat = np.array(np.nan)
         if flat.ndim != 1 or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
             raise BadMessage(f"an outline of {self.label} whose points are no pixels")
         return flat.reshape(-1, 2) - 0.5
+
+    def turned(self, degrees: float, about: tuple[float, float]) -> Outline:
+        """Return the outline turned clockwise, as seen in the image, about a point in pixels."""
+        cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        points = np.reshape(self.ring, (-1, 2)) - about
+        turned = points @ np.array([[cosine, sine], [-sine, cosine]]) + about
+        return self._replace(ring=turned.ravel().tolist()) if degrees else self
 
 
 def rectangle(label: str, left: float, top: float, right: float, bottom: float) -> Outline:
     """Return the outline of a rectangle, given two opposite corners in pixels."""
     return Outline(label, (left, top, right, top, right, bottom, left, bottom))
+
+
+def ellipse(label: str, x: float, y: float, across: float, down: float) -> Outline:
+    """Return the outline of an ellipse, given its centre and its two radii in pixels."""
+    angles = np.linspace(0, 2 * np.pi, _CORNERS, endpoint=False)
+    # A polygon outside the curve has the same area as the curve.
+    wider = math.sqrt(2 * np.pi / _CORNERS / math.sin(2 * np.pi / _CORNERS))
+    points = (x + wider * across * np.cos(angles), y + wider * down * np.sin(angles))
+    return Outline(label, np.stack(points, 1).ravel().tolist())
+
+
+def hull(label: str, ring: Sequence[float]) -> Outline:
+    """Return the outline around points: what a cuboid covers, given its corners in the image."""
+    import cv2
+
+    points = np.reshape(np.asarray(ring, np.float32), (-1, 2))
+    return Outline(label, cv2.convexHull(points).ravel().tolist())
+
+
+def flat(points: Iterable[Iterable[float]]) -> list[float]:
+    """Return ``x, y, x, y, ...`` of points."""
+    return [number for x, y in points for number in (x, y)]
+
+
+def size_in(stated: Mapping[str, Any], width: str = "width", height: str = "height") -> Size | None:
+    """Return the size that a part of a file states under two names; None if it states none."""
+    with suppress(KeyError, TypeError, ValueError, OverflowError):
+        return int(stated[width]), int(stated[height])
+    return None
 
 
 class Runs(NamedTuple):
@@ -76,7 +122,10 @@ class Runs(NamedTuple):
     def fill(self, size: Size) -> Mask:
         """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if the runs do not fit."""
         left, top, width, height = self.box or (0, 0, *size)
-        lengths = np.asarray(self.lengths, np.int64)
+        try:
+            lengths = np.asarray(self.lengths, np.int64)
+        except (TypeError, ValueError, OverflowError):
+            lengths = np.array([-1])
         fits = left + width <= size[0] and top + height <= size[1]
         fits = fits and min(left, top, width, height, lengths.min(initial=0)) >= 0
         # Lengths that are too great could add up to the same number by overflow.
@@ -91,7 +140,25 @@ class Runs(NamedTuple):
         return filled
 
 
-Shape = Outline | Runs
+class Undrawn(NamedTuple):
+    """A shape whose pixels are not known.
+
+    It costs its image if its class is road, or is ignored and the shape has no box; the box of
+    another ignored one is ignored. Of other classes it is left out, which is said.
+    """
+
+    label: str
+    what: str
+    """Its kind, for a person: what comes after "a" or a number."""
+    box: Outline | None = None
+    """What it lies within, if that is known."""
+
+    def fill(self, size: Size) -> Mask:
+        """Return the ``(H, W)`` pixels of its box; none if that is not known."""
+        return np.zeros(size[::-1], np.bool_) if self.box is None else self.box.fill(size)
+
+
+Shape = Outline | Runs | Undrawn
 
 
 @dataclass(frozen=True)
@@ -101,8 +168,9 @@ class Drawing:
     image: str
     """The name of the image's file, or a text that ends with the number of its frame."""
     size: Size | None
-    """Of the image; None where the format does not say."""
-    shapes: Sequence[Shape]
+    """Of the image; None where the format does not say: then that of the log's images counts."""
+    shapes: Iterable[Shape]
+    """They are run through once. An error while they are costs this image, and no other."""
 
     @property
     def classes(self) -> set[str]:
@@ -111,7 +179,7 @@ class Drawing:
 
     def content(self) -> bytes:
         """Return all that decides its pixels."""
-        return json.dumps([self.size, self.shapes]).encode()
+        return json.dumps([self.size, [*self.shapes]]).encode()
 
     def pixels(self, values: Mapping[str, int], limits: Limits) -> npt.NDArray[np.uint16]:
         """Return the ``(H, W)`` values of the classes, 0 where no shape is.
@@ -121,10 +189,10 @@ class Drawing:
         if self.size is None:
             raise BadMessage("neither the label nor the log says how large the image is")
         limits.check(*self.size)
-        found = np.zeros(self.size[::-1], np.uint16)
+        painted = np.zeros(self.size[::-1], np.uint16)
         for shape in self.shapes:
-            found[shape.fill(self.size)] = values[shape.label]
-        return found
+            painted[shape.fill(self.size)] = values[shape.label]
+        return painted
 
 
 class Proposal(NamedTuple):
@@ -168,8 +236,136 @@ class LabelFormat:
     """Whether a parsed file is of this format."""
     read: Callable[[Path, Any, Size | None], Iterable[Drawing]]
     """Return the label of each image in a parsed file of this format, given the size of the log's
-    images. A `LogError` says what cannot be used; a KeyError, TypeError or ValueError means that
-    the file is not as the format asks."""
+    images. A `LogError` or `BadMessage` says what cannot be used; a KeyError, TypeError or
+    ValueError means that the file, or the image, is not as the format asks."""
     write: Callable[[Sequence[Proposal]], Mapping[str, bytes]] | None = None
     """Returns the files of masks for an annotator to correct, by their names; None where it writes
     none."""
+    one_image: bool = False
+    """Whether a file is the label of one image, so that one that cannot be read costs that alone.
+    """
+
+
+@dataclass(frozen=True)
+class Meant:
+    """What the classes of drawn labels mean, as asked for."""
+
+    road: Set[str]
+    ignored: Set[str]
+    skip_roadless: bool
+
+
+def settled(
+    drawn: Sequence[Drawing], meant: Meant, broken: dict[str, str], notes: list[str]
+) -> list[Drawing]:
+    """Return the images whose shapes are known, ignored ones on top.
+
+    Images that are lost for a shape are added to the ``broken`` ones, with the reason, and
+    warnings, a sentence each, to the ``notes``.
+    """
+    whole = [known for drawing in drawn if (known := _with_known(drawing, meant, broken))]
+    shapes = [shape for drawing in drawn for shape in drawing.shapes]
+    for what, boxed in (
+        ("not drawn: where they lie on the road, it counts as road", False),
+        ("ignored as the boxes around them, for they have no outline", True),
+    ):
+        kinds = Counter(
+            f"{shape.label} ({shape.what})"
+            for shape in shapes
+            if isinstance(shape, Undrawn)
+            and shape.label not in meant.road
+            and (shape.label in meant.ignored) is boxed
+        )
+        if kinds:
+            named = ", ".join(f"{count} of {kind}" for kind, count in kinds.most_common())
+            notes.append(f"{kinds.total()} of {len(shapes)} shapes are {what}: {named}")
+    without = [drawing.image for drawing in whole if meant.road.isdisjoint(drawing.classes)]
+    if without and meant.road:
+        counted = "are left out" if meant.skip_roadless else "count as images without road"
+        advice = "" if meant.skip_roadless else "; `truth.skip_roadless` leaves them out"
+        notes.append(
+            f"{len(without)} of {len(drawn)} images have shapes, but none of road, and {counted} "
+            f"({some(without)}){advice}"
+        )
+        if meant.skip_roadless:
+            whole = [drawing for drawing in whole if drawing.image not in without]
+    notes += _hidden(whole, meant)
+    return whole
+
+
+def _with_known(drawing: Drawing, meant: Meant, broken: dict[str, str]) -> Drawing | None:
+    """Return an image with the shapes whose pixels are known; None if it is lost for another."""
+    shapes: list[Shape] = []
+    for shape in drawing.shapes:
+        if isinstance(shape, Undrawn) and (shape.box is None or shape.label not in meant.ignored):
+            if shape.label in meant.road | meant.ignored:
+                broken[drawing.image] = f"{shape.label} is drawn as a {shape.what}"
+                return None
+        else:
+            shapes.append(shape)
+    shapes.sort(key=lambda shape: shape.label in meant.ignored)
+    return replace(drawing, shapes=tuple(shapes))
+
+
+COARSE: Final = 480
+"""Pixels of the longer side of an image in which overlaps are looked for."""
+LOOKED_AT: Final = 30
+"""Images in which they are looked for, spread over all."""
+TOUCHING: Final = 0.005
+"""Share of the road's pixels that may cover another shape without a word: outlines that touch."""
+
+
+def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
+    """Yield a warning where road covers earlier shapes of other classes, which count as road."""
+    crossed = [drawing for drawing in drawn if _is_over(drawing, meant)]
+    places = np.linspace(0, len(crossed) - 1, min(LOOKED_AT, len(crossed)), dtype=int)
+    share, images, classes = 0.0, 0, Counter[str]()
+    for place in places.tolist():
+        with suppress(BadMessage, ValueError, TypeError, OverflowError):
+            under, road = _covered(crossed[place], meant)
+            if under.total() > TOUCHING * road:
+                share, images = share + under.total() / road, images + 1
+                classes += under
+    if images:
+        seen = f"{len(places)} images looked at" if len(places) < len(crossed) else "images"
+        total = len(places) if len(places) < len(crossed) else len(drawn)
+        names = ", ".join(name for name, _ in classes.most_common())
+        yield (
+            f"road was drawn over {names} in {images} of {total} {seen}: {share / images:.1%} of "
+            "the road's pixels there, which count as road; draw road first, or name these classes "
+            "in `labels.ignore`"
+        )
+
+
+def _is_over(drawing: Drawing, meant: Meant) -> bool:
+    """Whether a shape of road follows one of a class that is neither road nor ignored."""
+    labels = [shape.label for shape in drawing.shapes if shape.label not in meant.ignored]
+    first = next((n for n, label in enumerate(labels) if label not in meant.road), len(labels))
+    return not meant.road.isdisjoint(labels[first:])
+
+
+def _covered(drawing: Drawing, meant: Meant) -> tuple[Counter[str], int]:
+    """Return how many pixels of road cover an earlier shape, by its class, and how many there are.
+
+    Pixels are those of a reduced image.
+    """
+    assert drawing.size is not None
+    step = -(-max(drawing.size) // COARSE)
+    small = (-(-drawing.size[0] // step), -(-drawing.size[1] // step))
+    names = ["", *drawing.classes]
+    top, under = np.zeros((2, *small[::-1]), np.uint16)
+    road = np.zeros(small[::-1], np.bool_)
+    for shape in drawing.shapes:
+        if isinstance(shape, Outline):
+            ring = (np.asarray(shape.ring, np.float64) / step).tolist()
+            area = shape._replace(ring=ring).fill(small)
+        else:
+            area = shape.fill(drawing.size)[::step, ::step]
+        if shape.label in meant.road:
+            under = np.where(area & (top > 0), top, under)
+            top[area], road[area] = 0, True
+        else:
+            top[area], under[area], road[area] = names.index(shape.label), 0, False
+    pixels = np.bincount(under.ravel(), minlength=len(names)).tolist()
+    counts = {name: n for name, n in zip(names[1:], pixels[1:], strict=True) if n}
+    return Counter(counts), int(road.sum())

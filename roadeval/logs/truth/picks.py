@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,9 @@ from roadeval.data import ROAD, Truth
 from roadeval.images import Limits
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth.drawn import PROPOSED, Proposal
-from roadeval.logs.truth.formats import standard
+from roadeval.logs.truth.formats.coco import COCO
+from roadeval.logs.truth.formats.cvat import CVAT
+from roadeval.logs.truth.formats.labelme import LABELME
 from roadeval.runtime.documents import read_bounded, read_json
 
 PICK: Final = "pick.json"
@@ -29,7 +31,7 @@ PROPOSALS: Final = "proposals"
 LABELS: Final = "labels"
 """What the folder of picked frames holds: this file, and these folders."""
 FORMAT: Final = {"name": "roadeval-pick", "version": 1}
-WRITTEN: Final = {"coco": standard.COCO, "labelme": standard.LABELME, "cvat": standard.CVAT}
+WRITTEN: Final = {"coco": COCO, "labelme": LABELME, "cvat": CVAT}
 """Formats of annotation tools in which masks to correct are written."""
 
 
@@ -135,6 +137,7 @@ def as_read(format_: str, proposal: Proposal) -> npt.NDArray[np.bool_]:
         return proposal.road
     (content,) = proposal_files(format_, [proposal]).values()
     (drawn,) = WRITTEN[format_].read(Path(proposal.image), json.loads(content), None)
+    drawn = replace(drawn, shapes=[*drawn.shapes])
     values = {name: int(name == PROPOSED) for name in drawn.classes}
     return np.equal(drawn.pixels(values, Limits()), 1)
 

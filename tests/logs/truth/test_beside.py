@@ -23,7 +23,7 @@ from roadeval.logs import (
 )
 from roadeval.logs.errors import FrameError
 from roadeval.logs.truth.beside import GREATEST, labels_in
-from roadeval.logs.truth.formats.standard import lengths_in
+from roadeval.logs.truth.formats.coco import lengths_in
 from tests.e2e.commands import here
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 from tests.logs.truth.test_folder import opened
@@ -217,7 +217,6 @@ WRONG = {
     "a text of other letters": coco({"counts": "\u20ac!"}),
     "a huge image": coco(SQUARE, width=10**9, height=10**9),
     "a negative one": coco(SQUARE, width=-48),
-    "no width": coco(SQUARE, width=None),
     "a list": [],
     "no images": {"images": 3, "annotations": [], "categories": []},
     "a class that is not listed": coco(SQUARE) | {"categories": []},
@@ -344,19 +343,19 @@ def test_json_that_nests_deep_or_is_too_large_is_refused(tmp_path):
 
 def test_a_line_of_yolo_is_read_in_a_time_that_grows_with_its_length(tmp_path):
     (tmp_path / "1.txt").write_text("0" + " -1" * 5000 + " x")
-    quickly(lambda: labels_in(tmp_path / "1.txt", SIZE), "not labels of YOLO segmentation")
+    quickly(lambda: labels_in(tmp_path / "1.txt", SIZE), "line 1 is no class with an outline")
 
 
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
-        ("1.txt", "0 .5 .5 .2 .2", "boxes, as for detection"),
+        ("1.txt", "0 .5 .5 .2 .2", "0 is drawn as a box without an outline"),
         ("a.xml", "<annotations><track/></annotations>", "tracks of a video"),
         (
             "a.xml",
-            '<annotations><image name="1.png" width="48" height="32"><ellipse label="a"/></image>'
+            '<annotations><image name="1.png" width="48" height="32"><spline label="a"/></image>'
             "</annotations>",
-            r"it holds a shape \(ellipse\)",
+            "1.png: a is drawn as a spline",
         ),
         ("a.json", {"shapes": [], "imageWidth": 4, "imageHeight": 4}, "LabelMe without a shape"),
     ],
@@ -364,18 +363,6 @@ def test_a_line_of_yolo_is_read_in_a_time_that_grows_with_its_length(tmp_path):
 def test_what_a_format_has_and_nobody_reads_is_said(tmp_path, name, content, reason):
     with pytest.raises(LogError, match=reason):
         labels_in(written(tmp_path / "truth", name, content), SIZE)
-
-
-def test_areas_of_a_brush_are_said_to_be_unread(tmp_path):
-    content = json.loads((LABELS / "label_studio" / "tasks.json").read_text())
-    # The value as label-studio-sdk's `brush.image2annotation` makes it.
-    content[0]["annotations"][0]["result"][0]["value"] = {
-        "rle": [0, 0, 24, 0, 57, 27, 255, 9, 55, 0],
-        "format": "rle",
-        "brushlabels": ["car"],
-    }
-    with pytest.raises(LogError, match=r"it holds brushlabels, .*; export masks as PNG"):
-        labels_in(written(tmp_path / "truth", "a.json", content), SIZE)
 
 
 def test_a_long_text_of_runs_is_read_in_a_time_that_grows_with_its_length():

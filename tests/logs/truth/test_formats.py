@@ -199,7 +199,7 @@ def test_outlines_are_those_of_scikit_image(points):
 
 @given(arrays(bool, (HEIGHT, WIDTH)))
 def test_runs_are_those_of_pycocotools(mask):
-    from roadeval.logs.truth.formats.standard import lengths_in
+    from roadeval.logs.truth.formats.coco import lengths_in
 
     encoded = coco.encode(np.asfortranarray(mask.astype(np.uint8)))
     lengths = lengths_in(encoded["counts"].decode())
@@ -210,7 +210,7 @@ def test_runs_are_those_of_pycocotools(mask):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_long_runs_are_those_of_pycocotools(seed):
-    from roadeval.logs.truth.formats.standard import lengths_in
+    from roadeval.logs.truth.formats.coco import lengths_in
 
     rng = np.random.default_rng(seed)
     mask = np.repeat(rng.random(40) < 0.5, rng.integers(1, 60_000, 40))

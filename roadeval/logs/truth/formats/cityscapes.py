@@ -1,0 +1,26 @@
+"""Label format: Cityscapes' polygons, a JSON file an image, in their order from back to front."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Size, flat, size_in
+
+
+def _is_cityscapes(_: Path, content: Any) -> bool:
+    return isinstance(content, dict) and {"imgWidth", "imgHeight", "objects"} <= content.keys()
+
+
+def _cityscapes(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
+    shapes = (
+        Outline(str(thing["label"]), flat(thing["polygon"]))
+        for thing in content["objects"]
+        if not thing.get("deleted")
+    )
+    yield Drawing(str(path), size_in(content, "imgWidth", "imgHeight"), shapes)
+
+
+CITYSCAPES: Final = LabelFormat("Cityscapes", ".json", _is_cityscapes, _cityscapes, one_image=True)
+FORMATS: Final = (CITYSCAPES,)

@@ -1,0 +1,134 @@
+"""Label format: COCO, polygons or runs of pixels, one JSON file."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.truth.drawn import (
+    PROPOSED,
+    Drawing,
+    LabelFormat,
+    Outline,
+    Proposal,
+    Runs,
+    Shape,
+    Size,
+    Undrawn,
+    rectangle,
+    size_in,
+)
+
+
+def _is_coco(_: Path, content: Any) -> bool:
+    keys = {"images", "annotations", "categories"}
+    return isinstance(content, dict) and keys <= content.keys()
+
+
+def _coco(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
+    categories = _by_id(path, "category", content["categories"])
+    names = {number: str(category["name"]) for number, category in categories.items()}
+    images = _by_id(path, "image", content["images"])
+    annotations = defaultdict(list)
+    for annotation in content["annotations"]:
+        if "segments_info" in annotation:
+            raise LogError(f"{path}: COCO panoptic; save its masks as PNG files, one a frame")
+        annotations[annotation["image_id"]].append(annotation)
+    for number in annotations.keys() - images.keys():
+        raise LogError(f"{path}: annotations are of image {number}, which is not listed")
+    for number, image in images.items():
+        size = size_in(image)
+        shapes = _shapes(annotations[number], names, size)
+        yield Drawing(str(image["file_name"]), size, shapes)
+
+
+def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[Any, Any]:
+    """Return images or categories by their ids; a `LogError` if an id is used twice."""
+    numbered: dict[Any, Mapping[str, Any]] = {}
+    for entry in listed:
+        if numbered.setdefault(entry["id"], entry) is not entry:
+            raise LogError(
+                f"{path}: two entries have the {what} id {entry['id']}, so it is not certain what "
+                "an annotation belongs to; merge the files by a tool that numbers them anew"
+            )
+    return numbered
+
+
+def _shapes(
+    annotations: Iterable[Mapping[str, Any]], names: Mapping[Any, str], size: Size | None
+) -> Iterator[Shape]:
+    for annotation in annotations:
+        if (label := names.get(annotation["category_id"])) is None:
+            raise BadMessage(f"an annotation of category {annotation['category_id']}, not listed")
+        match annotation.get("segmentation"):
+            case {"counts": counts, **rest}:
+                yield run_lengths(label, counts, rest.get("size"), size)
+            case [[*_], *_] as rings if any(rings):
+                yield from (Outline(label, ring) for ring in rings if ring)
+            case None | [] | [[]]:
+                left, top, width, height = annotation.get("bbox") or (0, 0, 0, 0)
+                box = rectangle(label, left, top, left + width, top + height) if width else None
+                yield Undrawn(label, "box without an outline", box)
+            case other:
+                yield Outline(label, other)
+
+
+def run_lengths(label: str, counts: Any, stated: Any, size: Size | None) -> Runs:
+    """Return an area of runs, with the height and width that are stated beside them."""
+    if size is not None and stated is not None and (stated[1], stated[0]) != size:
+        raise BadMessage(
+            f"a mask of {label} that is {stated[1]}x{stated[0]}, on an image of {size[0]}x{size[1]}"
+        )
+    return Runs(label, lengths_in(counts) if isinstance(counts, str) else counts, by_columns=True)
+
+
+def lengths_in(text: str) -> Sequence[int]:
+    """Return the lengths of the runs that COCO writes as a text.
+
+    A number has five bits in each letter, the lowest ones first, and from the fourth number on it
+    is the difference from the last but one.
+    """
+    lengths: list[int] = []
+    value = shift = 0
+    for letter in text.encode():
+        code = letter - 48
+        value |= (code & 31) << shift
+        shift += 5
+        if code & 32 and shift < 60:  # no number is longer
+            continue
+        if code & 16:
+            value -= 1 << shift
+        lengths.append(value + (lengths[-2] if len(lengths) > 2 else 0))
+        value = shift = 0
+    return lengths
+
+
+def _as_coco(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+    """Return one file, with a region of uncompressed runs for each image."""
+    images, annotations = [], []
+    for number, each in enumerate(proposals, 1):
+        width, height = each.size
+        rows, columns = (np.flatnonzero(each.road.any(axis=axis)).tolist() for axis in (1, 0))
+        box = [0, 0, 0, 0]
+        if rows:
+            left, top = columns[0], rows[0]
+            box = [left, top, columns[-1] + 1 - left, rows[-1] + 1 - top]
+        images.append({"id": number, "file_name": each.image, "width": width, "height": height})
+        about = {"id": number, "image_id": number, "category_id": 1, "iscrowd": 1}
+        runs = {"size": [height, width], "counts": each.runs(by_columns=True)}
+        annotations.append(
+            {**about, "area": int(each.road.sum()), "bbox": box, "segmentation": runs}
+        )
+    content = {"images": images, "annotations": annotations}
+    content["categories"] = [{"id": 1, "name": PROPOSED}]
+    return {"instances.json": json.dumps(content).encode()}
+
+
+COCO: Final = LabelFormat("COCO", ".json", _is_coco, _coco, _as_coco)
+FORMATS: Final = (COCO,)

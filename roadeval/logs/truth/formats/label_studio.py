@@ -1,0 +1,181 @@
+"""Label format: Label Studio's JSON and JSON-MIN; points are percents of the image's size."""
+
+from __future__ import annotations
+
+import json
+import re
+from base64 import b64decode
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import parse_qs, unquote, urlsplit
+
+import numpy as np
+
+from roadeval.images import Limits, to_labels
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.truth.drawn import (
+    Drawing,
+    LabelFormat,
+    Outline,
+    Proposal,
+    Runs,
+    Shape,
+    Size,
+    ellipse,
+    rectangle,
+    size_in,
+)
+
+_UPLOADED: Final = re.compile(r"(?:[0-9a-f]{8}-)?(.+)")
+"""The name of an uploaded image, without the eight digits that the upload puts before it."""
+_PLACE: Final = ("points", "x", "rle", "imageDataURL")
+"""What says where a region is."""
+_AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL")
+"""What says which pixels it has: a key point has none of these, and is left out."""
+OPAQUE: Final = 127
+"""A pixel of a brush's edge belongs to it if it is opaque by more than a half."""
+
+
+def _is_label_studio(_: Path, content: Any) -> bool:
+    first = content[0] if isinstance(content, list) and content else None
+    return isinstance(first, dict) and ("annotations" in first or "annotation_id" in first)
+
+
+def _label_studio(
+    _: Path, content: list[Mapping[str, Any]], size: Size | None
+) -> Iterator[Drawing]:
+    annotations: defaultdict[Any, list[Mapping[str, Any]]] = defaultdict(list)
+    tasks = {}
+    for place, task in enumerate(content):
+        number = task.get("id", f"number {place}")
+        tasks[number] = task
+        annotations[number] += task.get("annotations", [task])
+    for number, task in tasks.items():
+        regions = [region for made in annotations[number] for region in _results(made)]
+        stated = next(filter(None, (_size(region) for region in regions)), None)
+        about = f"task {number}"
+        yield Drawing(
+            _image(task, regions), stated, _shapes(annotations[number], about, stated or size)
+        )
+
+
+def _results(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the regions of an annotation: its results, or, in JSON-MIN, all lists of a task."""
+    if "result" in annotation:
+        return list(annotation["result"])
+    lists = (value for value in annotation.values() if isinstance(value, list))
+    return [region for values in lists for region in values if isinstance(region, dict)]
+
+
+def _size(region: Mapping[str, Any]) -> Size | None:
+    return size_in({**region, **region.get("value", {})}, "original_width", "original_height")
+
+
+def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str:
+    """Return the name of a task's image: of the field that the regions refer to, if it is there."""
+    data = task.get("data", task)
+    texts = {name: text for name, text in data.items() if isinstance(text, str)}
+    wanted = [texts[name] for r in regions if (name := r.get("to_name")) in texts]
+    files = [text for text in texts.values() if re.search(r"\.[a-zA-Z]\w{2,3}($|\?)", text)]
+    address = next(iter([*wanted, *files, *(text for text in texts.values() if "/" in text)]), None)
+    if address is None:
+        raise ValueError("a task without an image")
+    parts = urlsplit(address) if "?" in address or "://" in address else None
+    path = address if parts is None else parts.path
+    if parts is not None and (local := parse_qs(parts.query).get("d")):  # a file of its own disk
+        (path,) = local
+    if parts is not None and (hidden := parse_qs(parts.query).get("fileuri")):
+        path = urlsplit(b64decode(hidden[0]).decode()).path
+    *folders, name = unquote(path).strip("/").split("/")
+    uploaded = _UPLOADED.fullmatch(name)
+    above = [] if "upload" in folders else folders[-1:]
+    return "/".join([*above, uploaded[1] if uploaded else name])
+
+
+def _shapes(
+    annotations: Sequence[Mapping[str, Any]], about: str, size: Size | None
+) -> Iterator[Shape]:
+    made = [each for each in annotations if not each.get("was_cancelled")]
+    if len(made) > 1:
+        made = [each for each in made if each.get("ground_truth")] or made
+    if len(made) > 1:
+        who = " and ".join(str(each.get("completed_by", each.get("annotator"))) for each in made)
+        raise BadMessage(
+            f"{about} has {len(made)} annotations (of annotators {who}): mark one of them as "
+            "ground truth in Label Studio and export JSON, or delete the others"
+        )
+    # A region and its class may be two results of one id.
+    merged: dict[Any, dict[str, Any]] = {}
+    for region in _results(made[0]) if made else ():
+        value = {**region, **region.get("value", {})}
+        place = next((json.dumps(value[name]) for name in _PLACE if name in value), None)
+        merged.setdefault(region.get("id", place), {}).update(value)
+    for region in merged.values():
+        if any(region.get(name) is not None for name in _AREAS):
+            yield _shape(region, size)
+
+
+def _shape(region: Mapping[str, Any], size: Size | None) -> Shape:
+    named = [v for k, v in region.items() if k.endswith("labels") and isinstance(v, list)]
+    labels = [str(label) for values in named for label in values]
+    if len(labels) != 1:
+        raise BadMessage(f"a region of {' and '.join(labels) or 'no class'}: give it one class")
+    (label,) = labels
+    if size is None or region.get("image_rotation"):
+        raise BadMessage(f"a region of {label} on an image that was turned, or of unknown size")
+    across, down = size[0] / 100, size[1] / 100
+    degrees = float(region.get("rotation") or 0)
+    if "rle" in region:
+        return _brushed(label, region["rle"], size)
+    if "imageDataURL" in region:
+        pixels = to_labels(b64decode(region["imageDataURL"].partition(",")[2]), Limits())
+        area = Proposal("", pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
+        return Runs(label, area.runs(), (0, 0, *area.size))
+    if "points" in region:
+        return Outline(label, [n for x, y in region["points"] for n in (x * across, y * down)])
+    x, y = region["x"] * across, region["y"] * down
+    if "radiusX" in region:
+        across, down = region["radiusX"] * across, region["radiusY"] * down
+        return ellipse(label, x, y, across, down).turned(degrees, (x, y))
+    right, bottom = x + region["width"] * across, y + region["height"] * down
+    return rectangle(label, x, y, right, bottom).turned(degrees, (x, y))  # about its first corner
+
+
+def _brushed(label: str, numbers: Sequence[int], size: Size) -> Runs:
+    """Return an area that was painted with the brush.
+
+    The bytes are bits: 32 with the number of values, which are four a pixel; 5 with the bits of a
+    value, 4 for each of four lengths, all less one. Then come blocks: a bit whether one value is
+    repeated, 2 bits that choose a length, as many bits as that says with the number of values less
+    one, and the values. The fourth value of a pixel is how opaque it is.
+    """
+    bits = "".join(f"{number:08b}" for number in numbers)
+    place = 0
+
+    def read(width: int) -> int:
+        nonlocal place
+        place += width
+        return int(bits[place - width : place], 2)
+
+    total, width = read(32), read(5) + 1
+    if total != 4 * size[0] * size[1]:
+        raise BadMessage(f"a mask of {label} for an image of another size")
+    Limits().check(*size)
+    lengths = [read(4) + 1 for _ in range(4)]
+    values = np.zeros(total, np.uint8)
+    start = 0
+    while start < total:
+        is_repeated = read(1)
+        end = start + 1 + read(lengths[read(2)])
+        values[start:end] = read(width) if is_repeated else [read(width) for _ in range(start, end)]
+        start = end
+    if start != total:
+        raise BadMessage(f"a mask of {label} that does not fit its image")
+    area = Proposal("", values.reshape(size[1], size[0], 4)[..., 3] > OPAQUE)
+    return Runs(label, area.runs())
+
+
+LABEL_STUDIO: Final = LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio)
+FORMATS: Final = (LABEL_STUDIO,)

@@ -1,0 +1,97 @@
+"""Label format: Scalabel and BDD100K, polygons with curves or runs of pixels, JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.truth.drawn import (
+    Drawing,
+    LabelFormat,
+    Outline,
+    Shape,
+    Size,
+    Undrawn,
+    flat,
+    rectangle,
+    size_in,
+)
+from roadeval.logs.truth.formats.coco import run_lengths
+
+_STEPS: Final = np.linspace(0, 1, 25)[1:, None]
+"""Where points lie on a curve, from its beginning to its end."""
+
+
+def _frames(content: Any) -> list[Mapping[str, Any]]:
+    """Return the images of a file; the older files of BDD100K have one each, with its name."""
+    if isinstance(content, dict) and isinstance(content.get("frames"), list):
+        frames: list[Mapping[str, Any]] = content["frames"]
+        return [{"name": content.get("name"), **frame} for frame in frames]
+    return content if isinstance(content, list) else []
+
+
+def _is_scalabel(_: Path, content: Any) -> bool:
+    return any("name" in frame and {"labels", "objects"} & {*frame} for frame in _frames(content))
+
+
+def _scalabel(_path: Path, content: Any, _: Size | None) -> Iterator[Drawing]:
+    config = content.get("config") if isinstance(content, dict) else None
+    common = size_in((config or {}).get("imageSize") or {})
+    for frame in _frames(content):
+        size = size_in(frame.get("size") or {}) or common
+        yield Drawing(str(frame["name"]), size, _shapes(frame, size))
+
+
+def _shapes(frame: Mapping[str, Any], size: Size | None) -> Iterator[Shape]:
+    for part in frame.get("labels") or frame.get("objects") or ():
+        label = str(part["category"])
+        if (runs := part.get("rle")) is not None:
+            yield run_lengths(label, runs["counts"], runs.get("size"), size)
+        elif polygons := part.get("poly2d"):
+            # Formerly a single list of points, each with its type.
+            whole = polygons if isinstance(polygons[0], dict) else [_with_types(polygons)]
+            for polygon in whole:
+                if polygon.get("closed", True):
+                    yield Outline(label, _ring(label, polygon["vertices"], polygon.get("types")))
+        elif box := part.get("box2d"):
+            corners = (box[name] for name in ("x1", "y1", "x2", "y2"))
+            yield Undrawn(label, "box without an outline", rectangle(label, *corners))
+
+
+def _with_types(points: Sequence[Sequence[Any]]) -> Mapping[str, Any]:
+    types = "".join(point[2] for point in points)
+    return {"vertices": [point[:2] for point in points], "types": types}
+
+
+def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> Sequence[float]:
+    """Return the points of a polygon, those of its curves included.
+
+    A ``C`` is a point of a cubic curve: three in a row are two control points and the end, as
+    BDD100K's toolkit draws them; two in a row lie before a corner, as Scalabel draws them.
+    """
+    if types is None or "C" not in types:
+        return flat(points)
+    if len(types) != len(points) or {*types} - {*"LC"} or types[0] != "L":
+        raise BadMessage(f"a polygon of {label} whose curves are not as Scalabel writes them")
+    corners = np.array([*points, points[0]], np.float64)
+    ring, place = [corners[0]], 1
+    while place < len(points):
+        if types[place] == "L":
+            ring.append(corners[place])
+            place += 1
+            continue
+        if types[place : place + 2] != "CC" or place + 2 > len(points):
+            raise BadMessage(f"a curve of {label} that has not two control points")
+        one, two, end = corners[place : place + 3]
+        start, t = ring[-1], _STEPS
+        curve = start * (1 - t) ** 3 + 3 * one * t * (1 - t) ** 2
+        ring += [*(curve + 3 * two * t**2 * (1 - t) + end * t**3)]
+        place += 3
+    return np.ravel(ring).tolist()
+
+
+FORMATS: Final = (LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _scalabel),)

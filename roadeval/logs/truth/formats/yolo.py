@@ -1,0 +1,63 @@
+"""Label format: YOLO segmentation, a text file an image; points are shares of its size.
+
+Classes have numbers; what they are called stands in files that differ from tool to tool.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.truth.drawn import (
+    Drawing,
+    LabelFormat,
+    Outline,
+    Shape,
+    Size,
+    Undrawn,
+    rectangle,
+)
+
+_LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]", re.MULTILINE)
+"""How a line begins: names of classes, in a file beside the labels, do not."""
+_FARTHEST: Final = 2
+"""Shares beyond the image's edge are rounded ones, or cut off; others are pixels."""
+
+
+def _is_yolo(_: Path, content: str) -> bool:
+    return not content.strip() or _LINE.search(content) is not None
+
+
+def _yolo(path: Path, content: str, size: Size | None) -> Iterator[Drawing]:
+    if size is None:
+        raise LogError(f"{path}: its points are shares of the image's size, which is not known")
+    yield Drawing(str(path), size, _shapes(content, size))
+
+
+def _shapes(content: str, size: Size) -> Iterator[Shape]:
+    for number, line in enumerate(content.splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            label, *shares = line.split()
+            flat = [float(share) * size[place % 2] for place, share in enumerate(shares)]
+            label = str(int(label))
+            if int(label) < 0 or len(flat) % 2 or len(flat) < 4:
+                raise ValueError
+        except (ValueError, OverflowError) as error:
+            raise BadMessage(f"line {number} is no class with an outline") from error
+        if max(map(abs, map(float, shares))) > _FARTHEST:
+            raise BadMessage(f"line {number} has points that are no shares of the image's size")
+        if len(flat) == 4:
+            x, y, width, height = (number / 2 for number in flat)
+            box = rectangle(label, 2 * x - width, 2 * y - height, 2 * x + width, 2 * y + height)
+            yield Undrawn(label, "box without an outline", box)
+        else:
+            yield Outline(label, flat)
+
+
+YOLO: Final = LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo, one_image=True)
+FORMATS: Final = (YOLO,)

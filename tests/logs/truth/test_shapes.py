@@ -1,0 +1,310 @@
+"""What annotation tools can draw beyond plain outlines, and what becomes of each shape."""
+
+import numpy as np
+import pytest
+
+from roadeval.images import Limits
+from roadeval.logs import LabelSettings, LogError, MaskSettings
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.truth.beside import labels_in
+from tests.logs.truth.test_beside import coco, written
+from tests.logs.truth.test_formats import HEIGHT, SIZE, WIDTH, inside
+
+SQUARE = [[10, 10], [20, 10], [20, 20], [10, 20]]
+
+
+def read(folder, name, content, *, ignore=(), road=("road",), **asked):
+    """The truth of each label by its name, and the warnings; lost labels by their reason."""
+    path = written(folder / "truth", name, content)
+    settings = MaskSettings(str(path), labels=LabelSettings(road, ignore), **asked)
+    origin = labels_in(path, SIZE, settings)
+    found = {}
+    for label in origin.labels:
+        try:
+            picture = label.picture(label.content(), Limits())
+        except BadMessage as error:
+            found[label.path.name] = str(error)
+        else:
+            values = np.frombuffer(picture.data, "<u2").reshape(picture.height, picture.width)
+            names = ["", *origin.classes]
+            found[label.path.name] = np.array(names)[values]
+    return found, origin.notes
+
+
+def one(folder, name, content, **asked):
+    (label,) = read(folder, name, content, **asked)[0].values()
+    return label
+
+
+def image_xml(*shapes, size='width="48" height="32"'):
+    return f'<annotations><image name="1.png" {size}>{"".join(shapes)}</image></annotations>'
+
+
+def labelme(*shapes, **size):
+    drawn = [{"label": label, "shape_type": kind, "points": at} for label, kind, at in shapes]
+    return {"shapes": drawn, "imageWidth": WIDTH, "imageHeight": HEIGHT} | size
+
+
+def task(*regions, data=None, **annotation):
+    common = {"original_width": WIDTH, "original_height": HEIGHT, "to_name": "image"}
+    made = {"result": [common | region for region in regions]} | annotation
+    return {"id": 7, "data": data or {"image": "1.png"}, "annotations": [made]}
+
+
+def percent(points):
+    return [[100 * x / WIDTH, 100 * y / HEIGHT] for x, y in points]
+
+
+def region(**value):
+    return {"value": {"polygonlabels": ["road"], **value}}
+
+
+POLYGON = region(points=percent(SQUARE))
+VIA = {
+    "shape_attributes": {
+        "name": "polygon",
+        "all_points_x": [x for x, _ in SQUARE],
+        "all_points_y": [y for _, y in SQUARE],
+    },
+    "region_attributes": {"class": "road"},
+}
+VERTICES = {"vertices": SQUARE, "types": "LLLL", "closed": True}
+VIA_IMAGE = {"filename": "1.png", "size": 9, "regions": [VIA]}
+AREA = {"category": "road", "poly2d": [VERTICES]}
+TYPED = {"category": "road", "poly2d": [[x, y, "L"] for x, y in SQUARE]}
+CUT = "https://b.s3.amazonaws.com/x/1.png?X-Amz-Date=20240101T000000Z&X-Amz-Signature=a.b0"
+
+SAME = {
+    "Cityscapes": ("1.json", {"imgWidth": 48, "imgHeight": 32, "objects": [
+        {"label": "road", "polygon": SQUARE},
+        {"label": "car", "polygon": [[0, 0], [48, 0], [48, 32]], "deleted": 1},
+    ]}),
+    "VIA, a project": ("a.json", {"_via_settings": {}, "_via_img_metadata": {"1.png9": VIA_IMAGE}}),
+    "VIA, an export": ("a.json", {"1.png9": VIA_IMAGE}),
+    "VIA 1": ("a.json", {"1.png9": VIA_IMAGE | {"regions": {"0": VIA}}}),
+    "VIA, ticked": ("a.json", {"1.png9": VIA_IMAGE | {"regions": [
+        VIA | {"region_attributes": {"class": {"road": True, "car": False}, "wet": "no"}}
+    ]}}),
+    "Scalabel": ("a.json", {"frames": [{"name": "1.png", "labels": [AREA]}], "config": {}}),
+    "BDD100K": ("a.json", [{"name": "0.png"}, {"name": "1.png", "labels": [AREA]}]),
+    "BDD100K, an image": ("1.json", {"name": "1", "frames": [{"objects": [TYPED]}]}),
+    "Scalabel, runs": ("a.json", [{"name": "1.png", "labels": [{"category": "road", "rle": {
+        "counts": [10 * 32 + 10, *[10, 22] * 9, 10, 12 + 28 * 32], "size": [32, 48]}}]}]),
+    "COCO, one list": ("a.json", coco([n for point in SQUARE for n in point])),
+    "COCO without a size": ("a.json", coco([[n for p in SQUARE for n in p]], width=None)),
+    "CVAT without a size": ("a.xml", image_xml(
+        '<polygon label="road" points="10,10;20,10;20,20;10,20"/>', size="")),
+    "CVAT, left by its track": ("a.xml", image_xml(
+        '<polygon label="road" points="10,10;20,10;20,20;10,20" z_order="1.0"/>',
+        '<polygon label="car" outside="1" points="10,10;20,10;20,20;10,20" z_order="2"/>')),
+    "LabelMe without a size": ("1.json", labelme(
+        ("road", "polygon", SQUARE), imageWidth=None, imageHeight=None)),
+    "LabelMe, oriented": ("1.json", labelme(("road", "oriented_rectangle", SQUARE))),
+    "X-AnyLabeling, four corners": ("1.json", labelme(("road", "quadrilateral", SQUARE))),
+    "LabelMe, points and lines beside it": ("1.json", labelme(
+        ("road", "polygon", SQUARE), ("car", "points", SQUARE), ("car", "linestrip", SQUARE))),
+    "YOLO with empty lines": ("1.txt", "\nroad 1".replace("road 1", "5 " + " ".join(
+        f"{x / WIDTH} {y / HEIGHT}" for x, y in SQUARE)) + "\n \n\n"),
+    "Label Studio": ("a.json", [task(POLYGON)]),
+    "Label Studio, signed": ("a.json", [task(POLYGON, data={"note": "x.jpg", "image": CUT})]),
+    "Label Studio, another field": ("a.json", [task(POLYGON, data={"url": "s3://b/x/1.png"})]),
+    "Label Studio, its disk": ("a.json", [
+        task(POLYGON, data={"image": "/data/local-files/?d=a%20b/1.png"})]),
+    "Label Studio, uploaded": ("a.json", [
+        task(POLYGON, data={"image": "/data/upload/7/1a2b3c4d-1.png"})]),
+    "Label Studio, two results": ("a.json", [task(
+        {"id": "a", "type": "polygon", "value": {"points": percent(SQUARE), "closed": True}},
+        {"id": "a", "type": "labels", "value": {"points": percent(SQUARE), "labels": ["road"]}})]),
+    "Label Studio, ground truth": ("a.json", [task(POLYGON, ground_truth=True) | {
+        "annotations": [
+            task(region(points=percent([[0, 0], [9, 0], [9, 9]])))["annotations"][0],
+            task(POLYGON, ground_truth=True)["annotations"][0],
+        ]}]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", SAME)
+def test_the_same_square_is_read_from_each_format(tmp_path, what):
+    label = one(tmp_path, *SAME[what], road=("5",) if "YOLO" in what else ("road",))
+    expected = np.where(inside(SQUARE), "5" if "YOLO" in what else "road", "")
+    np.testing.assert_array_equal(label, expected)
+
+
+def test_an_address_without_an_ending_names_its_image(tmp_path):
+    content = [task(POLYGON, data={"image": "https://x/0007", "by": "a.png"})]
+    assert [*read(tmp_path, "a.json", content)[0]] == ["0007"]
+
+
+TURNED = [(26.0, 11.0), (26.0, 31.0), (16.0, 31.0), (16.0, 11.0)]
+ABOUT_CORNER = [(11.0, 16.0), (11.0, 36.0), (1.0, 36.0), (1.0, 16.0)]
+AT = {"x": 100 * 11 / WIDTH, "y": 100 * 16 / HEIGHT, "rotation": 90}
+BOX = AT | {"width": 100 * 20 / WIDTH, "height": 100 * 10 / HEIGHT}
+TURNS = {
+    "CVAT, about its centre": (
+        "a.xml",
+        image_xml('<box label="road" xtl="11" ytl="16" xbr="31" ybr="26" rotation="90"/>'),
+        TURNED,
+    ),
+    "Label Studio, about its first corner": ("a.json", [task(region(**BOX))], ABOUT_CORNER),
+    "CVAT, a cuboid": (
+        "a.xml",
+        image_xml(
+            '<cuboid label="road" xtl1="10" ytl1="10" xbl1="10" ybl1="20" xtr1="16" ytr1="10" '
+            'xbr1="16" ybr1="20" xtl2="14" ytl2="6" xbl2="14" ybl2="16" xtr2="20" ytr2="6" '
+            'xbr2="20" ybr2="16"/>'
+        ),
+        [(10, 10), (14, 6), (20, 6), (20, 16), (16, 20), (10, 20)],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", TURNS)
+def test_turned_boxes_and_cuboids_are_drawn(tmp_path, what):
+    name, content, points = TURNS[what]
+    off = (one(tmp_path, name, content) == "road") ^ inside(points)
+    assert off.sum() <= 12  # edges that run through centres
+
+
+ELLIPSES = {
+    "CVAT": (
+        "a.xml",
+        image_xml('<ellipse label="road" cx="24" cy="16" rx="12" ry="6" rotation="30"/>'),
+    ),
+    "Label Studio": (
+        "a.json",
+        [task(region(x=50, y=50, radiusX=25, radiusY=18.75, rotation=30))],
+    ),
+    "VIA": ("a.json", {"1.png9": VIA_IMAGE | {"regions": [VIA | {"shape_attributes": {
+        "name": "ellipse", "cx": 24, "cy": 16, "rx": 12, "ry": 6, "theta": np.pi / 6}}]}}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ELLIPSES)
+def test_ellipses_are_drawn_turned_clockwise(tmp_path, what):
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5 - np.array([16, 24])[:, None, None]
+    along, across = (x * np.cos(a) + y * np.sin(a) for a in (np.pi / 6, np.pi / 6 + np.pi / 2))
+    expected = (along / 12) ** 2 + (across / 6) ** 2 < 1
+    off = (one(tmp_path, *ELLIPSES[what]) == "road") ^ expected
+    assert off.sum() <= 2
+
+
+CIRCLES = {
+    "LabelMe": ("1.json", labelme(("road", "circle", [[24, 16], [30, 16]]))),
+    "VIA": ("a.json", {"1.png9": VIA_IMAGE | {"regions": [VIA | {"shape_attributes": {
+        "name": "circle", "cx": 24, "cy": 16, "r": 6}}]}}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", CIRCLES)
+def test_circles_are_drawn(tmp_path, what):
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    expected = np.hypot(x - 24, y - 16) < 6
+    assert ((one(tmp_path, *CIRCLES[what]) == "road") ^ expected).sum() <= 2
+
+
+@pytest.mark.parametrize("types", ["LCCCL", "LCCL"])
+def test_curves_of_bdd100k_are_cubic(tmp_path, types):
+    """As ``poly_to_patch`` of bdd100k 1.0 draws them, and as Scalabel 0.3 has them."""
+    points = [[10.2, 25.3], [10.2, 5.3], [35.2, 5.3], [35.2, 25.3], [22.2, 29.3]]
+    vertices = points if types == "LCCCL" else points[:4]
+    t = np.linspace(0, 1, 200)[:, None]
+    a, b, c, d = np.array(points[:4])
+    curve = a * (1 - t) ** 3 + 3 * b * t * (1 - t) ** 2 + 3 * c * t**2 * (1 - t) + d * t**3
+    part = {"category": "road", "poly2d": [{"vertices": vertices, "types": types, "closed": True}]}
+    label = one(tmp_path, "a.json", [{"name": "1.png", "labels": [part]}])
+    expected = inside([*curve.tolist(), *vertices[4:]])
+    assert ((label == "road") ^ expected).sum() <= 2
+
+
+def test_ids_that_are_used_twice_are_refused(tmp_path):
+    for what in ("image", "category"):
+        content = coco([[0, 0, 9, 0, 9, 9]])
+        listed = {"image": "images", "category": "categories"}[what]
+        content[listed] = [content[listed][0], content[listed][0] | {"name": "b", "file_name": "2"}]
+        with pytest.raises(LogError, match=f"two entries have the {what} id 1"):
+            read(tmp_path, "a.json", content)
+
+
+def test_a_mask_of_another_size_than_its_image_costs_that_image(tmp_path):
+    content = coco({"counts": [10, 48 * 32 - 10], "size": [48, 32]})
+    content["images"].append({"id": 2, "file_name": "2.png", "width": 48, "height": 32})
+    content["annotations"].append(
+        content["annotations"][0] | {"image_id": 2, "segmentation": [[0, 0, 9, 0, 9, 9]]}
+    )
+    found, _ = read(tmp_path, "a.json", content)
+    assert found["1.png"] == "a mask of road that is 32x48, on an image of 48x32"
+    assert (found["2.png"] == "road").any()
+
+
+# --- What the meaning of the classes decides ------------------------------------------------------
+
+
+def streets(*images):
+    """COCO: of each image the classes of its annotations, each a polygon or a box."""
+    names = ["road", "car", "tree"]
+    segmentations = {"road": [[0, 16, 48, 16, 48, 32, 0, 32]], "tree": [[0, 0, 9, 0, 9, 9, 0, 9]]}
+    return {
+        "images": [
+            {"id": n, "file_name": f"{n}.png", "width": 48, "height": 32}
+            for n in range(len(images))
+        ],
+        "categories": [{"id": n, "name": name} for n, name in enumerate(names)],
+        "annotations": [
+            {
+                "image_id": n,
+                "category_id": names.index(name.strip("[]")),
+                "bbox": [20, 18, 10, 10],
+                "segmentation": []
+                if "[" in name
+                else segmentations.get(name, [[20, 18, 30, 18, 30, 28, 20, 28]]),
+            }
+            for n, classes in enumerate(images)
+            for name in classes.split()
+        ],
+    }
+
+
+def counts(label):
+    return dict(zip(*(part.tolist() for part in np.unique(label, return_counts=True)), strict=True))
+
+
+@pytest.mark.parametrize("order", ["car road", "road car"])
+def test_an_ignored_class_is_ignored_wherever_it_was_drawn(tmp_path, order):
+    found, notes = read(tmp_path, "a.json", streets(order), ignore=("car",))
+    assert counts(found["0.png"]) == {"": 768, "car": 100, "road": 668}
+    assert not notes
+
+
+def test_road_over_an_earlier_class_is_told_with_its_share(tmp_path):
+    content = streets("car road", "road car", "tree road")
+    found, (note,) = read(tmp_path, "a.json", content)
+    assert counts(found["0.png"])["road"] == 768
+    assert note.startswith("road was drawn over car in 1 of 3 images: 13.0% of the road's pixels")
+
+
+def test_images_without_a_road_are_told_and_can_be_left_out(tmp_path):
+    content = streets("road", "car", "tree car", "road tree")
+    found, (note,) = read(tmp_path, "a.json", content)
+    assert len(found) == 4
+    assert note.startswith("2 of 4 images have shapes, but none of road, and count as images")
+    assert "(1.png, 2.png); `truth.skip_roadless` leaves them out" in note
+    found, (note,) = read(tmp_path, "a.json", content, skip_roadless=True)
+    assert [*found] == ["0.png", "3.png"]
+    assert "are left out (1.png, 2.png)" in note
+
+
+def test_boxes_without_an_outline_are_told_with_number_and_class(tmp_path):
+    content = streets("road [car]", "road car", "road")
+    found, (note,) = read(tmp_path, "a.json", content)
+    assert counts(found["0.png"])["road"] == 768
+    assert note.startswith("1 of 5 shapes are not drawn: where they lie on the road, it counts as")
+    assert note.endswith(": 1 of car (box without an outline)")
+    found, (note,) = read(tmp_path, "a.json", content, ignore=("car",))
+    assert counts(found["0.png"]) == {"": 768, "car": 100, "road": 668}
+    assert "1 of 5 shapes are ignored as the boxes around them" in note
+
+
+def test_a_box_in_place_of_the_road_costs_its_image(tmp_path):
+    found, _ = read(tmp_path, "a.json", streets("[road]", "road"))
+    assert found["0.png"] == "road is drawn as a box without an outline"
+    assert counts(found["1.png"])["road"] == 768
