@@ -167,7 +167,7 @@ def settle(
             check_size(chosen.name, chosen.size, camera)
             own = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
             reader = readers[chosen.name]
-            pairing = by_time(reader, camera)
+            pairing = by_time(reader, camera, asked.sync_offset_ms if name == TRUTH else 0.0)
             meaning = meaning_of(reader, own)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     no_truth = "" if truth.topic else truth.why

@@ -192,7 +192,7 @@ class Log:
             found = settle(self.topics, self._readers, self.config, of_rig=self._of_rig)
             if (place := self.config.truth).path:
                 settings = MaskSettings(**vars(place), labels=self.config.labels)
-                truth = self._beside_log(settings, found)
+                truth = self._beside_log(settings, found, self.config.topics.sync_offset_ms)
                 found = replace(found, labels={TRUTH: truth, **found.labels})
             beside = {
                 name: self._masks(name, own, found) for name, own in self.config.masks.items()
@@ -218,7 +218,9 @@ class Log:
             raise LogError(f"`masks` {name}: {reason}") from error
         return masks
 
-    def _beside_log(self, settings: MaskSettings, found: Selection) -> LabelSource:
+    def _beside_log(
+        self, settings: MaskSettings, found: Selection, offset_ms: float = 0.0
+    ) -> LabelSource:
         """Settle labels of a folder, of an annotation tool's file, or of another log."""
         log, topic = log_and_topic(settings.path)
         camera = found.camera
@@ -231,7 +233,7 @@ class Log:
             is_whole = images.sure == images.expected() == len(images)
             count = len(images) if is_whole else None
             labels = with_keys(origin, settings.path, settings, self._limits, count)
-            return beside_log(labels, settings, camera, lambda: labels.digest)
+            return beside_log(labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms)
         other = open_log(log, LogConfig(frames=self.config.frames))
         self._beside.append(other)
         if topic is None:
@@ -242,7 +244,7 @@ class Log:
         reader = other._readers[named(other.topics, topic, "topic").name]
         same = other.path.resolve() == self.path.resolve()
         name = "" if same else other.name
-        return beside_log(reader, settings, camera, lambda: other.digest, name)
+        return beside_log(reader, settings, camera, lambda: other.digest, name, offset_ms)
 
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with what is asked of one camera of several."""

@@ -94,6 +94,10 @@ class TopicSettings:
     ] = None
     """Milliseconds between the stamps of an image and its truth, at most. Default: half the frame
     period."""
+    sync_offset_ms: Annotated[
+        float, Interval(ge=-86_400_000, le=86_400_000), Flag("--sync-offset", "MS")
+    ] = 0.0
+    """Milliseconds to add to the stamps of the truth before it is paired: below 0 if it is late."""
     resize_truth: Annotated[bool, Flag("--resize-truth")] = False
     """Scale label images of another size to the image's (nearest pixel)."""
 

@@ -371,8 +371,11 @@ def beside_log(
     camera: Camera,
     digest: Callable[[], str],
     log: str = "",
+    offset_ms: float = 0.0,
 ) -> LabelSource:
     """Settle labels that have names, or those of a topic of another ``log``.
+
+    The offset is added to their stamps.
 
     A `LogError` if none belongs to a frame, they cannot be understood, or are of another size.
     """
@@ -384,7 +387,7 @@ def beside_log(
     else:
         raise LogError("`truth.images` is for labels with names: those of a log have none")
     if by == "stamp":
-        pairing = by_time(labels, camera)
+        pairing = by_time(labels, camera, offset_ms)
         check_times(pairing, labels.name, camera.clock)
     else:
         pairing = by_number(labels, settings, camera.images)

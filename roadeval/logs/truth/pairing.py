@@ -287,6 +287,22 @@ class Times:
         return int(self._times[position]) if position < self._sure else UNREADABLE
 
 
+@dataclass(frozen=True, eq=False)
+class Later:
+    """Stamps to each of which ``offset`` nanoseconds are added."""
+
+    stamps: Stamps
+    offset: int
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+    def stamp(self, position: int) -> int:
+        """Return the stamp at a position with the offset, or `UNREADABLE`."""
+        stamp = self.stamps.stamp(position)
+        return stamp if stamp == UNREADABLE else stamp + self.offset
+
+
 class Clock(StrEnum):
     """What the images of a log can be paired by."""
 
@@ -486,19 +502,22 @@ def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
     return min(bisect_left(range(len(stamps)), stamp, low, high, key=at), len(stamps) - 1)
 
 
-def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
+def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pairing:
     """Pair by stamps, by log times, or by order where the log has no times at all.
 
-    Order means something only if there is a label for each image.
+    The offset is added to the labels' times. Order means something only if there is a label for
+    each image.
     """
-    images, clock = camera.images, camera.clock
+    images, clock, offset = camera.images, camera.clock, round(offset_ms * 1e6)
     if clock is Clock.STAMP:
         period = median_period(images.log_times)
         in_order = period > 0 and _rise(images) and _rise(labels)
         reach = max(REACH * period, camera.tolerance_ns) if in_order else None
-        return Pairing(images, labels, camera.tolerance_ns, reach)
+        stamps = Later(labels, offset) if offset else labels
+        return Pairing(images, stamps, camera.tolerance_ns, reach)
     if clock is Clock.LOG_TIME:
-        return Pairing(Times(images.log_times), Times(labels.log_times), camera.tolerance_ns)
+        times = Times(images.log_times), Times(labels.log_times + offset)
+        return Pairing(*times, camera.tolerance_ns)
     count = min(labels.sure, len(labels) if len(images) == len(labels) else 0)
     unsure = len(images) - min(images.sure, labels.sure)
     frames = Times(range(len(images)), images.sure)
