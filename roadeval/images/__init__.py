@@ -11,6 +11,7 @@ from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.images.decoding import (
+        deep_samples,
         eight_bits,
         palette_indices,
         png_of,

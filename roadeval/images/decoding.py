@@ -34,22 +34,32 @@ MOST_SCANS: Final = 100
 can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
 
 
-def to_rgb(data: File, limits: Limits) -> Rgb:
-    """Decode an image file to ``(H, W, 3)`` uint8 RGB.
+def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
+    """Decode an image file to ``(H, W, 3)`` uint8 RGB; ``white`` is that of `eight_bits`.
 
-    16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels, and
-    opacity is left out. An `ImageError` if it is damaged, of no known format, or too large.
+    Grey fills all channels, and opacity is left out. An `ImageError` if it is damaged, of no known
+    format, or too large.
     """
     image = _decoded(data, limits)
     if isinstance(image, np.ndarray):
         return image
     if image.mode in _SAMPLES:
-        return np.repeat(eight_bits(_samples(image))[..., None], 3, axis=2)
+        return np.repeat(eight_bits(_samples(image), white)[..., None], 3, axis=2)
     return np.array(image.convert("RGB"))
 
 
+def deep_samples(data: File, limits: Limits) -> Array | None:
+    """Return the samples of a grey image of more than eight bits; None of any other.
+
+    Errors as of `to_rgb`.
+    """
+    format_ = format_of(data)
+    image = None if format_ is None or format_.plugin is None else _decoded(data, limits)
+    return _samples(image) if image and image.mode in _SAMPLES[1:] else None
+
+
 def to_labels(data: File, limits: Limits) -> Array:
-    """Decode a label image to ``(H, W)`` uint8 or uint16, or to ``(H, W, 3)`` if it has colours.
+    """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
     Of a file with a palette these are the palette's indices, or its greys if it has only greys.
     An image of three equal channels is a label image of one. Errors as of `to_rgb`.
@@ -65,7 +75,7 @@ def to_labels(data: File, limits: Limits) -> Array:
         return np.ascontiguousarray(used[indices, 0]) if greys else indices
     if image.mode in _SAMPLES:
         samples = _samples(image)
-        return samples if samples.dtype == np.uint16 else eight_bits(samples)
+        return samples if samples.dtype.kind != "f" else eight_bits(samples)
     return without_colours(np.array(image.convert("RGB")))
 
 
@@ -87,12 +97,17 @@ def without_colours(image: Rgb) -> Array:
     return np.ascontiguousarray(grey) if same else image
 
 
-def eight_bits(samples: Array) -> npt.NDArray[np.uint8]:
-    """Convert samples to 0..255: the upper half of 16 bits, floats from 0..1."""
-    if samples.dtype.kind == "u" and samples.dtype.itemsize == 2:
-        samples = samples >> 8
-    elif samples.dtype == np.float32:
-        samples = np.rint(np.clip(np.nan_to_num(samples), 0, 1) * 255)
+def eight_bits(samples: Array, white: float | None = None) -> npt.NDArray[np.uint8]:
+    """Convert samples of more than eight bits to 0..255, the upper eight of the bits in use.
+
+    ``white`` is the sample that becomes 255: by default the greatest of 16 bits, of floats 1.
+    """
+    if samples.dtype.kind == "f":
+        scale = np.float32(1 if white is None else 1 / white)
+        samples = np.rint(np.clip(np.nan_to_num(samples) * scale, 0, 1) * 255)
+    elif samples.dtype != np.uint8:
+        scale = np.float32(256 / ((white or np.iinfo(np.uint16).max) + 1))
+        samples = np.clip(samples * scale, 0, 255)
     return np.asarray(samples, np.uint8)
 
 
@@ -184,11 +199,10 @@ def _damage_in(format_: ImageFormat) -> Iterator[None]:
 
 
 def _samples(image: Any) -> Array:
-    """Return the numbers of an image as uint8, uint16 or float32, in this machine's byte order."""
+    """Return the numbers of an image, in this machine's byte order."""
     samples = np.array(image)
-    if samples.dtype == np.int32:  # how Pillow holds 16 bits of some formats, and all 32 of others
-        if samples.min() < 0 or samples.max() > np.iinfo(np.uint16).max:
-            raise ImageError("an image of 32-bit numbers")
+    # Pillow holds 16 bits of some formats, and all 32 of others, in 32.
+    if samples.dtype == np.int32 and 0 <= samples.min() <= samples.max() < 1 << 16:
         samples = samples.astype(np.uint16)
     return samples.astype(samples.dtype.newbyteorder("="), copy=False)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from heapq import heappushpop
 from itertools import islice
 from typing import Final, TypeVar
@@ -14,12 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import ROAD, Calibration, Frame, Rgb
+from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
 from roadeval.images import format_of
 from roadeval.logs.errors import BadMessage, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
-from roadeval.logs.messages.pixels import to_rgb
+from roadeval.logs.messages.pixels import deep_samples, to_rgb
 from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
 from roadeval.logs.topics.calibration import calibration_of
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
@@ -34,7 +35,15 @@ from roadeval.logs.truth.labels import (
     read_or_error,
     samples,
 )
-from roadeval.logs.truth.pairing import REACH, Camera, Clock, Partners, by_time, frames_of
+from roadeval.logs.truth.pairing import (
+    LOOKED_AT,
+    REACH,
+    Camera,
+    Clock,
+    Partners,
+    by_time,
+    frames_of,
+)
 
 TRUTH: Final = "/truth"
 SHADOW: Final = "/shadow"
@@ -63,6 +72,8 @@ class Selection:
     """The ground before the camera, for images of the size in which it was logged."""
     ground_why: str = ""
     """How it is known, or what is missing of a camera of which something is known."""
+    white: float | None = None
+    """The sample that is white in the camera's images; None of images of 8 bits."""
 
     @property
     def image(self) -> TopicInfo:
@@ -103,9 +114,16 @@ class Selection:
         return self.ground.scaled(*self.size) if self.ground and self.size else None
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the camera's images, a sentence each."""
+        if self.white in (None, 1, WHITE):
+            return ()
+        return (f"a sample of {self.white:g} is white; `frames.white` sets another",)
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Which topics were chosen and why, a sentence each."""
-        lines = [f"image: {self.image.name} ({self.image_why})"]
+        lines = [f"image: {self.image.name} ({'; '.join((self.image_why, *self.notes))})"]
         for name, source in self.labels.items():
             what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
             words = source.meaning.words
@@ -145,7 +163,7 @@ def settle(
     """
     asked = config.topics
     image, why = choose_image(topics, asked.image)
-    if image.problem:
+    if image.problem or "depth" in image.format.lower():
         _check_readable(readers[image.name], image)
     if config.truth.path:
         truth = Choice(None, "")
@@ -173,19 +191,54 @@ def settle(
     no_truth = "" if truth.topic else truth.why
     known = calibration_of(image, topics, readers)
     ground = ground_of(known[0], config.ground, image.size)
-    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, *ground)
+    white = _white_of(readers[image.name], config.frames.white)
+    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, *ground, white)
+
+
+BITS: Final = (8, 10, 12, 14, 16)
+"""Of the samples of cameras."""
+WHITE: Final = (1 << BITS[-1]) - 1
+BRIGHT: Final = 2.0
+"""Greatest sample, at most, of pictures of fractions, some of which go beyond 1."""
+
+
+def _white_of(images: TopicReader, asked: float | None) -> float | None:
+    """Return the sample that is white in a camera's pictures; None where they have 8 bits.
+
+    Unless it is asked for it follows from the greatest sample of some pictures of the whole topic.
+    """
+    most, kind = 0.0, ""
+    for _, picture in samples(images):
+        with suppress(BadMessage):
+            deep = deep_samples(picture, images.limits)
+            if deep is None or asked is not None:
+                return None if deep is None else asked
+            most, kind = max(most, float(deep[np.isfinite(deep)].max(initial=0))), deep.dtype.kind
+    if not kind or (kind == "f" and most <= BRIGHT):
+        return 1 if kind else None
+    return next(((1 << bits) - 1 for bits in BITS if most < 1 << bits), most)
 
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
     """Refuse, as a `LogError`, a topic of whose sampled messages none can be decoded."""
+    problem = topic.problem
     for _, picture in samples(reader):
-        with suppress(BadMessage):
+        try:
             to_rgb(picture, reader.limits)
+        except BadMessage as error:
+            problem = problem or str(error)
+        else:
             return
-    raise nothing_of(reader, topic.problem)
+    raise nothing_of(reader, problem)
 
 
 Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
+
+
+NAMED: Final = 5
+"""Frames that a sentence names."""
+FEW: Final = 10
+"""Where one in so many images is blank, it is told."""
 
 
 @dataclass(slots=True)
@@ -209,6 +262,10 @@ class Accounting:
     """Of these, those that repeat an earlier one, by stamp and content."""
     undecodable: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that could not be decoded, and why."""
+    odd_sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """Of the frames returned, those of another width and height than the topic's first."""
+    blank: dict[int, str] = field(default_factory=dict)
+    """Of the frames returned, those that are black or white."""
     in_chunks: set[int] = field(default_factory=set)
     """Those of them whose chunk cannot be read, which is a damage of the log by itself."""
 
@@ -219,14 +276,34 @@ class Accounting:
         return tuple(f"frame {number}: {self.undecodable[number]}" for number in lost)
 
     @property
-    def repeats(self) -> tuple[str, ...]:
-        """A sentence on images that repeat others; none where there are none."""
-        if not self.repeated:
-            return ()
-        return (
-            f"{self.repeated} of the {self.read} images repeat an earlier one, by stamp and "
-            "content; each of them is counted",
-        )
+    def notes(self) -> Iterator[str]:
+        """Sentences on images that repeat others, are blank, or have another size than the first.
+
+        Few that are blank are not told: they may be those in which an exposure settles.
+        """
+        if self.repeated:
+            yield (
+                f"{self.repeated} of the {self.read} images repeat an earlier one, by stamp and "
+                "content; each of them is counted"
+            )
+        for level in ("black", "white"):
+            blank = [number for number, own in self.blank.items() if own == level]
+            if blank and FEW * len(blank) >= self.read:
+                yield (
+                    f"{len(blank)} of the {self.read} images are {level} (frames {_named(blank)}): "
+                    "nothing can be seen in them, or learnt from them"
+                )
+        if self.odd_sizes:
+            sizes = sorted({f"{width}x{height}" for width, height in self.odd_sizes.values()})
+            yield (
+                f"the images' sizes vary: {len(self.odd_sizes)} of the {self.read} are not of the "
+                f"first one's size but {' or '.join(sizes)} (frames {_named(self.odd_sizes)}); "
+                "labels are held against their own images"
+            )
+
+
+def _named(frames: Iterable[int]) -> str:
+    return first_of([*map(str, sorted(frames))], NAMED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,8 +346,12 @@ class LoggedFrame:
         picture = self.picture
         if isinstance(picture, FrameError):
             raise picture
-        image = to_rgb(picture, self.selection.camera.images.limits)
+        image = to_rgb(picture, self.selection.camera.images.limits, self.selection.white)
         logged = image.shape[1], image.shape[0]
+        if logged != self.selection.image.size:
+            self.accounting.odd_sizes[self.number] = logged
+        if level := _blank(image):
+            self.accounting.blank[self.number] = level
         size = scaled_size(logged, self.selection.scale)
         labels = {name: self._label(label, logged, size) for name, label in self.labels.items()}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
@@ -390,6 +471,19 @@ class FrameStream:
         return False
 
 
+def looked_at(selection: Selection) -> Iterator[str]:
+    """Yield what some images of a camera show a user to know before a replay, a sentence each."""
+    count = len(selection.camera.images)
+    places = sorted({*np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist()})
+    if selection.image.kind is TopicKind.VIDEO:  # one after the other is quickest
+        places = [*range(min(LOOKED_AT, count))]
+    stream = FrameStream(replace(selection, labels={}), count, places, labelled=False)
+    for logged in stream:
+        with suppress(FrameError):
+            logged.decode()
+    yield from stream.accounting.notes
+
+
 def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int]) -> Iterator[int]:
     """Yield those of some frames, in order, that have a label, and read no more than that takes.
 
@@ -421,6 +515,21 @@ def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]
     whose = np.repeat(np.arange(len(streams)), [len(each) for each in streams])
     for place in whose[np.argsort(times, kind="stable")].tolist():
         yield place, next(streams[place])
+
+
+DARK, LIGHT = 16, 240
+"""Levels at most, and at least, of an image that is black, or white."""
+ALL: Final = 0.99
+"""Share of its samples."""
+
+
+def _blank(image: Rgb) -> str:
+    """Return ``black`` or ``white`` for an image that is nothing else; else empty."""
+    some = image[::4, ::4]
+    for level, share in (("black", (some <= DARK).mean()), ("white", (some >= LIGHT).mean())):
+        if share >= ALL:
+            return level
+    return ""
 
 
 def _averaged(image: Rgb, size: tuple[int, int]) -> Rgb:

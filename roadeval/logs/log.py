@@ -17,7 +17,7 @@ from roadeval.images import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import check_content, files_of
-from roadeval.logs.frames import TRUTH, FrameStream, Selection, settle, with_label
+from roadeval.logs.frames import TRUTH, FrameStream, Selection, looked_at, settle, with_label
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
@@ -352,7 +352,7 @@ def describe(
         verified = verify or log.size <= SMALL
         try:
             selection = log.select()
-            picks = selection.reasons
+            picks = (*selection.reasons, *looked_at(selection))
         except LogError as error:
             problem = str(error)
         sha256 = log.verify(on_bytes) if verified else None

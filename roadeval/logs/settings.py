@@ -68,7 +68,7 @@ def _time(moment: object) -> object:
 Time = Annotated[str, Checked(_time)]
 """A moment as `roadeval.logs.parse_time` reads it."""
 Count = Interval(ge=1, le=1_000_000_000)
-Value = Annotated[int, Interval(ge=0, le=65535)]
+Value = Annotated[int, Interval(ge=-32768, le=65535)]
 Name = Annotated[str, Len(1, 200)]
 Level = Annotated[int, Interval(ge=0, le=255)]
 Color = tuple[Level, Level, Level]
@@ -125,7 +125,8 @@ class LabelSettings:
     """Which values, or colours, of a label image mean road, and which are ignored.
 
     All others are non-road. With none given, a mask is understood by itself if its values are among
-    0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore.
+    0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore. Negative
+    values mean no label: they are ignored, unless they are named.
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
@@ -227,6 +228,9 @@ class FrameSettings:
         MAX_PIXELS
     )
     """Leave out images of more pixels. They are not decoded: a damaged head may claim any size."""
+    white: Annotated[float | None, Interval(gt=0), Flag("--white", "V", "Input")] = None
+    """The sample that is white in images of more than 8 bits. Default: the greatest of 8, 10, 12,
+    14 or 16 bits, whichever hold the samples of some of the camera's images; of fractions 1."""
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
             "[labels]\nroad_colors = [[1, 2]]",
             r"labels\.road_colors, item 1: is too short",
         ),
-        ("[labels]\nroad = [3, -1]", r"labels\.road, item 2: .*\(given: -1\)"),
+        ("[labels]\nroad = [3, -40000]", r"labels\.road, item 2: .*\(given: -40000\)"),
         ("[training.patch]\nx = 1", r"training\.patch.x: .*choose bottom, bottom_width, top"),
         ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
         ("chain = [['post']]", r"no stage \['post'\]"),

@@ -151,7 +151,7 @@ def read(path: Path, labels: LabelSettings = UNSAID) -> Reading:
                 truth = None if frame.truth is None else frame.truth.tobytes()
                 image = frame.image.tobytes()
                 frames.append((frame.log_time_ns, Seen(frame.stamp_ns, image, truth)))
-            told += [*log.losses, *stream.accounting.repeats]
+            told += [*log.losses, *stream.accounting.notes]
             without_truth = selection.no_truth
     except LogError as error:
         told.append(str(error))

@@ -79,9 +79,9 @@ def test_sixteen_bits_keep_the_upper_half() -> None:
         assert images.to_labels(data, LIMITS).tolist() == samples.tolist()
 
 
-def test_whole_numbers_of_thirty_two_bits_are_refused() -> None:
-    with pytest.raises(ImageError, match="32-bit"):
-        images.to_rgb(file("TIFF", np.array([[70_000]], np.int32)), LIMITS)
+def test_whole_numbers_of_thirty_two_bits_keep_their_sign_and_size() -> None:
+    data = file("TIFF", np.array([[70_000, -1]], np.int32))
+    assert images.to_labels(data, LIMITS).tolist() == [[70_000, -1]]
 
 
 def test_a_mask_of_one_bit_is_black_and_white() -> None:

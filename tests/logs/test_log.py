@@ -120,7 +120,7 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, ap
     with open_log(path) as log:
         stream = log.frames(log.select())
         assert sum(1 for _ in stream) == 7
-        (told,) = stream.accounting.repeats
+        (told,) = stream.accounting.notes
     assert told.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
 
 

@@ -106,12 +106,12 @@ def picture_in(message: Any) -> LoggedPicture:
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = message.format if hasattr(message, "format") else message.encoding
             data = _as(BUFFERS, message.data)
-            return CompressedPicture(stamp_ns, _as(str, name), data, frame_id)
+            return CompressedPicture(stamp_ns, _name(name), data, frame_id)
         return RawPicture(
             stamp_ns,
             int(message.width),
             int(message.height),
-            _as(str, message.encoding),
+            _name(message.encoding),
             int(getattr(message, "step", 0)),
             bool(getattr(message, "is_bigendian", False)),
             _as(BUFFERS, message.data),
@@ -119,6 +119,11 @@ def picture_in(message: Any) -> LoggedPicture:
         )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it lacks the fields of an image") from error
+
+
+def _name(text: Any) -> str:
+    """Return the name of an encoding; some writers fill its place up with zeros or blanks."""
+    return str(_as(str, text)).strip("\0 \t\r\n")
 
 
 def _as(kind: type | tuple[type, ...], value: Any) -> Any:

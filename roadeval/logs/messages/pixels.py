@@ -36,7 +36,7 @@ class PixelFormat:
     code: str | None
     """OpenCV's conversion to RGB; None for RGB itself."""
     rows: float = 1.0
-    """Rows stored for each image row, 3/2 for planar 4:2:0."""
+    """Rows stored for each image row: 3/2 for planar 4:2:0, 3 for 4:4:4."""
     block: tuple[int, int] = (1, 1)
     """Pixels of one block share their colours; width and height are whole multiples of it."""
 
@@ -54,8 +54,10 @@ def _formats() -> dict[str, PixelFormat]:
         "yuv422_yuy2": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
         "nv12": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV12", 1.5, (2, 2)),
         "nv21": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV21", 1.5, (2, 2)),
-        "32fc1": PixelFormat("f4", 1, "COLOR_GRAY2RGB"),
+        "nv24": PixelFormat("u1", 1, "COLOR_YUV2RGB_YUY2", 3),
     }
+    numbers = {"32fc1": "f4", "8sc1": "i1", "16sc1": "i2", "32sc1": "i4"}
+    formats |= {name: PixelFormat(of, 1, "COLOR_GRAY2RGB") for name, of in numbers.items()}
     for bits, dtype in (("8", "u1"), ("16", "u2")):
         formats |= {
             f"mono{bits}": PixelFormat(dtype, 1, "COLOR_GRAY2RGB"),
@@ -122,14 +124,20 @@ def rows_of(picture: RawPicture, limits: Limits) -> Array:
     return np.ascontiguousarray(array, dtype.newbyteorder("="))
 
 
-def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
-    """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own.
+def raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None = None) -> Rgb:
+    """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own; ``white`` as of `to_rgb`.
 
     A `BadMessage` if its encoding is unknown, or as of `rows_of`.
     """
     import cv2
 
-    samples, code = eight_bits(rows_of(picture, limits)), format_of(picture).code
+    samples, layout = eight_bits(rows_of(picture, limits), white), format_of(picture)
+    code = layout.code
+    if layout.rows == 3:
+        # As 4:2:2 in which each pixel comes twice, for OpenCV does not know 4:4:4.
+        y, uv = np.split(samples, [picture.height])
+        pairs = np.stack([np.stack([y, y], axis=2), uv.reshape(*y.shape, 2)], axis=3)
+        samples = pairs.reshape(picture.height, -1, 2)
     if code is None:
         # An array of its own: a part of a message may not be written to.
         return np.require(samples, requirements=["C", "W"])
@@ -138,25 +146,41 @@ def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
     except cv2.error as error:
         size = f"{picture.width}x{picture.height}"
         raise BadMessage(f"an image of {size} in {picture.encoding}: {error.err}") from error
-    return np.asarray(rgb, np.uint8)
+    return np.ascontiguousarray(rgb[:, :: 1 + (layout.rows == 3)], np.uint8)
 
 
-def to_rgb(picture: Picture, limits: Limits) -> Rgb:
-    """Decode a picture to ``(H, W, 3)`` uint8 RGB.
+def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
+    """Decode a picture to ``(H, W, 3)`` uint8 RGB; grey fills all channels.
 
-    16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels. A
-    `BadMessage` if it is damaged or cannot be decoded.
+    ``white`` is the sample of more than eight bits that is white: by default the greatest one of 16
+    bits, and 1 of fractions. A `BadMessage` if it is damaged or cannot be decoded.
     """
     if isinstance(picture, RawPicture):
-        return raw_to_rgb(picture, limits)
+        return raw_to_rgb(picture, limits, white)
     if isinstance(picture, CompressedPicture):
+        if _is_depth(picture):
+            raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
         with _bad_message():
-            return images.to_rgb(_image_file(picture), limits)
+            return images.to_rgb(picture.data, limits, white)
     return picture.pixels
 
 
+def deep_samples(picture: Picture, limits: Limits) -> Array | None:
+    """Return the samples of a picture that has more than eight bits; None of any other.
+
+    A `BadMessage` as of `to_rgb`.
+    """
+    if isinstance(picture, RawPicture):
+        is_deep = format_of(picture).dtype != "u1"
+        return rows_of(picture, limits) if is_deep else None
+    if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
+        return None
+    with _bad_message():
+        return images.deep_samples(file_of(picture), limits)
+
+
 def to_labels(picture: Picture, limits: Limits) -> Array:
-    """Decode a label picture to ``(H, W)`` uint8 or uint16, or to ``(H, W, 3)`` if it has colours.
+    """Decode a label picture to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
     Of an image with a palette these are the palette's indices, or its greys if it has only
     greys. An image of three equal channels is a label image of one.
@@ -166,10 +190,11 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
     if isinstance(picture, RawPicture):
         layout = format_of(picture)
         if layout.is_grey and layout.dtype != "f4":
-            return rows_of(picture, limits)
+            rows = rows_of(picture, limits)
+            return rows.astype(np.int16) if layout.dtype == "i1" else rows
     elif isinstance(picture, CompressedPicture):
         with _bad_message():
-            return images.to_labels(_image_file(picture), limits)
+            return images.to_labels(file_of(picture), limits)
     return without_colours(to_rgb(picture, limits))
 
 
@@ -183,7 +208,7 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return None
     with _bad_message():
-        return images.size_of(picture.data)
+        return images.size_of(file_of(picture))
 
 
 def lossy_format(picture: Picture) -> str:
@@ -192,7 +217,7 @@ def lossy_format(picture: Picture) -> str:
         return ""
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return "video"
-    format_ = images.format_of(picture.data)
+    format_ = images.format_of(file_of(picture))
     return "" if format_ is None or format_.exact else format_.name
 
 
@@ -204,8 +229,22 @@ def _bad_message() -> Iterator[None]:
         raise BadMessage(str(error)) from error
 
 
-def _image_file(picture: CompressedPicture) -> Buffer:
-    """Return the file, unless it holds a depth map, which decodes like a camera image."""
-    if "compresseddepth" in picture.format.lower():
-        raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
-    return picture.data
+_DEPTH_HEAD: Final = 12
+"""Bytes of image_transport's ``compressedDepth`` before the image file: kind and quantization."""
+
+
+def _is_depth(picture: CompressedPicture) -> bool:
+    return "compresseddepth" in picture.format.lower()
+
+
+def file_of(picture: CompressedPicture) -> Buffer:
+    """Return the image file of a picture; of ``compressedDepth`` the PNG of whole numbers.
+
+    A `BadMessage` if it has none.
+    """
+    if not _is_depth(picture):
+        return picture.data
+    data, name = picture.data[_DEPTH_HEAD:], picture.format.lower()
+    if "32fc1" in name or "rvl" in name:
+        raise BadMessage(f"it holds depth ({picture.format}); of such images PNG of 16UC1 is read")
+    return data

@@ -256,14 +256,16 @@ def _samples(pixels: npt.NDArray[Any]) -> tuple[str, npt.NDArray[Any]]:
     """Return the name of an encoding, and the numbers in it; refuse what no label can be."""
     is_fraction, greatest = pixels.dtype.kind == "f", np.iinfo(np.uint16).max
     with np.errstate(invalid="ignore"):
-        fits = np.isfinite(pixels) if is_fraction else pixels <= greatest
-        wrong = pixels[~(fits & (pixels >= 0))]
+        fits = np.isfinite(pixels) & (pixels >= 0) if is_fraction else pixels <= greatest
+        wrong = pixels[~fits]
     if wrong.size and is_fraction:
         raise BadMessage(f"it holds {wrong[0]}, which is neither a class nor a confidence")
     if wrong.size:
-        raise BadMessage(f"it holds {wrong[0]}, which is neither from 0 to 65535 nor a fraction")
+        raise BadMessage(f"it holds {wrong[0]}, which is neither at most 65535 nor a fraction")
     if is_fraction:
         return "32FC1", pixels.astype("<f4")
+    if pixels.dtype.kind == "i" and (pixels < 0).any():
+        return "32SC1", np.maximum(pixels, np.iinfo(np.int32).min).astype("<i4")
     if pixels.dtype.itemsize == 1:
         return "mono8", pixels.astype("u1")
     return "mono16", pixels.astype("<u2")

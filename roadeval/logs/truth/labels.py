@@ -50,6 +50,9 @@ UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
 TOP: Final = np.iinfo(np.uint16).max
 """The code of a confidence of 1."""
+LEAST: Final = np.iinfo(np.int16).min
+"""The least label value that is told from others: any below counts as it."""
+NO_LABEL: Final = "values below 0 mean no label, and are ignored"
 _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
 """Masks that need no settings: what their values mean."""
 
@@ -78,8 +81,9 @@ class ClassMap:
 
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
-        """``(65536,)`` truth by label value."""
-        table = np.full(65536, self.others, np.uint8)
+        """``(98304,)`` truth by label value; those below 0 lie at the end, as Python counts."""
+        table = np.full(TOP + 1 - LEAST, self.others, np.uint8)
+        table[LEAST:] = IGNORE
         for value, truth in self.meaning.items():
             table[value] = truth
         return table
@@ -104,13 +108,15 @@ class ClassMap:
         return Labels(self.of_values(values))
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
-        """Translate ``(H, W)`` uint8 or uint16 labels; a `BadMessage` if a value is unknown."""
+        """Translate ``(H, W)`` labels; a `BadMessage` if a value is unknown, or beyond 65535."""
         if labels.dtype == np.uint8:
             import cv2
 
             truth: Truth = cv2.LUT(np.ascontiguousarray(labels), self._table[:256])
+        elif labels.dtype.itemsize > 2 and (greatest := labels.max()) > TOP:
+            raise BadMessage(f"it holds the value {greatest}: label values are at most {TOP}")
         else:
-            truth = self._table[labels]
+            truth = self._table[np.maximum(labels, LEAST) if labels.dtype.kind == "i" else labels]
         if self.others == UNKNOWN and (truth == UNKNOWN).any():
             value = int(labels[truth == UNKNOWN][0])
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
@@ -151,8 +157,8 @@ class Confidence:
                 raise BadMessage("it holds a confidence that is not from 0 to 1")
             return np.rint(values.astype(np.float64) * TOP).astype(np.uint16)
         levels = to_labels(picture, limits)
-        if levels.ndim != 2:
-            raise BadMessage("it holds colours, not confidences")
+        if levels.ndim != 2 or levels.dtype.kind == "i":
+            raise BadMessage("it holds colours or signed numbers, not confidences")
         # 257 times 255 is 65535.
         return levels.astype(np.uint16) * 257 if levels.dtype == np.uint8 else levels
 
@@ -178,6 +184,8 @@ def seen_in(picture: Picture, labels: LabelSettings, name: str, limits: Limits) 
             f"{name} holds the colours {_listed(colors)}: name those that mean road with "
             "`labels.road_colors`"
         )
+    if pixels.dtype.kind == "i":
+        return set(np.unique(np.maximum(pixels, LEAST)).tolist())
     return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
 
 
@@ -197,20 +205,27 @@ def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMa
         if by_color:
             wanted = (*map(_packed, labels.road_colors),), (*map(_packed, labels.ignore_colors),)
         there = f"{name}, whose frames hold {_listed(map(text, values))}"
-        return _as_given(wanted, {value: value for value in values}, there, by_color=by_color)
+        given = _as_given(wanted, {value: value for value in values}, there, by_color=by_color)
+        return _without_negatives(given, values)
     for meaning in _MASKS:
         # A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would
         # be ignored.
         white = next(value for value, truth in meaning.items() if truth == ROAD)
         is_plain = white > 1 or 2 * pictures[white] >= pictures[255]
-        if {*values} <= meaning.keys() and is_plain:
-            ignored = [str(value) for value in values if meaning[value] == IGNORE]
+        if {value for value in values if value >= 0} <= meaning.keys() and is_plain:
+            ignored = [str(value) for value in values if meaning.get(value) == IGNORE]
             words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
-            return ClassMap(meaning, UNKNOWN, False, words)
+            return _without_negatives(ClassMap(meaning, UNKNOWN, False, words), values)
     raise LogError(
         f"{name} holds the values {_listed(map(str, values))}: name those that mean road with "
         "`labels.road`, and those to leave out with `labels.ignore`"
     )
+
+
+def _without_negatives(classes: ClassMap, values: Iterable[int]) -> ClassMap:
+    """Say in a meaning that values below 0 are ignored, where some occur that it does not name."""
+    negative = any(value < 0 and value not in classes.meaning for value in values)
+    return replace(classes, words=f"{classes.words}; {NO_LABEL}") if negative else classes
 
 
 def _as_given(

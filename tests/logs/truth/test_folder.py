@@ -148,7 +148,7 @@ def test_whole_numbers_keep_their_values(dtype, order):
         (np.zeros((2, 3, 1)), r"of shape \(2, 3, 1\)"),
         (np.zeros(3), r"of shape \(3,\)"),
         (np.array([["a"]]), "not of numbers"),
-        (np.array([[-1]]), "it holds -1"),
+        (np.array([[-1.5]]), "it holds -1.5"),
         (np.array([[70_000]]), "it holds 70000"),
         (np.zeros((1, 1), complex), "not of numbers"),
     ],
