@@ -49,6 +49,8 @@ class ExecutionSettings:
 
     jobs: Annotated[int | None, Interval(ge=1, le=1000), Flag("--jobs", "N")] = None
     """Worker threads; processes of a fleet. Default: one per CPU core."""
+    patience_s: Annotated[float, Interval(ge=1, le=3600), Flag("--patience", "SECONDS")] = 20.0
+    """Seconds for which a server that holds a log may be silent before the run ends."""
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from base64 import b64encode
 from collections.abc import Callable
 from concurrent.futures import wait
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, Final, TypeVar, cast
+from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 
 from roadeval.fleet.drives import (
@@ -35,52 +35,78 @@ from roadeval.fleet.drives import (
 from roadeval.logs import RemoteLog
 from roadeval.runtime.threads import in_thread
 
+if TYPE_CHECKING:
+    from obstore import ObjectMeta
+
 Answer = TypeVar("Answer")
 
-TIMES: Final[dict[str, str]] = {"connect_timeout": "10s", "read_timeout": "30s", "timeout": "1d"}
-"""Limits: of connecting, of waiting for the next bytes, and of the whole answer."""
-RETRIES: Final[dict[str, Any]] = {"max_retries": 4, "retry_timeout": timedelta(minutes=2)}
+PATIENCE_S: Final = 20.0
+"""How long a server may be silent, see `roadeval.config.ExecutionSettings`."""
+RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 _PART: Final = 64 << 10
 """Least bytes of a part that is read: a chunk's message indexes, and the next one's head."""
 _PATIENCE_S: Final = 0.2
 """Between two looks whether an answer has come."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
+CHANGED: Final = "it changed while it was read"
+SILENT: Final = "the server stopped answering"
 _REASONS: Final = (
     (r"169\.254\.169\.254|metadata\.google\.internal", "no credentials in the environment"),
     (r"NotFound\b|status code: 404", "there is no such file"),
     (r"PermissionDenied|status code: 403", "the server denies access"),
     (r"Unauthenticated|status code: 401", "the server asks who you are"),
-    (r"Precondition", "it changed while it was read"),
+    (r"Precondition", CHANGED),
     (r"non-2xx status code: (\d+)", "the server cannot give it"),
     (r"dns error", "no host of this name is known"),
     (r"ConnectionRefused|kind: Connect\b", "the host cannot be reached"),
     (r"BadScheme", "the endpoint is without TLS, which only AWS_ALLOW_HTTP=true allows"),
-    (r"TimedOut|kind: Timeout|timed out", "the server stopped answering"),
+    (r"TimedOut|kind: Timeout|timed out", SILENT),
     (r"RangeNotSupported", NO_PARTS),
     (r"Content-Length", "the server does not state its length"),
 )
 """Patterns of obstore's messages and errors, with their meaning; the first that is found counts."""
 
 
-def readable(drive: str | PathLike[str]) -> Path | RemoteLog:
+def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
     """Return what `roadeval.logs.open_log` opens of a drive: a path, or the file behind a URL.
 
-    Of it only the parts that are needed are read. A `FleetError` if the URL cannot be one, or
-    nothing can be read there.
+    Of it only the parts that are needed are read. A `FleetError` if the URL cannot be one, nothing
+    can be read there, or the server is silent for so many seconds.
     """
     source = os.fspath(drive)
     if not is_url(source):
         return Path(source)
-    name, place = Path(_file_name(source)), _place(source)
-    file = cast("IO[bytes]", _Parts(place, *_facts(place)))
+    name, place = Path(_file_name(source)), _place(source, patience_s)
+    file = cast("IO[bytes]", _Parts(place, _facts(place)))
     return RemoteLog(shown(source), name, file)
+
+
+class _Facts(NamedTuple):
+    """What tells one content of a file from another."""
+
+    size: int
+    tag: str | None
+    modified: datetime
+
+    @classmethod
+    def of(cls, meta: ObjectMeta) -> Self:
+        return cls(meta["size"], meta["e_tag"], meta["last_modified"])
+
+    def differs(self, other: Self) -> bool:
+        """Return whether both state something, and not the same."""
+        # A server that compresses weakens a tag; one that states no time is given 1970.
+        one, two = ((tag or "").removeprefix("W/") for tag in (self.tag, other.tag))
+        times = self.modified, other.modified
+        later = times[0] != times[1] and all(time.timestamp() > 0 for time in times)
+        return self.size != other.size or (one != two and "" not in (one, two)) or later
 
 
 class _Parts:
     """A file elsewhere of which parts are read; a `FleetError` if it changes meanwhile."""
 
-    def __init__(self, place: _Place, size: int, tag: str | None) -> None:
-        self._place, self._size, self._at = place, size, 0
+    def __init__(self, place: _Place, facts: _Facts) -> None:
+        self._place, self._facts, self._size, self._at = place, facts, facts.size, 0
+        tag = facts.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
         self._begin, self._part = 0, b""
 
@@ -103,31 +129,40 @@ class _Parts:
             return b""
         options = {"range": (begin, end), **self._options}
 
-        def part() -> bytes:
-            return bytes(obstore.get(self._place.store, self._place.key, options=options).bytes())
+        def part() -> tuple[_Facts, bytes]:
+            answer = obstore.get(self._place.store, self._place.key, options=options)
+            content = bytearray()
+            for piece in answer.stream(min_chunk_size=1 << 20):
+                content += piece
+                if len(content) > end - begin:  # it may never end
+                    break
+            return _Facts.of(answer.meta), bytes(content)
 
+        where = shown(self._place.url)
         try:
-            content = _ask(self._place.url, part)
+            facts, content = _ask(self._place.url, part)
         except FleetError as error:
             if not str(error).endswith(NO_PARTS):
                 raise
-            place = shown(self._place.url)
-            raise FleetError(f"{place}: the server gives no parts of files: copy it here") from None
+            raise FleetError(f"{where}: the server gives no parts of files: copy it here") from None
+        if facts.differs(self._facts):
+            raise FleetError(f"{where}: {CHANGED}")
         if len(content) != end - begin:
-            raise FleetError(f"{shown(self._place.url)}: ended early")
+            much = "ended early" if len(content) < end - begin else "the server sends too much"
+            raise FleetError(f"{where}: {much}")
         return content
 
     def close(self) -> None:
         self._part = b""
 
 
-def stamp(url: str) -> tuple[int, str | None]:
+def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:
     """Return size and tag of the file behind a URL, to notice that it has changed.
 
     The tag is None where the server states none. A `FleetError` if it is not there, or cannot be
     asked.
     """
-    return _facts(_place(url))
+    return _facts(_place(url, patience_s))[:2]
 
 
 @dataclass(frozen=True)
@@ -139,14 +174,15 @@ class _Place:
     key: str = ""
 
 
-def _facts(place: _Place) -> tuple[int, str | None]:
+def _facts(place: _Place) -> _Facts:
     import obstore
 
     try:
-        meta = _ask(place.url, obstore.head, place.store, place.key)
-    except FleetError:  # a signed URL may be good for reading alone
-        meta = _ask(place.url, obstore.get, place.store, place.key).meta
-    return meta["size"], meta["e_tag"]
+        return _Facts.of(_ask(place.url, obstore.head, place.store, place.key))
+    except FleetError as error:  # a signed URL may be good for reading alone
+        if str(error).endswith(SILENT):
+            raise
+        return _Facts.of(_ask(place.url, obstore.get, place.store, place.key).meta)
 
 
 def _file_name(url: str) -> str:
@@ -155,7 +191,7 @@ def _file_name(url: str) -> str:
     return name if name.strip(".") else "drive"
 
 
-def _place(url: str) -> _Place:
+def _place(url: str, patience_s: float) -> _Place:
     """Open the store that a URL leads to, without a request.
 
     A `FleetError` if the URL cannot be one, or obstore is not installed.
@@ -167,21 +203,25 @@ def _place(url: str) -> _Place:
         raise FleetError(
             f"{shown(url)}: URLs are read by obstore: pip install 'roadeval[remote]'"
         ) from error
+    # Of connecting, of waiting for the next bytes, of the whole answer, and of trying again.
+    pause = timedelta(seconds=patience_s / 2)
+    times = {"connect_timeout": pause, "read_timeout": pause, "timeout": timedelta(days=1)}
+    retries = {**RETRIES, "retry_timeout": pause}
     if scheme in BUCKETS:
         bucket, key = bucket_and_key(url)
         kind = stores.S3Store if scheme == "s3" else stores.GCSStore
         # obstore ignores this variable where any option is given.
-        allowed = {**TIMES, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
-        store = _ask(url, kind, bucket, client_options=allowed, retry_config=RETRIES)
+        allowed = {**times, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
+        store = _ask(url, kind, bucket, client_options=allowed, retry_config=retries)
         return _Place(url, store, key)
     parts = urlsplit(url)
     user, at, host = parts.netloc.rpartition("@")
     plain = urlunsplit((parts.scheme, host, parts.path, parts.query, ""))
-    options: dict[str, Any] = {**TIMES, "allow_http": scheme == "http"}
+    options: dict[str, Any] = {**times, "allow_http": scheme == "http"}
     if at:
         basic = b64encode(unquote(user).encode()).decode()
         options["default_headers"] = {"authorization": f"Basic {basic}"}
-    store = _ask(url, stores.HTTPStore, plain, client_options=options, retry_config=RETRIES)
+    store = _ask(url, stores.HTTPStore, plain, client_options=options, retry_config=retries)
     return _Place(url, store)
 
 

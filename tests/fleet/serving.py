@@ -10,6 +10,7 @@ import hashlib
 import os
 import re
 import time
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
@@ -20,6 +21,8 @@ import pytest
 
 CONTENT = bytes(range(256)) * 40_000
 """Ten megabytes."""
+ENDLESS = 1 << 30
+"""Bytes after which a server that never ends gives up."""
 SLOW = 5.0
 """Seconds for which a server stalls."""
 
@@ -37,7 +40,9 @@ class _Handler(BaseHTTPRequestHandler):
     def _answer(self, *, body: bool) -> None:
         kind = "whole" if self.server.folder else self.path.strip("/").partition("/")[0]
         self.server.asked.append((self.command, self.path, dict(self.headers)))
-        if kind.isdigit():
+        if kind == "hung":
+            time.sleep(SLOW)
+        elif kind.isdigit():
             self._head(int(kind), 0)
         elif kind == "signed" and not body:
             self._head(403, 0)
@@ -62,14 +67,28 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get("If-Match", tag) != tag:
             self._head(412, 0)
             return
-        headers = {"ETag": tag, "Last-Modified": "Wed, 21 Oct 2015 07:28:00 GMT"}
+        later = self.command == "GET"
+        hour = 8 if kind == "touched" and later else 7
+        headers = {"ETag": tag, "Last-Modified": f"Wed, 21 Oct 2015 {hour:02}:28:00 GMT"}
+        if kind == "retagged" and later:
+            headers["ETag"] = '"another"'
+        if kind in ("touched", "untagged", "grown"):
+            del headers["ETag"]
+        if kind == "weakened" and later:
+            headers["ETag"] = f"W/{tag}"
         begin, end, size = 0, len(content), len(content)
         asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         if asked is not None and kind != "early":
             begin, end = int(asked[1]), int(asked[2]) + 1
+            size += kind == "grown"
             headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
-        self._head(206 if "Content-Range" in headers else 200, end - begin, **headers)
-        if body and kind in ("early", "stalled", "resumed") and not begin:
+        length = 1 << 40 if kind == "endless" and body else end - begin
+        self._head(206 if "Content-Range" in headers else 200, length, **headers)
+        if body and kind == "endless":
+            with suppress(OSError):  # until the client goes away
+                while self.server.sent < ENDLESS:
+                    self.server.sent += self.wfile.write(CONTENT)
+        elif body and kind in ("early", "stalled", "resumed") and not begin:
             self.close_connection = True
             self.wfile.write(content[: end // 2])
             self.wfile.flush()

@@ -24,11 +24,8 @@ def running():
 @pytest.fixture
 def server(running, monkeypatch):
     """A server, and a client with little patience."""
-    times = {"connect_timeout": "2s", "read_timeout": "1s", "timeout": "60s"}
     pause = {"init_backoff": timedelta(milliseconds=1), "max_backoff": timedelta(milliseconds=9)}
-    retries = {"max_retries": 2, "retry_timeout": timedelta(seconds=20), "backoff": pause}
-    monkeypatch.setattr(remote, "TIMES", times)
-    monkeypatch.setattr(remote, "RETRIES", retries)
+    monkeypatch.setattr(remote, "RETRIES", {"max_retries": 2, "backoff": pause})
     running.asked.clear()
     return running
 
@@ -40,9 +37,9 @@ def s3(server, monkeypatch):
     return server
 
 
-def fetched(url: str) -> bytes:
+def fetched(url: str, patience_s: float = 20) -> bytes:
     """The bytes of a drive."""
-    return readable(url).file.read(len(CONTENT))
+    return readable(url, patience_s).file.read(len(CONTENT))
 
 
 def refused(url: str) -> str:
@@ -101,11 +98,34 @@ def test_user_and_password_of_a_url_are_sent(server):
         ("503/a.mcap", "the server cannot give it"),
         ("unknown/a.mcap", "the server does not state its length"),
         ("early/a.mcap", "the server gives no parts of files: copy it here"),
+        ("retagged/a.mcap", "it changed while it was read"),
+        ("touched/a.mcap", "it changed while it was read"),
+        ("grown/a.mcap", "it changed while it was read"),
+        ("endless/a.mcap", "the server sends too much"),
     ],
 )
 def test_what_a_server_cannot_give_is_refused_in_one_line(server, path, message):
     url = server.url(path)
     assert refused(f"{url}?sig=geheim") == f"{url}: {message}"
+
+
+@pytest.mark.parametrize("kind", ["weakened", "untagged"])
+def test_a_tag_that_is_weakened_or_missing_is_no_change(server, kind):
+    assert fetched(server.url(f"{kind}/a.mcap")) == CONTENT
+
+
+def test_of_an_answer_without_end_little_more_than_was_asked_for_is_taken(server):
+    server.sent = 0
+    refused(server.url("endless/a.mcap"))
+    assert server.sent < 10 * len(CONTENT)
+
+
+@pytest.mark.parametrize("path", ["hung/a.mcap", "stalled/a.mcap"])
+def test_a_silent_server_is_waited_for_as_long_as_was_asked(server, path):
+    begun = time.monotonic()
+    with pytest.raises(RoadevalError, match="the server stopped answering"):
+        fetched(server.url(path), patience_s=2)
+    assert 1 < time.monotonic() - begun < 4.5
 
 
 def test_a_part_that_breaks_off_goes_on_where_it_broke(server):
@@ -167,7 +187,6 @@ def interruptible():
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a process alone")
 @pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_ends_the_wait_for_a_server_at_once(server, monkeypatch):
-    monkeypatch.setitem(remote.TIMES, "read_timeout", "60s")
     begun = time.monotonic()
     Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):

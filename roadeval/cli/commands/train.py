@@ -14,7 +14,7 @@ from roadeval.cli.options import Given, takes
     *("truth", "cameras", "topics.truth", "topics.masks", "labels"),
     *("topics.sync_tolerance_ms", "topics.resize_truth"),
     *("frames.scale", "frames.max_pixels"),
-    *("frames.start", "frames.end"),
+    *("frames.start", "frames.end", "run.patience_s"),
 )
 def train(
     paths: Annotated[

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import hashlib
 import json
 import math
@@ -18,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval import logs
-from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig
+from roadeval.config import FleetSettings, OutputSettings, RunConfig
 from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import final_stages
@@ -167,7 +168,7 @@ def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
         files = [file for own in beside for file in logs.label_files(own)]
         found: dict[str, Any] = {}
         if entry.path is None:
-            size, tag = stamp(entry.source)
+            size, tag = stamp(entry.source, config.run.patience_s)
             # Without a tag nothing shows: it is equal to no other.
             found[entry.id] = [size, tag or secrets.token_hex()]
         else:
@@ -215,7 +216,7 @@ def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
         figures=False,
     )
     own_config = replace(
-        task.config, output=output, run=ExecutionSettings(jobs=1), fleet=FleetSettings()
+        task.config, output=output, run=replace(task.config.run, jobs=1), fleet=FleetSettings()
     )
     with TableFile(frames_path(folder, drive), "frames") as table:
         gatherer = FrameGatherer(folder, drive, table)
@@ -267,7 +268,7 @@ def ending_the_run(folder: Path) -> Iterator[None]:
         if failure is None:
             raise
         reason = (
-            f"{folder}: cannot be written: {failure.strerror}"
+            f"{folder}: cannot be written: {os.strerror(failure.errno or errno.EIO)}"
             if isinstance(failure, OSError)
             else str(failure)
         )

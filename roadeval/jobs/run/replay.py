@@ -90,7 +90,7 @@ def replay(
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
-    with logs.open_log(readable(drive), config) as log:
+    with logs.open_log(readable(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
             outcome = _written(log, config, to, on_progress, on_frame)

@@ -66,7 +66,7 @@ def draw(
     Where they must be ``labelled``, a drive without road truth gives none.
     """
     frames, streams = list[Frame](), list[logs.FrameStream]()
-    with logs.open_log(readable(drive.source), own.for_training()) as log:
+    with logs.open_log(readable(drive.source, own.run.patience_s), own.for_training()) as log:
         selection = log.select()
         if labelled and selection.truth is None:
             return [], []
