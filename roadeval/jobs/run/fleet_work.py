@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import errno
-import os
 import hashlib
 import json
 import math
+import os
 import secrets
 import shutil
 import time
