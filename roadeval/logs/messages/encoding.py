@@ -1,8 +1,8 @@
 """Message encodings: from a message's bytes to its fields.
 
-The image messages are known by their schema's name, whatever the schema's text: the layouts are
-those of ROS's ``sensor_msgs``, of ``ffmpeg_image_transport_msgs`` and of Foxglove's schemas. They
-serve where a schema has no text, or one in a language that no library reads.
+Messages of images, calibrations and transforms are known by their schema's name, whatever its
+text: the layouts are those of ROS, of ``ffmpeg_image_transport_msgs`` and of Foxglove. They serve
+where a schema has no text, or one that no library reads.
 """
 
 from __future__ import annotations
@@ -36,24 +36,40 @@ class TopicKind(StrEnum):
 
 Fields = tuple[tuple[str, str], ...]
 """Names and types of a message's fields, in the order of their bytes."""
-_CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q"}
+_CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q", "f8": "d"}
 """Of the numbers among the types, as `struct` names them."""
 
 
-class ImageSchema(NamedTuple):
-    """A message that carries an image."""
+class MessageSchema(NamedTuple):
+    """A message that carries an image, a calibration or transforms."""
 
     kind: TopicKind
     fields: Fields
 
 
-def _schema(kind: TopicKind, fields: str) -> ImageSchema:
-    pairs = (field.partition(":") for field in fields.split())
-    return ImageSchema(kind, tuple((name, type_) for name, _, type_ in pairs))
+def _fields(text: str) -> Fields:
+    pairs = (field.partition(":") for field in text.split())
+    return tuple((name, type_) for name, _, type_ in pairs)
+
+
+def _schema(kind: TopicKind, fields: str) -> MessageSchema:
+    return MessageSchema(kind, _fields(fields))
 
 
 _ROS: Final = "header:header"
 _FOXGLOVE: Final = "timestamp:time frame_id:str"
+_LENS: Final = "distortion_model:str d:f8[] k:f8[9] r:f8[9] p:f8[12]"
+_MOVED: Final = "translation:vector rotation:quaternion"
+_FRAME: Final = f"timestamp:time parent_frame_id:str child_frame_id:str {_MOVED}"
+NESTED: Final = {
+    "region": _fields("x_offset:u4 y_offset:u4 height:u4 width:u4 do_rectify:u1"),
+    "vector": _fields("x:f8 y:f8 z:f8"),
+    "quaternion": _fields("x:f8 y:f8 z:f8 w:f8"),
+    "moved": _fields(_MOVED),
+    "stamped": _fields(f"{_ROS} child_frame_id:str transform:moved"),
+    "frame": _fields(_FRAME),
+}
+"""The fields of types that are messages themselves."""
 
 SCHEMAS: Final = {
     "sensor_msgs/Image": _schema(
@@ -70,14 +86,21 @@ SCHEMAS: Final = {
     ),
     "foxglove/CompressedImage": _schema(TopicKind.COMPRESSED, f"{_FOXGLOVE} data:bytes format:str"),
     "foxglove/CompressedVideo": _schema(TopicKind.VIDEO, f"{_FOXGLOVE} data:bytes format:str"),
+    "sensor_msgs/CameraInfo": _schema(
+        TopicKind.CALIBRATION,
+        f"{_ROS} height:u4 width:u4 {_LENS} binning_x:u4 binning_y:u4 roi:region",
+    ),
+    "foxglove/CameraCalibration": _schema(
+        TopicKind.CALIBRATION, f"{_FOXGLOVE} width:u4 height:u4 {_LENS}"
+    ),
+    "tf2_msgs/TFMessage": _schema(TopicKind.TRANSFORMS, "transforms:stamped[]"),
+    "foxglove/FrameTransform": _schema(TopicKind.TRANSFORMS, _FRAME),
+    "foxglove/FrameTransforms": _schema(TopicKind.TRANSFORMS, "transforms:frame[]"),
 }
 """By package and message."""
 
 PICTURES: Final = (TopicKind.IMAGE, TopicKind.COMPRESSED, TopicKind.VIDEO)
-KINDS: Final = {name.partition("/")[2]: schema.kind for name, schema in SCHEMAS.items()} | {
-    **dict.fromkeys(("CameraInfo", "CameraCalibration"), TopicKind.CALIBRATION),
-    **dict.fromkeys(("TFMessage", "FrameTransform", "FrameTransforms"), TopicKind.TRANSFORMS),
-}
+KINDS: Final = {name.partition("/")[2]: schema.kind for name, schema in SCHEMAS.items()}
 """By the message alone: its package may be another, with fields of the same names."""
 
 
@@ -184,15 +207,19 @@ class FieldReader:
             return bytes(self._take(self._number("u4"))).rstrip(b"\0").decode("utf-8", "replace")
         if kind == "bytes":
             return self._take(self._number("u4"))
-        return self._number(kind)
+        if kind.endswith("]"):
+            kind, _, length = kind[:-1].partition("[")
+            items = int(length or self._number("u4"))
+            # Each takes eight bytes at least: a damaged number of them would take for ever.
+            return [self._field(kind) for _ in range(min(items, self.left // 8 + 1))]
+        return self.read(NESTED[kind]) if kind in NESTED else self._number(kind)
 
-    def _number(self, kind: str) -> int:
+    def _number(self, kind: str) -> Any:
         code = struct.Struct(self._order + _CODES[kind])
         if self._aligned:
             width = min(code.size, self._widest)
             self._at += -(self._at - self._start) % width
-        value: int = code.unpack(self._take(code.size))[0]
-        return value
+        return code.unpack(self._take(code.size))[0]
 
     def _take(self, length: int) -> memoryview:
         if length > self.left:
@@ -216,8 +243,16 @@ class Layouts:
     """A message may be longer by fewer bytes than that."""
 
     def read(self, data: Buffer, decode: Decode | None) -> Any:
-        """Read a message by ``decode``, or by another image's layout if it fits that alone."""
-        if not self.fits(self.own, data):
+        """Read a message by ``decode``, or by another image's layout if it fits that alone.
+
+        Of what is no image the own layout is read where it fits: the libraries refuse some texts.
+        """
+        is_image = ("data", "bytes") in self.own
+        if self.fits(self.own, data):
+            decode = decode if is_image else None
+        elif decode is None and not is_image:
+            raise BadMessage("its length is not that of its fields")
+        else:
             # Of the others that begin as the own one does.
             for fields in (schema.fields for schema in SCHEMAS.values()):
                 if fields[0] == self.own[0] and fields != self.own and self.fits(fields, data):

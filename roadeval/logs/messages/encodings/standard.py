@@ -14,6 +14,7 @@ from mcap.records import Schema
 from roadeval.logs.container.records import LARGEST, PADDING, Buffer
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.encoding import (
+    NESTED,
     Encoding,
     FieldReader,
     Fields,
@@ -38,8 +39,14 @@ def _cdr(schema: Schema | None) -> MessageReader | None:
     if fields is None:
         return decode and MessageReader(lambda data: decode(_uncompressed(data)))
     layouts = Layouts(fields, _after_head, PADDING)
+
+    def read(data: Buffer) -> Any:
+        message = _uncompressed(data)
+        # The library takes XCDR2 for its first version, in which longer numbers stand elsewhere.
+        return layouts.read(message, None if bytes(message[1:2]) >= b"\6" else decode)
+
     return MessageReader(
-        lambda data: layouts.read(_uncompressed(data), decode),
+        read,
         lambda data: _cdr_stamp(fields, _uncompressed(data)),
         lambda data: layouts.fits(fields, data),
     )
@@ -75,7 +82,7 @@ def _uncompressed(data: Buffer) -> Buffer:
     return message
 
 
-# --- FlatBuffers, for Foxglove's image messages ---------------------------------------------------
+# --- FlatBuffers, for Foxglove's messages ---------------------------------------------------------
 
 
 def _flatbuffer(schema: Schema | None) -> MessageReader | None:
@@ -86,11 +93,10 @@ def _flatbuffer(schema: Schema | None) -> MessageReader | None:
         return None
     name = parts_of(schema.name)[-1]
     table = getattr(import_module(f"{schemas.__name__}.{name}"), name)
-    return MessageReader(partial(_flatbuffer_message, table, fields))
+    return MessageReader(lambda data: _flatbuffer_fields(table.GetRootAs(data), fields))
 
 
-def _flatbuffer_message(table: Any, fields: Fields, data: Buffer) -> SimpleNamespace:
-    message = table.GetRootAs(data)
+def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
     return SimpleNamespace(
         **{name: _flatbuffer_field(message, name, kind) for name, kind in fields}
     )
@@ -101,9 +107,15 @@ def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
     accessor = name.title().replace("_", "")
     if kind == "bytes":
         return memoryview(getattr(message, f"{accessor}AsNumpy")())
+    if kind.endswith("]"):
+        items = map(getattr(message, accessor), range(getattr(message, f"{accessor}Length")()))
+        nested = NESTED.get(kind.partition("[")[0])
+        return [_flatbuffer_fields(item, nested) if nested else item for item in items]
     value = getattr(message, accessor)()
     if kind == "time":
         return SimpleNamespace(sec=value.Sec(), nanosec=value.Nsec()) if value else None
+    if kind in NESTED:
+        return _flatbuffer_fields(value, NESTED[kind])
     return (value or b"").decode("utf-8", "replace") if kind == "str" else value
 
 

@@ -1,0 +1,130 @@
+"""Calibrations and transforms, read by the layouts of their names whatever the schemas' texts."""
+
+import struct
+from typing import Any
+
+import flatbuffers
+import numpy as np
+import pytest
+from foxglove_schemas_flatbuffer import CameraCalibration, FrameTransform, Quaternion, Vector3
+
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.pictures import decoder_for
+from tests.logs.messages.test_decoders import channel, schema
+
+D, K = [-0.1, 0.01, 0.0, 0.0, 0.5], [80.0, 0, 48, 0, 81, 36, 0, 0, 1]
+P = [70.0, 0, 47, 0, 0, 71, 35, 0, 0, 0, 1, 0]
+STAMP: list[Any] = [5, 7]
+INFO = [*STAMP, "cam", 72, 96, "plumb_bob", 5, *D, *K, *K, *P, 2, 3, 1, 2, 30, 40, True]
+TRANSFORM = [1, *STAMP, "base_link", "cam", 1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8]
+UPPER = (
+    "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] D\n"
+    "float64[9] K\nfloat64[9] R\nfloat64[12] P\nuint32 binning_x\nuint32 binning_y\n"
+    f"sensor_msgs/RegionOfInterest roi\n{'=' * 80}\nMSG: std_msgs/Header\n"
+    f"builtin_interfaces/Time stamp\nstring frame_id\n{'=' * 80}\n"
+    f"MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n{'=' * 80}\n"
+    "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\n"
+    "uint32 width\nbool do_rectify\n"
+)
+
+
+def packed(values: list[Any], kind: int = 1, *, ros1: bool = False) -> bytes:
+    """Return the bytes of a message; ``kind`` is the encapsulation's number."""
+    order, widest = "<" if kind & 1 else ">", 4 if kind >= 6 else 8
+    data = b""
+
+    def add(code: str, value: Any) -> None:
+        nonlocal data
+        width = struct.calcsize(code)
+        data += b"" if ros1 else bytes(-len(data) % min(width, widest))
+        data += struct.pack(order + code, value)
+
+    for value in values:
+        if isinstance(value, str):
+            text = value.encode() + (b"" if ros1 else b"\0")
+            add("I", len(text))
+            data += text
+        else:
+            add({bool: "?", int: "I", float: "d"}[type(value)], value)
+    head = b"" if ros1 else bytes([0, kind, 0, 0])
+    return head + (struct.pack("<I", len(data)) if kind == 9 else b"") + data
+
+
+def numbers(values: list[Any]) -> list[Any]:
+    """Return all of a message's own numbers as floats where they are so in a message."""
+    lens = values.index("plumb_bob") + 2
+    return [*values[:lens], *map(float, values[lens : lens + 35]), *values[lens + 35 :]]
+
+
+def fields(encoding: str, name: str, text: tuple[str, str], data: bytes) -> Any:
+    return decoder_for(channel(encoding), schema(name, *text)).fields(data)
+
+
+@pytest.mark.parametrize("text", [("ros2msg", UPPER), ("", ""), ("omgidl", "module x {}")])
+@pytest.mark.parametrize("kind", [0, 1, 7, 9])
+def test_a_camera_info_is_read_whatever_its_schema_says(text: tuple[str, str], kind: int):
+    """rosbags-convert 0.11.9 writes D, K, R and P, names that mcap-ros2-support 0.5.5 refuses."""
+    found = fields("cdr", "sensor_msgs/msg/CameraInfo", text, packed(numbers(INFO), kind))
+    assert (found.header.frame_id, found.width, found.height) == ("cam", 96, 72)
+    assert (found.distortion_model, found.d, found.k, found.p) == ("plumb_bob", D, K, P)
+    assert (found.binning_x, found.binning_y) == (2, 3)
+    assert (found.roi.x_offset, found.roi.y_offset) == (1, 2)
+    assert (found.roi.width, found.roi.height) == (40, 30)
+
+
+def test_a_camera_info_of_ros_1_is_read_without_a_text():
+    data = packed([1, *numbers(INFO)], ros1=True)
+    found = fields("ros1", "sensor_msgs/CameraInfo", ("", ""), data)
+    assert (found.width, found.d, found.k, found.binning_y) == (96, D, K, 3)
+
+
+@pytest.mark.parametrize("kind", [0, 1, 7])
+def test_transforms_are_read_without_a_text(kind: int):
+    found = fields("cdr", "tf2_msgs/msg/TFMessage", ("", ""), packed(TRANSFORM, kind))
+    (each,) = found.transforms
+    assert (each.header.frame_id, each.child_frame_id) == ("base_link", "cam")
+    assert (each.transform.translation.z, each.transform.rotation.w) == (3.0, 0.8)
+
+
+@pytest.mark.parametrize("cut", [-9, -1, 9])
+def test_a_camera_info_of_another_length_is_refused(cut: int):
+    data = packed(numbers(INFO))
+    data = data[:cut] if cut < 0 else data + bytes(cut)
+    with pytest.raises(BadMessage):
+        fields("cdr", "sensor_msgs/msg/CameraInfo", ("", ""), data)
+
+
+def test_a_number_of_transforms_that_cannot_be_is_refused_at_once():
+    with pytest.raises(BadMessage):
+        fields("cdr", "tf2_msgs/msg/TFMessage", ("", ""), packed([2**32 - 1, *TRANSFORM[1:]]))
+
+
+def test_foxgloves_flatbuffers_are_read():
+    builder = flatbuffers.Builder()
+    lists = {"D": D, "K": K, "P": P}
+    made = {name: builder.CreateNumpyVector(np.array(each)) for name, each in lists.items()}
+    model, frame = builder.CreateString("plumb_bob"), builder.CreateString("cam")
+    CameraCalibration.Start(builder)
+    for name, place in {**made, "DistortionModel": model, "FrameId": frame}.items():
+        getattr(CameraCalibration, f"Add{name}")(builder, place)
+    CameraCalibration.AddWidth(builder, 96)
+    builder.Finish(CameraCalibration.End(builder))
+    text = "flatbuffer", ""
+    found = fields("flatbuffer", "foxglove.CameraCalibration", text, bytes(builder.Output()))
+    assert (found.frame_id, found.width, found.d, found.k, found.p) == ("cam", 96, D, K, P)
+
+    builder = flatbuffers.Builder()
+    parent = builder.CreateString("base_link")
+    Vector3.Start(builder)
+    Vector3.AddZ(builder, 3.0)
+    at = Vector3.End(builder)
+    Quaternion.Start(builder)
+    Quaternion.AddW(builder, 0.8)
+    turn = Quaternion.End(builder)
+    FrameTransform.Start(builder)
+    FrameTransform.AddParentFrameId(builder, parent)
+    FrameTransform.AddTranslation(builder, at)
+    FrameTransform.AddRotation(builder, turn)
+    builder.Finish(FrameTransform.End(builder))
+    found = fields("flatbuffer", "foxglove.FrameTransform", text, bytes(builder.Output()))
+    assert (found.parent_frame_id, found.translation.z, found.rotation.w) == ("base_link", 3.0, 0.8)
