@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
+
+FISHEYE: Final = ("equidistant", "fisheye", "kannala_brandt")
+"""Models whose rays' angles, not their slopes, grow with the distance from the centre."""
 
 
 @dataclass(frozen=True)
@@ -16,6 +21,12 @@ class Mounting:
     """Of the camera in it: x, y, z in metres."""
     rotation: tuple[float, ...]
     """From the camera's axes to its axes, as a quaternion x, y, z, w."""
+
+    @property
+    def has_body_axes(self) -> bool:
+        """Whether the camera's z points up, as a vehicle's, where a camera's points ahead."""
+        x, y, z, w = self.rotation
+        return 1 - 2 * (x * x + y * y) > 0.5 > abs(2 * (y * z + x * w))
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,44 @@ class Calibration:
             ),
         }
         return next((text for text, holds in checks.items() if not holds), "")
+
+    @property
+    def doubt(self) -> str:
+        """What tells that its matrix is of images of another size: a centre far from theirs."""
+        x, y = self.matrix[2], self.matrix[5]
+        if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
+            return ""
+        pixels = f"{self.width}x{self.height} pixels"
+        return f"its centre, {x:.4g}, {y:.4g}, is far from the middle of {pixels}: is it of others?"
+
+    @property
+    def bends(self) -> bool:
+        """Whether straight lines are bent in its images: a fisheye's are without coefficients."""
+        return any(self.distortion) or self.model.lower() in FISHEYE
+
+    def has_shape(self, width: int, height: int) -> bool:
+        """Return whether images of this size have the shape of its own, but for a pixel."""
+        off = abs(self.width * height - self.height * width)
+        return off <= max(self.width + self.height, width + height)
+
+    def part(
+        self, corner: tuple[int, int], size: tuple[int, int], bins: Sequence[int]
+    ) -> Calibration:
+        """Return the calibration of a part of the sensor whose pixels are binned.
+
+        ``corner`` is its first pixel, ``size`` what is left, ``bins`` how many pixels, across and
+        down, become one. As ROS does, the corner comes off first, and then all is divided; a centre
+        in the very middle of the pixels' centres stays there.
+        """
+        k, centre = self.matrix, []
+        for at, begin, pixels, length in zip(
+            (k[2], k[5]), corner, bins, (self.width, self.height), strict=True
+        ):
+            half = 0.5 * (at == (length - 1) / 2)
+            centre.append((at - begin + half) / pixels - half)
+        across, down = bins
+        matrix = (k[0] / across, k[1] / across, centre[0], k[3], k[4] / down, centre[1], *k[6:])
+        return replace(self, width=size[0], height=size[1], matrix=matrix)
 
     def scaled(self, width: int, height: int) -> Calibration:
         """Return the calibration of the same image in another size, in pixels."""

@@ -11,32 +11,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 from typing import Final
 
 import numpy as np
 
 from roadeval.data import Calibration, Mounting
 from roadeval.data.arrays import Floats, Matrix
+from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
 
 GROUND_FRAMES: Final = ("base_footprint",)
 """Frames of a vehicle that lie on the ground (REP 120)."""
-FISHEYE: Final = ("equidistant", "fisheye", "kannala_brandt")
-_COEFFICIENTS: Final = {
-    **dict.fromkeys(("plumb_bob", "rational_polynomial"), (4, 5, 8, 12, 14)),
+COEFFICIENTS: Final = {
+    **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (4, 5, 8, 12, 14)),
     **dict.fromkeys(FISHEYE, (4,)),
+    **dict.fromkeys(("", "none", "pinhole", "no_distortion"), (0,)),
 }
-"""How many numbers the models have, by their names."""
+"""How many numbers the models have, by their names; zeros may follow, or be missing."""
 STATED: Final = (10, 40)
 """Metres ahead at which it is said how much of the way a pixel covers."""
 LOWEST, HIGHEST = 0.01, 1000.0
 """Metres of a camera above the ground, at least and at most."""
-SAME_SHAPE: Final = 0.02
-"""Images of one shape may differ by this in the ratio of their sides: sizes are rounded."""
-TOLERANCE: Final = 1e-4
-"""A distorted ray must lead back to itself within this, in units of the focal length: a polynomial
-bends rays from far outside the picture back into it."""
+TOLERANCE: Final = 1e-6
+"""A ray must lead back to its pixel within this, in units of the focal length."""
+STEPS: Final = 30
+"""How often a ray is corrected, at most."""
 AXES: Final = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """From ahead, left and up to a camera's right, down and forward."""
 
@@ -74,16 +76,11 @@ class Ground:
         Pixels may lie outside the image.
         """
         rays = _mapped(self.plane, places)
-        if not any(self.distortion):
-            return _mapped(self.matrix, rays)
-        found = np.full(rays.shape, np.nan)
-        known = np.flatnonzero(np.isfinite(rays).all(axis=1))
-        if len(known):
-            seen = self._distorted(rays[known])
-            back = np.abs(self.rays(seen) - rays[known]).max(axis=1)
-            sure = back < TOLERANCE * (1 + np.abs(rays[known]).max(axis=1))
-            found[known[sure]] = seen[sure]
-        return found
+        if self.bends:
+            # A polynomial that folds bends rays from far outside the picture back into it.
+            rays[~(np.hypot(*rays.T) <= self._curve[0][-1])] = np.nan
+            rays = _bent(rays, self.model, self.distortion)
+        return _mapped(self.matrix, rays)
 
     def places(self, pixels: Matrix) -> Matrix:
         """Return where on the ground pixels lie, ``(n, 2)``; NaN from the horizon upwards."""
@@ -119,28 +116,82 @@ class Ground:
         first, second, third = np.reshape(self.plane, (3, 3)).T
         return np.stack([first, second, np.cross(first, second)], axis=1), third
 
-    def _distorted(self, rays: Matrix) -> Matrix:
-        import cv2
+    @property
+    def bends(self) -> bool:
+        """Whether the lens has a distortion; a fisheye's is one without coefficients, too."""
+        return self.model in FISHEYE or any(self.distortion)
 
-        matrix, distortion = np.reshape(self.matrix, (3, 3)), np.array(self.distortion)
-        if self.model in FISHEYE:
-            return cv2.fisheye.distortPoints(rays[:, None], matrix, distortion)[:, 0]
-        points, zero = np.column_stack([rays, np.ones(len(rays))]), np.zeros(3)
-        return cv2.projectPoints(points, zero, zero, matrix, distortion)[0][:, 0]
+    @cached_property
+    def _curve(self) -> tuple[Floats, Floats]:
+        """Slopes of rays, and the distances from the centre at which they are seen.
+
+        It ends where the polynomial folds: from there on two rays would have the same pixel.
+        """
+        slopes = np.tan(np.linspace(0, math.radians(89.9), 10_000))
+        seen = slopes * _growth(slopes, self.model, self.distortion)
+        falls = ~(np.diff(seen) > 0)
+        end = int(np.argmax(falls)) + 1 if falls.any() else len(seen)
+        return slopes[:end], seen[:end]
 
     def rays(self, pixels: Matrix) -> Matrix:
-        """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down."""
-        if any(self.distortion):
-            import cv2
+        """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down.
 
-            # Of OpenCV's functions for it, one that both 4.10 and 5.0 let iterate to the end.
-            ends = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12
-            points = np.ascontiguousarray(pixels, np.float64)[:, None]
-            lens = np.reshape(self.matrix, (3, 3)), np.array(self.distortion)
-            if self.model in FISHEYE:
-                return cv2.fisheye.undistortPoints(points, *lens, criteria=ends)[:, 0]
-            pixels = cv2.undistortImagePoints(points, *lens, None, ends)[:, 0]
-        return _mapped(_inverse(self.matrix), pixels)
+        NaN where there is none, or one at more than a right angle to the camera's own.
+        """
+        wanted = _mapped(_inverse(self.matrix), pixels)
+        if not self.bends:
+            return wanted
+        slopes, seen = self._curve
+        aim, rays, missed = wanted.copy(), wanted.copy(), np.full(len(wanted), np.inf)
+        left = np.arange(len(wanted))
+        for _ in range(STEPS):
+            length = np.hypot(*aim[left].T)
+            slope = np.interp(length, seen, slopes, right=np.nan)
+            rays[left] = aim[left] * (slope / np.where(length > 0, length, 1))[:, None]
+            off = wanted[left] - _bent(rays[left], self.model, self.distortion)
+            missed[left] = np.hypot(*off.T)
+            aim[left] += off
+            left = left[missed[left] > TOLERANCE / 1e6]
+        rays[~(missed < TOLERANCE)] = np.nan
+        return rays
+
+
+def _growth(slope: Floats, model: str, distortion: Sequence[float]) -> Floats:
+    """Return by how much a lens moves what is seen along rays from the centre, by their slopes."""
+    if model in FISHEYE:
+        angle = np.arctan(slope)
+        k1, k2, k3, k4 = distortion
+        square = angle**2
+        seen = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
+        return np.divide(seen, slope, out=np.ones_like(slope), where=slope > 0)
+    k1, k2, _, _, k3, k4, k5, k6, *_ = (*distortion, *(0.0,) * 8)
+    square = slope**2
+    over = 1 + square * (k1 + square * (k2 + square * k3))
+    under = 1 + square * (k4 + square * (k5 + square * k6))
+    return np.divide(over, under, out=np.full_like(over, np.nan), where=under > 0)
+
+
+def _bent(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
+    """Return where a lens of OpenCV's models shows rays, in units of the focal length, ``(n, 2)``.
+
+    ``distortion`` are as many numbers as the model has.
+    """
+    slope = np.hypot(*rays.T)
+    bent = rays * _growth(slope, model, distortion)[:, None]
+    if model in FISHEYE:
+        return bent
+    _, _, p1, p2, *rest = distortion
+    s1, s2, s3, s4, tilt, turn = (*rest[4:], *(0.0,) * 10)[:6]
+    x, y = rays.T
+    square = slope**2
+    bent[:, 0] += 2 * p1 * x * y + p2 * (square + 2 * x * x) + square * (s1 + square * s2)
+    bent[:, 1] += 2 * p2 * x * y + p1 * (square + 2 * y * y) + square * (s3 + square * s4)
+    if not (tilt or turn):
+        return bent
+    turned = _rotation(LEFT, -math.degrees(turn)) @ _rotation(AHEAD, -math.degrees(tilt))
+    back = turned[2, 2] * np.eye(3) - np.outer(turned[:, 2], (0, 0, 1))
+    back[2, 2] = 1
+    return _mapped(back @ turned, bent)
 
 
 def ground_of(
@@ -176,8 +227,11 @@ def ground_of(
     if not np.isfinite(made.places(np.column_stack([columns.ravel(), rows.ravel()]))).any():
         return None, "no metres: the camera sees no ground: it looks up"
     (near, _), (far, _) = (made.pixel_at(ahead) for ahead in STATED)
-    covers = f"{near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
-    return made, f"metres: flat ground, {text}; a pixel covers {covers}"
+    covers = (
+        f"a pixel covers {near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
+    )
+    told = [covers] * math.isfinite(near + far), [lens.doubt] * bool(given.focal and lens.doubt)
+    return made, "; ".join((f"metres: flat ground, {text}", *chain(*told)))
 
 
 def _lens(
@@ -198,14 +252,18 @@ def _lens(
         return None, "the focal length is missing: give fov, or focal, with `ground`"
     if problem := known.problem:
         raise GroundError(f"`ground.{problem.split()[0]}`: its {problem}: no camera has that")
-    if abs(known.width * size[1] / (known.height * size[0]) - 1) > SAME_SHAPE:
+    if not known.has_shape(*size):
         shape = f"{known.width}x{known.height}, have another shape than the images"
         raise GroundError(f"`ground.size`: its images, {shape}, {size[0]}x{size[1]}")
-    wanted = _COEFFICIENTS.get(known.model)
-    if any(known.distortion) and (wanted is None or len(known.distortion) not in wanted):
+    last = max((n for n, number in enumerate(known.distortion, 1) if number), default=0)
+    model = known.model.strip().lower()
+    length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
+    if length is None:
         model = f"{known.model or 'without a name'} of {len(known.distortion)} numbers"
-        return None, f"the distortion is not known: {model}; known are {', '.join(_COEFFICIENTS)}"
-    return known, ""
+        names = ", ".join(filter(None, COEFFICIENTS))
+        return None, f"the distortion is not known: {model}; known are {names}"
+    numbers = (*known.distortion[:last], *(0.0,) * (length - last))
+    return replace(known, model=model, distortion=numbers), ""
 
 
 def _pose(

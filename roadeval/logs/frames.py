@@ -132,7 +132,8 @@ class Selection:
             lines.append(f"{what}: {source.where} ({source.why}; {words})")
         if known := self.calibration:
             place = f", mounted in {known.mounting.parent}" if known.mounting else ""
-            lines.append(f"calibration: {known.topic} ({known.model or 'no distortion'}{place})")
+            model = known.model or f"{'a nameless' if known.bends else 'no'} distortion"
+            lines.append(f"calibration: {known.topic} ({model}{place})")
         if self.calibration_why:
             lines.append(f"{'' if known else 'no '}calibration: {self.calibration_why}")
         if self.ground_why:

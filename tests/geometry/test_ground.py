@@ -21,7 +21,10 @@ LENSES = {
     "plumb_bob": (-0.3, 0.1, 0.001, -0.002, 0.01),
     "rational_polynomial": (0.2, -0.1, 0.001, 0.0005, 0.02, 0.3, -0.05, 0.01),
     "equidistant": (-0.02, 0.003, -0.001, 0.0002),
+    "fisheye": (0.0, 0.0, 0.0, 0.0),
 }
+TILTED = (-0.2, 0.05, 0.001, 0.002, 0.01, 0.1, 0.0, 0.0, 0.01, -0.02, 0.01, 0.003, 0.05, -0.03)
+"""All of OpenCV's fourteen numbers."""
 
 
 def made(**settings: object) -> Ground:
@@ -47,17 +50,18 @@ def test_places_are_seen_where_the_synthetic_world_draws_them():
     assert np.abs(made().places(seen) - PLACES).max() < 1e-6
 
 
-@pytest.mark.parametrize("model", LENSES)
-def test_a_lens_bends_as_opencv_says_and_back(model: str):
-    ground = made(model=model, distortion=LENSES[model])
+@pytest.mark.parametrize(("model", "numbers"), [*LENSES.items(), ("plumb_bob", TILTED)])
+def test_a_lens_bends_as_opencv_says_and_back(model: str, numbers: tuple[float, ...]):
+    ground = made(model=model, distortion=numbers)
     seen = ground.pixels(PLACES)
     inside = ((seen >= 0) & (seen < SIZE)).all(axis=1)
     assert inside.sum() > 400
     assert np.abs(ground.places(seen) - PLACES)[inside].max() < 1e-6
     turn, origin = ground.axes()
-    project = cv2.fisheye.projectPoints if model == "equidistant" else cv2.projectPoints
+    is_fisheye = model in ("equidistant", "fisheye")
+    project = cv2.fisheye.projectPoints if is_fisheye else cv2.projectPoints
     points = np.column_stack([PLACES, np.zeros(len(PLACES))])[:, None]
-    matrix, distortion = np.reshape(ground.matrix, (3, 3)), np.array(LENSES[model])
+    matrix, distortion = np.reshape(ground.matrix, (3, 3)), np.array(numbers)
     expected = project(points, Rotation.from_matrix(turn).as_rotvec(), origin, matrix, distortion)
     assert np.abs(expected[0].reshape(-1, 2) - seen)[inside].max() < 1e-6
 
@@ -69,6 +73,64 @@ def test_a_polynomial_does_not_bend_far_rays_back_into_the_picture():
     known = np.isfinite(seen).all(axis=1)
     assert 0 < known.sum() < 200
     assert np.abs(ground.places(seen[known]) - beside[known]).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("model", "numbers"),
+    [
+        ("plumb_bob", (-0.45, 0.25, 0.0, 0.0, -0.08)),
+        ("plumb_bob", (-0.4, 0.0, 0.0, 0.0)),
+        ("rational_polynomial", (0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0)),
+        ("equidistant", (-0.35, 0.02, 0.0, 0.0)),
+        ("equidistant", (0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_pixel_that_no_ray_reaches_lies_nowhere(model: str, numbers: tuple[float, ...]):
+    ground = made(model=model, distortion=numbers, focal=(180.0,), pitch=30.0)
+    pixels = np.stack(np.meshgrid(np.arange(640.0), np.arange(480.0)), axis=-1).reshape(-1, 2)
+    away = np.hypot(*(pixels - np.array([319.5, 239.5])).T) / 180
+    slopes = np.linspace(0, 60, 600_001)
+    k = (*numbers, *(0.0,) * 4)
+    angle = np.arctan(slopes)
+    seen = angle * (1 + k[0] * angle**2 + k[1] * angle**4)
+    if model != "equidistant":
+        over = 1 + k[0] * slopes**2 + k[1] * slopes**4 + k[4] * slopes**6
+        seen = slopes * over / (1 + k[5] * slopes**2)
+    farthest = seen[: np.argmax(np.append(np.diff(seen), -1) <= 0) + 1].max()
+    rays = ground.rays(pixels)
+    is_seen = np.isfinite(rays).all(axis=1)
+    assert not is_seen[away > farthest + 0.02].any()
+    assert is_seen[away < farthest - 0.02].all()
+    assert 0 < is_seen.sum() < len(pixels)
+
+
+@pytest.mark.parametrize(
+    ("model", "numbers", "same"),
+    [
+        (
+            "equidistant",
+            (-0.02, 0.003, -0.001, 0.0002, 0.0),
+            ("equidistant", LENSES["equidistant"]),
+        ),
+        (
+            "equidistant",
+            (*LENSES["equidistant"], *(0.0,) * 8),
+            ("equidistant", LENSES["equidistant"]),
+        ),
+        ("equidistant", (-0.02,), ("equidistant", (-0.02, 0.0, 0.0, 0.0))),
+        ("equidistant", (), ("equidistant", (0.0,) * 4)),
+        ("Plumb_Bob ", (-0.3, 0.1), ("plumb_bob", (-0.3, 0.1, 0.0, 0.0))),
+        ("radtan", (-0.3, 0.1, 0.0, 0.01), ("plumb_bob", (-0.3, 0.1, 0.0, 0.01))),
+        ("plumb_bob", (-0.3, 0.1, 0.0, 0.0, 0.0, 0.0), ("plumb_bob", (-0.3, 0.1, 0.0, 0.0))),
+        ("none", (0.0,) * 5, ("", ())),
+    ],
+)
+def test_zeros_may_follow_the_numbers_of_a_model_or_be_missing(
+    model: str, numbers: tuple[float, ...], same: tuple[str, tuple[float, ...]]
+):
+    seen = made(model=model, distortion=numbers, focal=(400.0,)).pixels(PLACES)
+    expected = made(model=same[0], distortion=same[1], focal=(400.0,)).pixels(PLACES)
+    assert seen == pytest.approx(expected, nan_ok=True)
 
 
 def test_nothing_is_on_the_ground_from_the_horizon_upwards():
@@ -143,6 +205,13 @@ def test_what_a_file_says_replaces_what_the_log_says():
     assert ground.distortion == LENSES["plumb_bob"]
 
 
+def test_a_centre_far_from_the_middle_is_told():
+    _, why = ground_of(
+        None, GroundSettings(height=1.3, pitch=4, focal=(560.0,), centre=(639.5, 479.5)), SIZE
+    )
+    assert "its centre, 639.5, 479.5, is far from the middle of 640x480 pixels" in why
+
+
 def test_intrinsics_may_be_for_images_of_another_size():
     larger = made(size=(1280, 960), focal=(1120.0,), centre=(639.5, 479.5))
     assert larger.pixels(PLACES) == pytest.approx(made().pixels(PLACES))
@@ -163,6 +232,22 @@ def test_intrinsics_may_be_for_images_of_another_size():
             None,
             {"height": 1.0, "pitch": 1.0, "fov": 60.0, "model": "mei", "distortion": (1.0,)},
             "the distortion is not known: mei of 1 numbers",
+        ),
+        (
+            None,
+            {"height": 1.0, "pitch": 1.0, "fov": 60.0, "model": "double_sphere"},
+            "the distortion is not known: double_sphere of 0 numbers",
+        ),
+        (
+            None,
+            {
+                "height": 1.0,
+                "pitch": 1.0,
+                "fov": 60.0,
+                "model": "fisheye",
+                "distortion": (0.1,) * 5,
+            },
+            "the distortion is not known: fisheye of 5 numbers",
         ),
     ],
 )

@@ -1,16 +1,16 @@
 """The calibration of a camera, and where it is mounted, from the messages of a log.
 
 Read are ``sensor_msgs/CameraInfo`` and Foxglove's ``CameraCalibration``, the first message of a
-topic; and static transforms, ROS's ``tf2_msgs/TFMessage`` and Foxglove's ``FrameTransform(s)``.
+topic that can be used; and static transforms, ROS's ``tf2_msgs/TFMessage`` and Foxglove's
+``FrameTransform(s)``.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,15 @@ from roadeval.data import Calibration, Mounting
 from roadeval.data.arrays import Vector
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
-from roadeval.logs.topics.reader import TopicInfo, TopicReader
+from roadeval.logs.topics.choose import words
+from roadeval.logs.topics.reader import Size, TopicInfo, TopicReader
 
 LOOKED_AT: Final = 100
-"""Messages of static transforms that are read, at most, of each topic."""
+"""Messages that are read, at most, of each topic."""
 FARTHEST, NOT_UNIT = 1e9, 0.01
 """Metres between two frames, and how far a quaternion's length may be from 1, at most."""
+OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
+"""The rotation from a camera's axes to those of a vehicle: x ahead, y left, z up (REP 103)."""
 DEEPEST: Final = 50
 """Frames on the way from a camera to the root, at most: more are a loop."""
 
@@ -32,51 +35,71 @@ Transform = tuple[str, Vector, Vector]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
 
 
-_RECTIFIED: Final = re.compile(r"(?:^|[_.-])(?:rect(?:ified)?|undist\w*)(?:$|[_.-])", re.I)
+RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undistorted"})
+"""Words of topics of images without distortion."""
+_ADVICE: Final = "give its lens with `ground`"
 
 
 def is_rectified(name: str) -> bool:
-    """Return whether images or labels without distortion have this name, as ``image_rect_color``.
+    """Return whether images without distortion have this name, as ``/cam/rect/image/compressed``.
 
-    The last two parts of a path tell.
+    RealSense calls images that bear theirs ``image_rect_raw``.
     """
-    return any(map(_RECTIFIED.search, name.rstrip("/").split("/")[-2:]))
+    parts = map(words, name.split("/"))
+    return any(part & RECTIFIED and "raw" not in part for part in parts)
+
+
+class Lens(NamedTuple):
+    """What a topic says of the lens of a camera."""
+
+    topic: str
+    frame_id: str
+    calibration: Calibration | None
+    """For images of the camera's size; None if there is none that could be used."""
+    why: str
+    """What is to be said of it, or why there is none."""
 
 
 def calibration_of(
     image: TopicInfo, topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]
 ) -> tuple[Calibration | None, str]:
-    """Return the calibration of a camera and an empty text, or None and why there is none.
+    """Return the calibration of a camera and what is to be said of it, or None and why.
 
     The topic is that whose ``frame_id`` is the images' own; of several, that whose path shares most
     with theirs. The text is empty, too, where the log has no calibration at all.
     """
-    found = list[Calibration]()
-    for topic in topics:
-        if topic.kind is TopicKind.CALIBRATION and topic.count:
-            with suppress(*_UNREADABLE):
-                found.append(_read(topic.name, readers[topic.name].fields(0), image.name))
-    own = [each for each in found if each.frame_id in ("", image.frame_id)]
-    near = [_shared(each.topic, image.name) for each in own]
-    best = [each for each, shared in zip(own, near, strict=True) if shared == max(near)]
-    if len(best) != 1 or not (best[0].frame_id or max(near)):
-        names = ", ".join(each.topic for each in found)
-        return None, f"none of {names} is clearly of {image.name}" if found else ""
-    (made,) = best
-    if made.problem:
-        return None, f"{made.topic}: its {made.problem}"
-    if image.size not in (None, (made.width, made.height)):
-        return None, f"{made.topic}: it is for images of {made.width}x{made.height}"
+    lenses = [
+        _lens_of(topic, readers[topic.name], image)
+        for topic in topics
+        if topic.kind is TopicKind.CALIBRATION and topic.count
+    ]
+    own = [lens for lens in lenses if lens.frame_id in ("", image.frame_id)]
+    near = max((_shared(lens.topic, image.name) for lens in own), default=0)
+    best = [lens for lens in own if _shared(lens.topic, image.name) == near]
+    best = [lens for lens in best if lens.calibration] or best
+    if len(best) != 1 or not (near or best[0].frame_id or best[0].calibration is None):
+        names = ", ".join(lens.topic for lens in lenses)
+        return None, f"none of {names} is clearly of {image.name}" if lenses else ""
+    topic, frame, made, why = best[0]
+    if made is None:
+        return None, f"{topic}: {why}"
+    reader = readers[topic]
     with suppress(*_UNREADABLE):
-        reader = readers[made.topic]
-        if _read(made.topic, reader.fields(len(reader) - 1), image.name) != made:
-            return None, f"{made.topic}: it changes within the log"
+        last, _ = _read(topic, reader.fields(len(reader) - 1), image)
+        if last not in (None, made):
+            return None, f"{topic}: it changes within the log"
     static = [each for each in topics if each.kind is TopicKind.TRANSFORMS]
     transforms = dict(_transforms(readers[each.name] for each in static))
+    notes = [why] * bool(why)
     try:
-        return replace(made, mounting=_mounting(made.frame_id, transforms)), ""
+        mounting = _mounting(frame, transforms)
     except ValueError as error:
-        return made, f"its place is not known: the transform of {error}"
+        return made, "; ".join([*notes, f"its place is not known: the transform of {error}"])
+    if mounting and mounting.has_body_axes:
+        notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read so")
+        mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
+        made = replace(made, frame_id=f"{frame}_optical")
+    return replace(made, mounting=mounting), "; ".join(notes)
 
 
 def _shared(one: str, other: str) -> int:
@@ -85,21 +108,74 @@ def _shared(one: str, other: str) -> int:
     return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)
 
 
-def _read(topic: str, message: Any, image: str) -> Calibration:
-    """Read a message. Of rectified images it is the projection that holds, without distortion."""
+def _lens_of(topic: TopicInfo, reader: TopicReader, image: TopicInfo) -> Lens:
+    """Read the first message that can be used: some drivers send zeros until they are ready."""
+    frame, why = "", "no message can be read"
+    for position in range(min(len(reader), LOOKED_AT)):
+        try:
+            message = reader.fields(position)
+            frame = str(getattr(message, "header", message).frame_id)
+            made, why = _read(topic.name, message, image)
+        except _UNREADABLE:
+            why = f"its {topic.encoding} messages of {topic.schema} cannot be read: {_ADVICE}"
+            continue
+        if made is not None:
+            return Lens(topic.name, frame, made, why)
+    return Lens(topic.name, frame, None, why)
+
+
+def _read(topic: str, message: Any, image: TopicInfo) -> tuple[Calibration | None, str]:
+    """Return a message's calibration and what is to be said of it, or None and why.
+
+    Of rectified images it is the projection that holds, without distortion.
+    """
 
     def numbers(name: str) -> tuple[float, ...]:
         value = getattr(message, name, None)
         return tuple(map(float, getattr(message, name.upper()) if value is None else value))
 
-    header = getattr(message, "header", message)
-    matrix = numbers("k")
+    size, p = (int(message.width), int(message.height)), numbers("p")
     lens = str(message.distortion_model), numbers("d")
-    if is_rectified(image):
-        p, lens = numbers("p"), ("", ())
-        matrix = (*p[:3], *p[4:7], *p[8:11])
-    size = int(message.width), int(message.height)
-    return Calibration(topic, *size, matrix, *lens, str(header.frame_id))
+    frame = str(getattr(message, "header", message).frame_id)
+    made, note = Calibration(topic, *size, numbers("k"), *lens, frame), ""
+    if is_rectified(image.name):
+        flat = replace(made, matrix=(*p[:3], *p[4:7], *p[8:11]), model="", distortion=())
+        if made.bends and not any(p):
+            return None, f"its projection P is zero, and the images are rectified: {_ADVICE}"
+        if made.bends and np.array_equal(flat.matrix, made.matrix):
+            note = "the images are taken as not rectified: P is K, and there is distortion"
+        elif any(p):
+            made = flat
+    if made.problem:
+        return None, f"its {made.problem}"
+    fitted, said = _fitted(made, message, image.size or size)
+    return fitted, "; ".join(filter(None, (note, said)))
+
+
+def _fitted(made: Calibration, message: Any, size: Size) -> tuple[Calibration | None, str]:
+    """Return a calibration for images of a size: of a part of the sensor, binned, or scaled."""
+    region = getattr(message, "roi", None)
+    left, top, across, down = (
+        int(getattr(region, name, 0)) for name in ("x_offset", "y_offset", "width", "height")
+    )
+    bins = [max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy"]
+    whole = made.width, made.height
+    across, down = across or made.width - left, down or made.height - top
+    if min(left, top) < 0 or left + across > whole[0] or top + down > whole[1]:
+        return None, f"its region of interest lies outside its images of {whole[0]}x{whole[1]}"
+    part = made.part((left, top), (across // bins[0], down // bins[1]), bins)
+    if part.problem:
+        return None, f"its {part.problem} of its region of interest, binned"
+    if max(abs(part.width - size[0]), abs(part.height - size[1])) <= (max(bins) > 1):
+        note = "" if left or top else part.doubt
+        return replace(part, width=size[0], height=size[1]), note
+    if size == whole:
+        return made, "its region of interest and binning are not those of the images, and not used"
+    for lens in (part, made):
+        if lens.has_shape(*size):
+            note = f"it is for images of {lens.width}x{lens.height}, and scaled"
+            return lens.scaled(*size), "; ".join(filter(None, (note, lens.doubt)))
+    return None, f"it is for images of {part.width}x{part.height}"
 
 
 def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform]]:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -57,7 +58,11 @@ TEXTS = {
     ),
     "sensor_msgs/msg/CameraInfo": (
         "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n"
-        f"float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n{HEADER}"
+        "float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n"
+        "uint32 binning_x\nuint32 binning_y\n"
+        f"sensor_msgs/RegionOfInterest roi\n{LINE}\nMSG: sensor_msgs/RegionOfInterest\n"
+        "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n"
+        f"{HEADER}"
     ),
     "tf2_msgs/msg/TFMessage": f"geometry_msgs/TransformStamped[] transforms\n{GEOMETRY}{HEADER}",
 }
@@ -79,13 +84,30 @@ def image() -> bytes:
 
 def info(
     frame_id: str = "cam",
-    k: list[float] = K,
+    *,
+    k: Sequence[float] = K,
     size: tuple[int, int] = SIZE,
-    d: list[float] = D,
+    d: Sequence[float] = D,
+    p: Sequence[float] = (0.0,) * 12,
+    model: str = "plumb_bob",
+    binning: tuple[int, int] = (0, 0),
+    roi: tuple[int, int, int, int] = (0, 0, 0, 0),
 ) -> dict[str, Any]:
-    width, height = size
-    lens = {"distortion_model": "plumb_bob", "d": d, "k": k, "r": [0.0] * 9, "p": [0.0] * 12}
-    return {"header": header(frame_id), "height": height, "width": width, **lens}
+    """A CameraInfo; ``roi`` are its first column and row, and its width and height."""
+    names = "x_offset", "y_offset", "width", "height"
+    return {
+        "header": header(frame_id),
+        "height": size[1],
+        "width": size[0],
+        "distortion_model": model,
+        "d": list(d),
+        "k": list(k),
+        "r": [0.0] * 9,
+        "p": list(p),
+        "binning_x": binning[0],
+        "binning_y": binning[1],
+        "roi": {**dict(zip(names, roi, strict=True)), "do_rectify": False},
+    }
 
 
 def transforms(tree: list[Parts]) -> dict[str, Any]:
@@ -106,10 +128,11 @@ def transforms(tree: list[Parts]) -> dict[str, Any]:
 
 def ros2(
     path: Path,
-    infos: dict[str, dict[str, Any]],
+    infos: dict[str, dict[str, Any] | list[dict[str, Any]]],
     tree: list[Parts] = TREE,
+    image_topic: str = "/front/image/compressed",
 ) -> Path:
-    """A log of ROS 2 with one camera on /front/image/compressed."""
+    """A log of ROS 2 with one camera."""
     with path.open("wb") as file:
         writer = Ros2Writer(file)
         schemas = {name: writer.register_msgdef(name, text) for name, text in TEXTS.items()}
@@ -119,10 +142,11 @@ def ros2(
             writer.write_message(topic, schemas[kind], message, log_time=5 * 10**9 + 7)
 
         add("/tf_static", "tf2_msgs/msg/TFMessage", transforms(tree))
-        for topic, message in infos.items():
-            add(topic, "sensor_msgs/msg/CameraInfo", message)
+        for topic, messages in infos.items():
+            for message in messages if isinstance(messages, list) else [messages]:
+                add(topic, "sensor_msgs/msg/CameraInfo", message)
         picture = {"header": header("cam"), "format": "jpeg", "data": image()}
-        add("/front/image/compressed", "sensor_msgs/msg/CompressedImage", picture)
+        add(image_topic, "sensor_msgs/msg/CompressedImage", picture)
         writer.finish()
     return path
 
@@ -232,7 +256,9 @@ def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
         ({"/front/camera_info": info(k=[*K[::3], *K[1::3], *K[2::3]])}, "length is not clear"),
         ({"/front/camera_info": info(d=[math.inf] * 5)}, "its distortion has a number"),
         ({"/front/camera_info": info(size=(0, 0))}, "its size is 0x0"),
-        ({"/front/camera_info": info(size=(128, 96))}, "images of 128x96"),
+        ({"/front/camera_info": info(size=(128, 72))}, "images of 128x72"),
+        ({"/front/camera_info": info(binning=(2**32 - 1, 1))}, "its size is 0x48 pixels of its"),
+        ({"/front/camera_info": info(roi=(32, 0, 64, 48))}, "its region of interest lies outside"),
         ({"/rear/camera_info": info("cam_rear")}, "none of /rear/camera_info is clearly of"),
         ({}, ""),
     ],
@@ -285,3 +311,129 @@ def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
     whole, less = (np.array(m).reshape(3, 3) @ point for m in (K, known.matrix))
     # The image's corner, half a pixel before the centre of its first one, stays where it is.
     assert less[:2] / less[2] + 0.5 == pytest.approx((whole[:2] / whole[2] + 0.5) / [2, 3])
+
+
+@pytest.mark.parametrize(
+    ("given", "matrix"),
+    [
+        # A corner comes off first, and then all is divided, as in ROS's image_geometry.
+        ({"size": (128, 96), "binning": (2, 2), "k": [100.0, 0, 64, 0, 102, 48, 0, 0, 1]}, K),
+        ({"size": (64, 144), "roi": (0, 96, 64, 48), "k": [50.0, 0, 32, 0, 51, 120, 0, 0, 1]}, K),
+        (
+            {
+                "size": (512, 384),
+                "roi": (100, 200, 128, 144),
+                "binning": (2, 3),
+                "k": [100.0, 0, 164, 0, 153, 272, 0, 0, 1],
+            },
+            K,
+        ),
+        # Pixels' centres are counted: the middle of 128 columns, 63.5, is 31.5 of 64.
+        (
+            {"size": (128, 96), "binning": (2, 2), "k": [100.0, 0, 63.5, 0, 102, 47.5, 0, 0, 1]},
+            [50.0, 0, 31.5, 0, 51, 23.5, 0, 0, 1],
+        ),
+    ],
+)
+def test_a_part_of_the_sensor_and_binned_pixels_are_as_ros_means_them(
+    tmp_path: Path, given: dict[str, Any], matrix: list[float]
+):
+    known, why = found(ros2(tmp_path / "a.mcap", {"/front/camera_info": info(**given)}))
+    assert known is not None, why
+    assert (known.width, known.height) == SIZE
+    assert known.matrix == tuple(matrix)
+    assert why == ""
+
+
+@pytest.mark.parametrize(
+    ("given", "focal", "said"),
+    [
+        ({"size": (128, 96)}, 25.0, "it is for images of 128x96, and scaled"),
+        ({"size": (32, 24)}, 100.0, "it is for images of 32x24, and scaled"),
+        ({"binning": (2, 2)}, 50.0, "its region of interest and binning are not those of"),
+        ({"roi": (32, 24, 32, 24)}, 50.0, "its region of interest and binning are not those of"),
+        ({"k": [100.0, 0, 64, 0, 102, 48, 0, 0, 1]}, 100.0, "its centre, 64, 48, is far from"),
+    ],
+)
+def test_a_lens_of_another_resolution_is_scaled_or_doubted_and_said(
+    tmp_path: Path, given: dict[str, Any], focal: float, said: str
+):
+    known, why = found(ros2(tmp_path / "a.mcap", {"/front/camera_info": info(**given)}))
+    assert known is not None, why
+    assert (known.width, known.height, known.matrix[0]) == (*SIZE, focal)
+    assert said in why
+
+
+P = [40.0, 0, 30, 0, 0, 41.0, 20, 0, 0, 0, 1, 0]
+SAME = [*K[:3], 0.0, *K[3:6], 0.0, *K[6:], 0.0]
+
+
+@pytest.mark.parametrize(
+    ("topic", "given", "focal", "bends"),
+    [
+        ("/front/image_rect_color/compressed", {"p": P}, 40.0, False),
+        ("/front/rect/image/compressed", {"p": P}, 40.0, False),
+        ("/front/rectified/image", {"p": P}, 40.0, False),
+        ("/front/imageUndistorted", {"p": P}, 40.0, False),
+        ("/front/image_raw", {"p": P}, 50.0, True),
+        # What RealSense calls so bears its distortion.
+        ("/front/image_rect_raw", {"p": P}, 50.0, True),
+        ("/front/image_rect", {"p": SAME}, 50.0, True),
+        ("/front/image_rect", {"p": SAME, "d": [0.0] * 5}, 50.0, False),
+        ("/front/image_rect", {"d": [0.0] * 5}, 50.0, False),
+    ],
+)
+def test_names_and_numbers_tell_whether_images_are_rectified(
+    tmp_path: Path, topic: str, given: dict[str, Any], focal: float, bends: bool
+):
+    path = ros2(tmp_path / "a.mcap", {"/front/camera_info": info(**given)}, image_topic=topic)
+    known, why = found(path)
+    assert known is not None, why
+    assert (known.matrix[0], known.bends) == (focal, bends)
+    assert ("taken as not rectified" in why) == (given.get("p") == SAME and bends)
+
+
+def test_rectified_images_without_a_projection_have_no_lens(tmp_path: Path):
+    path = ros2(tmp_path / "a.mcap", {"/front/info": info()}, image_topic="/front/image_rect")
+    assert found(path) == (
+        None,
+        "/front/info: its projection P is zero, and the images are rectified: give its lens with "
+        "`ground`",
+    )
+
+
+def test_the_first_message_that_can_be_used_counts(tmp_path: Path):
+    zero = info(k=[0.0] * 9, size=(0, 0))
+    known, why = found(ros2(tmp_path / "a.mcap", {"/front/info": [zero, zero, info(), zero]}))
+    assert known is not None
+    assert (known.matrix, why) == (tuple(K), "")
+
+
+def test_a_camera_frame_with_the_axes_of_a_vehicle_is_read_so(tmp_path: Path):
+    body = Rotation.from_euler("ZYX", [20, 6, 1], degrees=True)
+    optical = body * Rotation.from_quat([-0.5, 0.5, -0.5, 0.5])
+    images = []
+    for name, turn in (("body", body), ("optical", optical)):
+        tree: list[Parts] = [("cam", "base_link", (1.0, 0.0, 1.2), turn)]
+        images.append(found(ros2(tmp_path / name, {"/front/info": info()}, tree)))
+    (of_body, why), (of_optical, nothing) = images
+    assert of_body is not None
+    assert of_optical is not None
+    assert of_body.mounting is not None
+    assert of_optical.mounting is not None
+    apart = Rotation.from_quat(of_body.mounting.rotation).inv() * optical
+    assert apart.magnitude() == pytest.approx(0, abs=1e-9)
+    apart = Rotation.from_quat(of_optical.mounting.rotation).inv() * optical
+    assert apart.magnitude() == pytest.approx(0, abs=1e-9)
+    assert (why, nothing) == ("cam has the axes of a vehicle, x ahead, and is read so", "")
+    assert (of_body.frame_id, of_optical.frame_id) == ("cam_optical", "cam")
+
+
+def test_a_calibration_that_cannot_be_read_is_said(tmp_path: Path):
+    topic, name, content = lens()
+    path = foxglove(tmp_path / "a.mcap", [(topic, name, {**content, "K": None}), picture()])
+    assert found(path) == (
+        None,
+        "/front/calibration: its json messages of foxglove.CameraCalibration cannot be read: give "
+        "its lens with `ground`",
+    )
