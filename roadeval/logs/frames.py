@@ -444,6 +444,27 @@ class FrameStream:
         """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
         return self._selection.camera.images.log_times[np.asarray(self._numbers, np.intp)]
 
+    def unpaired(self) -> Iterator[str]:
+        """Yield a sentence on labels with stamps that no frame has, and on frames that lost theirs.
+
+        Nothing is known of them where frames between others are not read.
+        """
+        first, last, asked = self._numbers[0], self._numbers[-1], len(self._numbers)
+        for name, (source, partners) in self._labels.items():
+            if not isinstance(source.pairing.images, TopicReader) or asked <= last - first:
+                continue
+            shown = f"{name.removeprefix('/')}: "
+            count, away = partners.unpaired(of_all=asked == self.accounting.in_log)
+            if count:
+                yield (
+                    f"{shown}{count} of the {len(source.pictures)} labels of {source.where} belong "
+                    f"to no frame: the first is {away / 1e6:.1f} ms from the nearest, and "
+                    f"{source.pairing.tolerance / 1e6:.1f} may lie between "
+                    "(`topics.sync_tolerance_ms`)"
+                )
+            if partners.missed:
+                yield f"{shown}{partners.missed} frames have no label, for it is nearer to another"
+
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
             name: source.label(position)

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any
 
 import numpy as np
 
@@ -22,14 +22,11 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
-from roadeval.logs.topics.reader import TopicInfo, describe_topic, topic_readers
+from roadeval.logs.topics.reader import SMALL, TopicInfo, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
 from roadeval.logs.truth.pairing import shown_name, with_keys
 from roadeval.runtime.text import visible
-
-SMALL: Final = 50_000_000
-"""Bytes of a log that is read whole where its checksums are of use: that takes a moment."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -376,6 +376,7 @@ def _missing(run: Run) -> Iterator[str]:
         if unused := masks.pairing.unused:
             yield f"{shown}: {unused} labels of {where} belong to no frame"
         yield from (f"{shown}: {where}: {note}" for note in masks.notes)
+    yield from run.frames.unpaired()
 
 
 def _masks(run: Run) -> dict[str, Any]:

@@ -35,6 +35,8 @@ KEPT: Final = 32
 """Messages of a topic to keep, those of at most `KEPT_BYTES`: a label's stamp is looked at before
 its turn, and its chunk, mostly of other topics, is long forgotten when its picture is needed."""
 KEPT_BYTES: Final = 1 << 18
+SMALL: Final = 50_000_000
+"""Bytes of a log that is read whole where that is of use: it takes a moment."""
 CLOUDS: Final = ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
 GAP: Final = 2.5
 """A step of more than so many median periods is a gap."""
@@ -328,6 +330,11 @@ class TopicReader:
         if not ends:
             return len(self)
         return int(np.searchsorted(self.log_times, min(ends), side="right"))
+
+    @property
+    def is_small(self) -> bool:
+        """Whether its files are read whole in a moment."""
+        return sum(len(file.source) for file in self._files) <= SMALL
 
     def readable(self) -> int:
         """Count the messages of the log, without those in chunks found to be damaged."""

@@ -362,8 +362,8 @@ def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
 class Pairing:
     """How the images and labels of one source are paired.
 
-    Equal stamps are a pair (the k-th image and the k-th label of the same stamp); otherwise the
-    nearest within the tolerance, if each is the other's nearest.
+    Equal stamps are a pair (the k-th image and the k-th label of the same stamp), in whatever order
+    they come; otherwise the nearest within the tolerance, if each is the other's nearest.
     """
 
     images: Stamps
@@ -372,6 +372,8 @@ class Pairing:
     """Largest difference of the stamps of a pair."""
     reach_ns: int | None = None
     """Where both are in order: the first stamp on a side that is farther away ends the search."""
+    is_small: bool = False
+    """Whether all stamps may be read to find an equal one."""
     unused: int = 0
     """Labels that belong to no frame of the log, as far as that is known beforehand."""
     unsure: int = 0
@@ -389,15 +391,31 @@ class Partners:
         self._pairing = pairing
         self.near = min(near, max(len(pairing.labels) - 1, 0))
         """Position of a label near the last image's stamp."""
+        self.used: set[int] = set()
+        """Positions of the labels that were found."""
+        self.missed = 0
+        """Images that have no label because another one is nearer to it."""
 
     def of(self, image: int) -> int | None:
         """Return the position of the label of an image; None if it has none."""
+        found = self._label(image)
+        self.used |= set() if found is None else {found}
+        return found
+
+    def _label(self, image: int) -> int | None:
         images, labels, reach = self._pairing.images, self._pairing.labels, self._pairing.reach_ns
         stamp = images.stamp(image)
         if stamp == UNREADABLE or not len(labels):
             return None
         middle = _seek(labels, stamp, _expected(labels, stamp, self.near))
         exact = next(_equal(labels, stamp, middle, reach), None)
+        if self._pairing.is_small and (exact is None or exact in self.used):
+            # It may lie anywhere.
+            same, ranks = self._labels_of.get(stamp, []), self._images_of.get(stamp, [])
+            if same:
+                return dict(zip(ranks, same, strict=False)).get(image)
+        elif exact is None:
+            exact = next(_equal(labels, stamp, min(self.near + 1, len(labels) - 1), reach), None)
         if exact is not None:
             self.near = exact
             before = _equal(images, stamp, image, reach, image)
@@ -407,11 +425,41 @@ class Partners:
         theirs = labels.stamp(label)
         if theirs == UNREADABLE or abs(theirs - stamp) > self._pairing.tolerance:
             return None
-        return (
-            label
-            if _closest(images, theirs, _seek(images, theirs, image), reach) == image
-            else None
-        )
+        if _closest(images, theirs, _seek(images, theirs, image), reach) != image:
+            self.missed += 1
+            return None
+        return label
+
+    @cached_property
+    def _labels_of(self) -> dict[int, list[int]]:
+        return _places(self._pairing.labels)
+
+    @cached_property
+    def _images_of(self) -> dict[int, list[int]]:
+        return _places(self._pairing.images)
+
+    def unpaired(self, *, of_all: bool) -> tuple[int, int]:
+        """Count the labels that no image found: of all, or of those between labels that one did.
+
+        Also return the nanoseconds between the first of them and the nearest image.
+        """
+        images, labels = self._pairing.images, self._pairing.labels
+        ends = (0, len(labels)) if of_all or not self.used else (min(self.used), max(self.used))
+        stamps = [labels.stamp(place) for place in range(*ends) if place not in self.used]
+        stamps = [stamp for stamp in stamps if stamp != UNREADABLE]
+        if not stamps:
+            return 0, 0
+        middle = _seek(images, stamps[0], 0)
+        nearest = _closest(images, stamps[0], middle, self._pairing.reach_ns)
+        return len(stamps), abs(images.stamp(nearest) - stamps[0])
+
+
+def _places(stamps: Stamps) -> dict[int, list[int]]:
+    """Return the positions of each stamp."""
+    places: dict[int, list[int]] = {}
+    for place in range(len(stamps)):
+        places.setdefault(stamps.stamp(place), []).append(place)
+    return places
 
 
 def frames_of(pairing: Pairing, begin: int = 0, end: int | None = None) -> Iterator[int]:
@@ -512,9 +560,10 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
     if clock is Clock.STAMP:
         period = median_period(images.log_times)
         in_order = period > 0 and _rise(images) and _rise(labels)
-        reach = max(REACH * period, camera.tolerance_ns) if in_order else None
+        is_small = images.is_small and (isinstance(labels, NamedLabels) or labels.is_small)
+        reach = max(REACH * period, camera.tolerance_ns) if in_order and not is_small else None
         stamps = Later(labels, offset) if offset else labels
-        return Pairing(images, stamps, camera.tolerance_ns, reach)
+        return Pairing(images, stamps, camera.tolerance_ns, reach, is_small)
     if clock is Clock.LOG_TIME:
         times = Times(images.log_times), Times(labels.log_times + offset)
         return Pairing(*times, camera.tolerance_ns)

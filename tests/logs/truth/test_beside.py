@@ -25,6 +25,7 @@ from roadeval.logs.errors import FrameError
 from roadeval.logs.truth.beside import GREATEST, labels_in
 from roadeval.logs.truth.formats.coco import lengths_in
 from tests.e2e.commands import here
+from tests.fixtures.shared import shared
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 from tests.logs.truth.test_folder import opened
 from tests.logs.truth.test_formats import LABELS, SIZE
@@ -132,6 +133,33 @@ def test_names_pair_labels_whatever_their_order(drive, tmp_path):
     _, labelled, frames = select(drive, path, images=str(named))
     assert labelled == [*range(FRAMES)]
     assert [int(frame.decode().truth.max()) for frame in frames] == [0, 0, 0, 0, 1, 1]
+
+
+@pytest.mark.parametrize("path", shared("failures"))
+def test_shared_labels_in_wrong_forms_meet_their_frames_or_are_refused(path):
+    log, labels = path / "labels" / "bare.mcap", path / "labels"
+    lacking = select(log, labels / "lab1m")[1]
+    assert lacking == [number for number in range(30) if number != 15]
+    first = {"first": 0}
+    assert select(log, labels / "roboflow_names.json", "road", **first)[1] == [10, 12, 17]
+    named = select(log, labels / "prefix_names", images=str(labels / "lab"))[1]
+    assert named == [*range(30)]
+    for name in ("other_camera_names.json", "cvat_two_cameras.xml"):
+        assert "`truth.names`" in refusal(log, labels / name, "road")
+    config = LogConfig(labels=LabelSettings(road=(3,), ignore=(11,)))
+    with open_log(path / "one_stamp_in_the_future.mcap", config) as log:
+        assert sum(frame.labelled for frame in log.frames(log.select())) == 40
+
+
+def test_labels_that_find_no_frame_are_told(drive, tmp_path):
+    """Frames lie 100 ms apart."""
+    late = (0, 20, 51)
+    names = (f"{(START + number * STEP) // 10**6 + late[number]}.png" for number in range(3))
+    path = images(tmp_path / "truth", *names)
+    run, summary = replay(drive, path, "--sync-tolerance", "30")
+    assert summary["frames"]["labelled"] == 2
+    assert "1 of the 3 labels of" in run.stderr
+    assert "the first is 49.0 ms from the nearest, and 30.0 may lie between" in run.stderr
 
 
 # --- Sizes and damage -----------------------------------------------------------------------------

@@ -153,3 +153,38 @@ def test_half_the_frame_period_may_lie_between_an_image_and_its_label(
     stamps, times, asked_ms, found
 ):
     assert tolerance(Topic(stamps, times), asked_ms) == found
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        [*range(0, 250, 10), 9_000, *range(260, 400, 10)],
+        [*range(0, 250, 10), 0, *range(260, 400, 10)],
+        [*range(200, 400, 10), *range(0, 200, 10)],
+        [*range(0, 400, 10)][::-1],
+    ],
+    ids=["one in the future", "one repeated", "two parts exchanged", "backwards"],
+)
+@pytest.mark.parametrize("labels", [lambda stamps: stamps, sorted], ids=["alike", "in order"])
+def test_equal_stamps_are_a_pair_in_whatever_order_they_come(stamps, labels):
+    pairing = Pairing(Stamps(stamps), Stamps(labels(stamps)), 4, is_small=True)
+    partners = Partners(pairing)
+    found = [partners.of(image) for image in range(len(stamps))]
+    assert [labels(stamps)[label] for label in found] == stamps
+    assert len({*found}) == len(found)
+    assert partners.unpaired(of_all=True) == (0, 0)
+
+
+def test_in_a_large_log_a_stamp_in_the_future_is_found_beside_the_last_pair():
+    stamps = [*range(0, 250, 10), 9_000, *range(260, 4000, 10)]
+    images, labels = Stamps(stamps), Stamps(stamps)
+    partners = Partners(Pairing(images, labels, 4, reach_ns=40))
+    assert [partners.of(image) for image in range(20, 30)] == [*range(20, 30)]
+    assert len(labels.read) < 60
+
+
+def test_labels_without_a_frame_and_frames_that_lose_theirs_are_counted():
+    partners = Partners(Pairing(Stamps([100, 104, 200]), Stamps([40, 103, 190, 203]), 5))
+    assert [partners.of(image) for image in range(3)] == [None, 1, 3]
+    assert (partners.unpaired(of_all=True), partners.missed) == ((2, 60), 1)
+    assert partners.unpaired(of_all=False) == (1, 10)
