@@ -183,10 +183,10 @@ def settle(
     labels = {}
     for name, (chosen, reason) in choices.items():
         if chosen is not None:
-            check_size(chosen.name, chosen.size, camera)
             own = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
             reader = readers[chosen.name]
             pairing = by_time(reader, camera, asked.sync_offset_ms if name == TRUTH else 0.0)
+            check_size(chosen.size, reader, 0, camera, pairing)
             meaning = meaning_of(reader, own)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     no_truth = "" if truth.topic else truth.why
@@ -299,7 +299,8 @@ class Accounting:
             yield (
                 f"the images' sizes vary: {len(self.odd_sizes)} of the {self.read} are not of the "
                 f"first one's size but {' or '.join(sizes)} (frames {_named(self.odd_sizes)}); "
-                "labels are held against their own images"
+                "labels are held against their own images, and the recording shows all images in "
+                "the first one's size"
             )
 
 

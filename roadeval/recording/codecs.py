@@ -105,6 +105,12 @@ class Codec:
         """Return the bytes of a frame's array, here of ``(H, W, 3)`` uint8 RGB as a JPEG file."""
         return _jpeg(array)
 
+    def fitted(self, array: Any) -> Array:
+        """Return an array of a frame of another size in that of the recording."""
+        pixels = array.pixels() if isinstance(array, Packed) else array
+        how = cv2.INTER_LINEAR if pixels.ndim == 3 else cv2.INTER_NEAREST
+        return np.asarray(cv2.resize(pixels, (self.width, self.height), interpolation=how))
+
     def columns(self, payloads: list[bytes]) -> Any:
         """Return the viewer's columns of the bytes of many frames."""
         import rerun as rr

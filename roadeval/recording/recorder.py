@@ -83,13 +83,18 @@ def _payloads(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the images of a frame by entity path; of its layers those of some kinds."""
     frame, codecs = result.frame, camera.codecs
-    if frame.media_type in ("image/jpeg", "image/png"):
+    # The viewer takes images for a video, whose size must not change.
+    is_odd = 0 != camera.layout.width != frame.image.shape[1]
+    is_odd |= 0 != camera.layout.height != frame.image.shape[0]
+    if frame.media_type in ("image/jpeg", "image/png") and not is_odd:
         yield at.CAMERA, bytes(frame.payload)
     else:
-        yield at.CAMERA, codecs[at.CAMERA].encode(frame.image)
+        codec = codecs[at.CAMERA]
+        yield at.CAMERA, codec.encode(codec.fitted(frame.image) if is_odd else frame.image)
     for path, picture in _pictures(result, camera.plan, kinds):
         if picture is not None:
-            yield path, codecs[path].encode(picture)
+            codec = codecs[path]
+            yield path, codec.encode(codec.fitted(picture) if is_odd else picture)
 
 
 def _pictures(

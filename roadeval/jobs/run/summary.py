@@ -56,6 +56,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     given = settings.model is not None and not settings.adapt
     unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run)
     thresholds = dict(_thresholds(run))
+    varying = " The images' sizes vary." if run.frames.accounting.odd_sizes else ""
     return Facts(
         **found,
         **as_parts(effects),
@@ -63,7 +64,8 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             *(found["totals"], effects, found["claims"], thresholds),
             unlabelled=unlabelled,
             estimated=estimated,
-        ),
+        )
+        + varying,
         unlabelled=unlabelled,
         estimate=estimated,
         thresholds=thresholds,

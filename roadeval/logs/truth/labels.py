@@ -368,16 +368,16 @@ def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameEr
         return error
 
 
-def samples(pictures: LabelPictures) -> Iterator[tuple[str, Picture]]:
+def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
     """Read the first pictures, and some spread over the rest, as far as they can be read.
 
-    Each comes with its place.
+    Each comes with its position.
     """
     count = len(pictures)
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
     for position in sorted({*range(min(LOOKED_AT, count)), *spread}):
         with suppress(FrameError):
-            yield pictures.place(position), pictures.picture(position)
+            yield position, pictures.picture(position)
 
 
 def beside_log(
@@ -411,7 +411,7 @@ def beside_log(
         words, notes = f"{by}, from {labels.first}" if labels.first else by, labels.origin.notes
     else:
         words = by if settings.pair else camera.clock
-    meaning = meaning_of(labels, settings, camera)
+    meaning = meaning_of(labels, settings, camera, pairing)
     why = f"{count}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
 
@@ -437,16 +437,23 @@ def label_files(settings: LabelPlace) -> list[Path]:
     return [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
 
 
-def check_size(labels: str, size: tuple[int, int] | None, camera: Camera) -> None:
-    """Refuse labels of another size than the images', unless they are resized; a `LogError`."""
+def check_size(
+    size: tuple[int, int] | None, labels: LabelPictures, position: int, camera: Camera, own: Pairing
+) -> None:
+    """Refuse a label of another size than its own image, unless they are resized; a `LogError`."""
     wanted = camera.topic.size
     if camera.resize_labels or size is None or wanted is None or size == wanted:
         return
-    theirs, ours = ("x".join(map(str, each)) for each in (size, wanted))
-    raise LogError(
-        f"{labels} is {theirs}, but {camera.topic.name} is {ours}: scale the labels with "
-        "`topics.resize_truth`"
-    )
+    image = Partners(replace(own, images=own.labels, labels=own.images)).of(position)
+    if image is not None:
+        with suppress(BadMessage, FrameError):
+            wanted = size_of(camera.images.picture(image)) or wanted
+    if size != wanted:
+        theirs, ours = ("x".join(map(str, each)) for each in (size, wanted))
+        raise LogError(
+            f"{labels.place(position)} is {theirs}, but {camera.topic.name} is {ours}: scale the "
+            "labels with `topics.resize_truth`"
+        )
 
 
 def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
@@ -458,7 +465,10 @@ def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
 
 
 def meaning_of(
-    labels: LabelPictures, settings: MaskSettings, camera: Camera | None = None
+    labels: LabelPictures,
+    settings: MaskSettings,
+    camera: Camera | None = None,
+    pairing: Pairing | None = None,
 ) -> Meaning:
     """Find the meaning of labels by looking at some; of those beside the log check the size, too.
 
@@ -469,10 +479,10 @@ def meaning_of(
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
     problem = ""
-    for place, picture in samples(labels):
+    for position, picture in samples(labels):
         try:
-            if camera is not None:
-                check_size(place, size_of(picture), camera)
+            if camera and pairing:
+                check_size(size_of(picture), labels, position, camera, pairing)
             if confidence is None:
                 seen += seen_in(picture, wanted, labels.name, labels.limits)
             else:
