@@ -187,7 +187,7 @@ class Schedule:
             return Role.TRAINING
         if frame.number in self.gap:
             return Role.GAP
-        if frame.truth is None:
+        if frame.truth is None or (frame.truth == IGNORE).all():
             return Role.UNLABELLED
         if self.picks is not None:
             if self.picks.is_proposal(frame.stamp_ns, frame.truth):

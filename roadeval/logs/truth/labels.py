@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -55,6 +55,14 @@ LEAST: Final = np.iinfo(np.int16).min
 NO_LABEL: Final = "values below 0 mean no label, and are ignored"
 _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
 """Masks that need no settings: what their values mean."""
+BLURRED: Final = 48
+"""How far JPEG may move the levels of a mask of 0 and 255."""
+TWO_KINDS: Final = (
+    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road with "
+    "`labels.road`, both where both do"
+)
+RARE: Final = 0.05
+"""Share of the labelled pixels below which what was named is hardly the road before a vehicle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +86,8 @@ class ClassMap:
     by_color: bool
     """Whether colours are looked up instead of values."""
     words: str
+    notes: tuple[str, ...] = ()
+    """Doubts about it, a sentence each."""
 
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
@@ -120,6 +130,9 @@ class ClassMap:
         if self.others == UNKNOWN and (truth == UNKNOWN).any():
             value = int(labels[truth == UNKNOWN][0])
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
+        is_second = self.others == UNKNOWN and self.meaning.get(255) == IGNORE
+        if is_second and (truth == IGNORE).any() and not (truth == ROAD).any():
+            raise BadMessage(f"it holds 255 but no 1: {TWO_KINDS}")
         return truth
 
 
@@ -128,6 +141,7 @@ class Confidence:
     """Confidence maps: road is what has at least the ``threshold``, from 0 to 1."""
 
     threshold: float
+    notes: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
@@ -167,37 +181,46 @@ Meaning = ClassMap | Confidence
 """How label pictures of one source are read."""
 
 
-def seen_in(picture: Picture, labels: LabelSettings, name: str, limits: Limits) -> set[int]:
-    """Return the values, or packed colours, that occur in a label picture of a topic or folder.
+def seen_in(
+    picture: Picture, labels: LabelSettings, name: str, limits: Limits, file: Path | None = None
+) -> Mapping[int, int]:
+    """Return the values, or packed colours, of a label picture, and how many pixels have each.
 
-    A `BadMessage` if it cannot be decoded. A `LogError` if it holds colours, and values are looked
-    for; or is compressed in a way that changes values.
+    ``file`` is its own, if it has one. A `BadMessage` if it cannot be decoded. A `LogError` if it
+    holds colours, and values are looked for; or is compressed in a way that changes values.
     """
     if format_ := lossy_format(picture):
-        raise LogError(lossy_labels(name, format_))
-    if labels.road_colors:
-        return set(np.unique(pack_colors(to_rgb(picture, limits))).tolist())
-    pixels = to_labels(picture, limits)
-    if pixels.ndim != 2:
-        colors = map(_color_name, np.unique(pack_colors(pixels)).tolist())
+        levels = to_rgb(picture, limits)[..., 0]
+        if file is None or np.mean((levels > BLURRED) & (levels < 255 - BLURRED)) > RARE:
+            raise LogError(lossy_labels(name, format_))
+        white = "cv2.threshold(cv2.imread(str(f), 0), 127, 255, 0)[1]"
+        files = f"pathlib.Path({name!r}).glob('*{file.suffix}')"
+        raise LogError(
+            f"{name} holds masks as {format_}, which blurs their edges; make a new folder of them: "
+            'mkdir png && python -c "import cv2, pathlib; '
+            f"[cv2.imwrite(f'png/{{f.stem}}.png', {white}) for f in {files}]\""
+        )
+    pixels = to_rgb(picture, limits) if labels.road_colors else to_labels(picture, limits)
+    packed = pixels if pixels.ndim == 2 else pack_colors(pixels)
+    packed = np.maximum(packed, LEAST) if packed.dtype.kind == "i" else packed
+    values, counts = np.unique(packed, return_counts=True)
+    if pixels.ndim != 2 and not labels.road_colors:
+        colors = map(_color_name, values.tolist())
         raise LogError(
             f"{name} holds the colours {_listed(colors)}: name those that mean road with "
             "`labels.road_colors`"
         )
-    if pixels.dtype.kind == "i":
-        return set(np.unique(np.maximum(pixels, LEAST)).tolist())
-    return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
+    return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
 
-def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMap:
+def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name: str) -> ClassMap:
     """Decide what the values of label pictures mean.
 
-    A `LogError` if a given value does not occur, or none is given and the values are class ids.
-    ``seen`` are the values, or packed colours, that occur in some of the pictures, once for each
-    picture in which they do.
+    ``pictures`` are the values, or packed colours, that occur in each of some pictures. A
+    `LogError` if a given value does not occur, or none is given and the values are class ids, or
+    do not mean the same in all pictures.
     """
-    pictures = Counter(seen)
-    values = sorted(pictures)
+    values = sorted({value for picture in pictures for value in picture})
     if labels.road or labels.road_colors:
         by_color = bool(labels.road_colors)
         text = _color_name if by_color else str
@@ -207,19 +230,19 @@ def understand(labels: LabelSettings, seen: Iterable[int], name: str) -> ClassMa
         there = f"{name}, whose frames hold {_listed(map(text, values))}"
         given = _as_given(wanted, {value: value for value in values}, there, by_color=by_color)
         return _without_negatives(given, values)
+    remedy = (
+        "name those that mean road with `labels.road`, and those to leave out with `labels.ignore`"
+    )
     for meaning in _MASKS:
-        # A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would
-        # be ignored.
-        white = next(value for value, truth in meaning.items() if truth == ROAD)
-        is_plain = white > 1 or 2 * pictures[white] >= pictures[255]
-        if {value for value in values if value >= 0} <= meaning.keys() and is_plain:
+        if {value for value in values if value >= 0} <= meaning.keys():
+            white = next(value for value, truth in meaning.items() if truth == ROAD)
+            if white == 1 and any(255 in picture and 1 not in picture for picture in pictures):
+                remedy = TWO_KINDS
+                break
             ignored = [str(value) for value in values if meaning.get(value) == IGNORE]
             words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
             return _without_negatives(ClassMap(meaning, UNKNOWN, False, words), values)
-    raise LogError(
-        f"{name} holds the values {_listed(map(str, values))}: name those that mean road with "
-        "`labels.road`, and those to leave out with `labels.ignore`"
-    )
+    raise LogError(f"{name} holds the values {_listed(map(str, values))}: {remedy}")
 
 
 def _without_negatives(classes: ClassMap, values: Iterable[int]) -> ClassMap:
@@ -477,16 +500,17 @@ def meaning_of(
     origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
     wanted = settings.labels
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
-    seen: list[int] = []
+    seen: list[Mapping[int, int]] = []
     problem = ""
     for position, picture in samples(labels):
+        file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
         try:
             if camera and pairing:
                 check_size(size_of(picture), labels, position, camera, pairing)
             if confidence is None:
-                seen += seen_in(picture, wanted, labels.name, labels.limits)
+                seen.append(seen_in(picture, wanted, labels.name, labels.limits, file))
             else:
-                seen.append(int(confidence.codes(picture, labels.limits).max()))
+                seen.append({int(confidence.codes(picture, labels.limits).max()): 1})
         except BadMessage as error:
             problem = problem or str(error)
     if not seen:
@@ -494,5 +518,32 @@ def meaning_of(
     if confidence is not None:
         return confidence
     if origin.occurring:
-        return of_classes(wanted, origin, labels.name)
-    return understand(wanted, seen, labels.name)
+        meaning = of_classes(wanted, origin, labels.name)
+    else:
+        meaning = understand(wanted, seen, labels.name)
+    names = {value: name for name, value in origin.classes.items()} | {0: "no shape"}
+    return replace(meaning, notes=_doubts(wanted, meaning, seen, names if origin.classes else {}))
+
+
+def _doubts(
+    asked: LabelSettings,
+    meaning: ClassMap,
+    pictures: Sequence[Mapping[int, int]],
+    names: Mapping[int, str],
+) -> tuple[str, ...]:
+    """Return a warning where what was said to be road is hardly anywhere in some pictures."""
+    pixels = sum(map(Counter, pictures), Counter[int]())
+    truth = {value: meaning.meaning.get(value, meaning.others) for value in pixels}
+    counted = sum(n for value, n in pixels.items() if truth[value] != IGNORE)
+    road = sum(n for value, n in pixels.items() if truth[value] == ROAD)
+    if not (asked.road or asked.road_colors) or road >= RARE * counted:
+        return ()
+    shares = ", ".join(
+        f"{names.get(value) or (_color_name(value) if meaning.by_color else value)} "
+        f"({100 * n / pixels.total():.1f} %)"
+        for value, n in pixels.most_common(8)
+    )
+    return (
+        f"road is {100 * road / counted:.2f} % of the labelled pixels that were looked at, which "
+        f"are {shares}: does `labels.road` name the road?",
+    )

@@ -185,6 +185,16 @@ def test_a_damaged_file_among_many_loses_its_frame(drive, tmp_path):
     assert summary["frames"]["skipped"] == {"undecodable": 1}
 
 
+def test_a_frame_that_is_ignored_as_a_whole_is_evaluated_nowhere(drive, tmp_path):
+    path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
+    images(path, "3.png", pixels=np.full_like(LOWER, 128))
+    run, summary = replay(drive, path)
+    assert run.returncode == 0
+    assert summary["frames"]["evaluated"] == summary["totals"]["net"]["post"]["frames"] == 5
+    assert summary["beyond"]["net"]["frames"] == 5
+    assert summary["frames"]["skipped"] == {"unlabelled": 1}
+
+
 @pytest.mark.parametrize("name", ["1.png", "1.npy", "a.json", "a.xml", "1.txt"])
 def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
     path = tmp_path / "truth"

@@ -1,24 +1,30 @@
 """What the values of a label image mean."""
 
 import io
+import subprocess
+import sys
+from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
 from roadeval.images import Limits
-from roadeval.logs import LabelSettings, LogError
+from roadeval.logs import LabelSettings, LogError, MaskSettings
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
-from roadeval.logs.truth.labels import seen_in, understand
+from roadeval.logs.truth.beside import file_label
+from roadeval.logs.truth.labels import meaning_of, seen_in, understand
+from roadeval.logs.truth.pairing import LabelSet, with_keys
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()
 
 
 def truth(values: list[int], labels: LabelSettings | None = None) -> list[int]:
-    table = understand(labels or LabelSettings(), values, "/labels")
+    table = understand(labels or LabelSettings(), [values], "/labels")
     return table.of_values(np.array([values], np.uint8))[0].tolist()
 
 
@@ -36,15 +42,23 @@ def test_a_mask_is_understood_by_itself(values: list[int], expected: list[int]) 
     assert truth(values) == expected
 
 
-@pytest.mark.parametrize(("images", "plain"), [(3, True), (2, True), (1, False)])
-def test_a_one_in_few_images_of_a_mask_turns_nothing_around(images, plain):
-    """Were it road, 255 would be ignored: then one damaged pixel would take all the road away."""
-    seen = [0, 255] * 4 + [1] * images
-    if plain:
-        assert understand(LabelSettings(), seen, "/mask").meaning == {0: 0, 1: 1, 255: 255}
-    else:
-        with pytest.raises(LogError, match="/mask holds the values 0 1 255: name those"):
-            understand(LabelSettings(), seen, "/mask")
+@pytest.mark.parametrize(
+    "pictures",
+    [[{0, 1}, {0, 255}], [{0, 255}] * 3 + [{0, 1, 255}], [{0, 1, 255}] * 9 + [{0, 255}]],
+)
+def test_values_that_mean_road_in_some_pictures_and_ignored_in_others_are_asked_for(pictures):
+    """Two annotators' labels in one folder: 255 would be ignored in half of them."""
+    with pytest.raises(LogError, match=r"/mask holds the values 0 1 255: 255 is road in masks of"):
+        understand(LabelSettings(), pictures, "/mask")
+    given = understand(LabelSettings(road=(1, 255)), pictures, "/mask")
+    assert given.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
+
+
+def test_a_picture_whose_values_mean_something_else_than_those_looked_at_is_no_label():
+    table = understand(LabelSettings(), [{0, 1}], "/mask")
+    with pytest.raises(BadMessage, match="it holds 255 but no 1: 255 is road in masks of 0 and"):
+        table.of_values(np.array([[0, 255]], np.uint8))
+    assert table.of_values(np.array([[1, 255]], np.uint8)).tolist() == [[1, 255]]
 
 
 def test_class_ids_are_asked_for_with_the_values_seen() -> None:
@@ -60,7 +74,7 @@ def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
 @pytest.mark.parametrize("setting", ["road", "ignore"])
 def test_a_name_for_labels_without_names_is_refused(setting: str) -> None:
     with pytest.raises(LogError, match=f"`labels.{setting}` sky does not occur in /labels"):
-        understand(LabelSettings(**{"road": (3,), setting: ("sky",)}), [0, 3], "/labels")
+        understand(LabelSettings(**{"road": (3,), setting: ("sky",)}), [[0, 3]], "/labels")
 
 
 @pytest.mark.parametrize(
@@ -83,7 +97,7 @@ def test_ignore_needs_road() -> None:
 
 
 def test_a_mask_that_later_holds_another_value_is_not_guessed_at() -> None:
-    table = understand(LabelSettings(), [0, 255], "/mask")
+    table = understand(LabelSettings(), [[0, 255]], "/mask")
     with pytest.raises(BadMessage, match="holds the value 7"):
         table.of_values(np.array([[0, 7]], np.uint8))
 
@@ -106,7 +120,7 @@ ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
 def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
     labels = LabelSettings(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
-    table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
+    table = understand(labels, [seen_in(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
 
@@ -127,7 +141,7 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
     assert to_labels(picture, LIMITS).tolist() == [[0, 1, 2]]
     labels = LabelSettings(road_colors=(ROAD,))
-    table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
+    table = understand(labels, [seen_in(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[0, 1, 0]]
 
 
@@ -137,4 +151,37 @@ def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelS
     with pytest.raises(LogError, match=r"/labels is JPEG, .*: log labels as PNG"):
         seen_in(picture, labels, "/labels", LIMITS)
     with pytest.raises(BadMessage, match="a JPEG, whose compression changes label values"):
-        understand(labels, [0, 255], "/labels").read(picture, LIMITS)
+        understand(labels, [[0, 255]], "/labels").read(picture, LIMITS)
+
+
+def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(
+    tmp_path, monkeypatch
+):
+    mask = np.zeros((64, 64), np.uint8)
+    mask[20:, 11:53] = 255
+    (tmp_path / "7.jpg").write_bytes(jpeg(np.dstack([mask] * 3)))
+    picture = CompressedPicture(0, "jpeg", (tmp_path / "7.jpg").read_bytes())
+    with pytest.raises(LogError, match="which blurs their edges; make a new folder") as caught:
+        seen_in(picture, LabelSettings(), str(tmp_path), LIMITS, tmp_path / "7.jpg")
+    monkeypatch.chdir(tmp_path)
+    program = str(caught.value).partition('python -c "')[2].rstrip('"')
+    (tmp_path / "png").mkdir()
+    subprocess.run([sys.executable, "-c", program], check=True)
+    mended = CompressedPicture(0, "png", (tmp_path / "png" / "7.png").read_bytes())
+    np.testing.assert_array_equal(to_labels(mended, LIMITS), mask)
+
+
+@pytest.mark.parametrize("road", [(7,), ("fence",)])
+def test_road_that_covers_hardly_any_pixel_is_told_with_the_classes(tmp_path, road):
+    pixels = np.full((20, 20), 3, np.uint8)
+    pixels[0, :2] = 7
+    cv2.imwrite(str(tmp_path / "0.png"), pixels)
+    origin = LabelSet((file_label(tmp_path / "0.png"),))
+    if road == ("fence",):
+        classes = {"fence": 7, "road": 3}
+        origin = replace(origin, classes=classes, occurring={"fence": 1, "road": 1})
+    place = MaskSettings(str(tmp_path), labels=LabelSettings(road=road))
+    (note,) = meaning_of(with_keys(origin, str(tmp_path), place, LIMITS), place).notes
+    names = "3 (99.5 %), 7 (0.5 %)" if road == (7,) else "road (99.5 %), fence (0.5 %)"
+    assert note.startswith("road is 0.50 % of the labelled pixels that were looked at, which are")
+    assert f"{names}: does `labels.road` name the road?" in note
