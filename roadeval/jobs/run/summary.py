@@ -308,8 +308,8 @@ def _of_picks(run: Run) -> Iterator[str]:
     own = scored + sum(roles[each] for each in used)
     if (unchanged := run.frames.accounting.labelled - own) > 0:
         yield (
-            f"{unchanged} labels are as they were proposed, or ignored as a whole, and count as not "
-            f"labelled; of one that is right as it is, empty `proposal` in {PICK}"
+            f"{unchanged} labels are as they were proposed, or ignored as a whole, and count as "
+            f"not labelled; of one that is right as it is, empty `proposal` in {PICK}"
         )
     known = {each.frame for each in picks.picked}
     if others := len(run.board.apart.keys() - known):

@@ -43,18 +43,25 @@ class Outline(NamedTuple):
 
     def fill(self, size: Size) -> Mask:
         """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if it is no outline."""
-        width, height = size
-        crossings = np.zeros((height, width + 1), np.bool_)
         points = self.points()
+        filled = np.zeros(size[::-1], np.bool_)
+        if not len(points):
+            return filled
+        # Its window of the image: pixels from the first to before the last.
+        left, top = np.clip(np.ceil(points.min(axis=0)), 0, size).astype(int).tolist()
+        right, bottom = np.clip(np.floor(points.max(axis=0)) + 1, 0, size).astype(int).tolist()
+        crossings = np.zeros((bottom - top, right - left + 1), np.bool_)
         for side in zip(points.tolist(), np.roll(points, -1, axis=0).tolist(), strict=True):
             # In one direction, whichever of two outlines the side belongs to.
             (x, y), (next_x, next_y) = sorted(side, key=itemgetter(1))
-            first, end = np.ceil(np.clip((y, next_y), 0, height)).astype(int)
+            first, end = np.ceil(np.clip((y, next_y), top, bottom)).astype(int)
             if first < end:
                 rows = np.arange(first, end)
                 at = x + (rows - y) * (next_x - x) / (next_y - y)
-                crossings[rows, np.ceil(np.clip(at, 0, width)).astype(int)] ^= True
-        filled: Mask = np.logical_xor.accumulate(crossings, axis=1)[:, :width]
+                columns = np.ceil(np.clip(at, left, right)).astype(int)
+                crossings[rows - top, columns - left] ^= True
+        inside = np.logical_xor.accumulate(crossings, axis=1)
+        filled[top:bottom, left:right] = inside[:, : right - left]
         return filled
 
     def points(self) -> npt.NDArray[np.float64]:
@@ -265,30 +272,26 @@ def settled(
     """
     whole = [known for drawing in drawn if (known := _with_known(drawing, meant, broken))]
     shapes = [shape for drawing in drawn for shape in drawing.shapes]
-    for what, boxed in (
+    undrawn = [s for s in shapes if isinstance(s, Undrawn) and s.label not in meant.road]
+    for what, is_ignored in (
         ("not drawn: where they lie on the road, it counts as road", False),
         ("ignored as the boxes around them, for they have no outline", True),
     ):
-        kinds = Counter(
-            f"{shape.label} ({shape.what})"
-            for shape in shapes
-            if isinstance(shape, Undrawn)
-            and shape.label not in meant.road
-            and (shape.label in meant.ignored) is boxed
-        )
+        some_of = [s for s in undrawn if (s.label in meant.ignored) is is_ignored]
+        kinds = Counter(f"{shape.label} ({shape.what})" for shape in some_of).most_common()
         if kinds:
-            named = ", ".join(f"{count} of {kind}" for kind, count in kinds.most_common())
-            notes.append(f"{kinds.total()} of {len(shapes)} shapes are {what}: {named}")
-    without = [drawing.image for drawing in whole if meant.road.isdisjoint(drawing.classes)]
+            named = ", ".join(f"{count} of {kind}" for kind, count in kinds)
+            notes.append(f"{len(some_of)} of {len(shapes)} shapes are {what}: {named}")
+    without = [drawing for drawing in whole if meant.road.isdisjoint(drawing.classes)]
     if without and meant.road:
-        counted = "are left out" if meant.skip_roadless else "count as images without road"
+        counted = "left out" if meant.skip_roadless else "counted as images without road"
         advice = "" if meant.skip_roadless else "; `truth.skip_roadless` leaves them out"
         notes.append(
-            f"{len(without)} of {len(drawn)} images have shapes, but none of road, and {counted} "
-            f"({some(without)}){advice}"
+            f"{len(without)} of {len(drawn)} images have shapes, but none of road, and are "
+            f"{counted} ({some([drawing.image for drawing in without])}){advice}"
         )
         if meant.skip_roadless:
-            whole = [drawing for drawing in whole if drawing.image not in without]
+            whole = [drawing for drawing in whole if drawing not in without]
     notes += _hidden(whole, meant)
     return whole
 
@@ -307,10 +310,8 @@ def _with_known(drawing: Drawing, meant: Meant, broken: dict[str, str]) -> Drawi
     return replace(drawing, shapes=tuple(shapes))
 
 
-COARSE: Final = 480
-"""Pixels of the longer side of an image in which overlaps are looked for."""
-LOOKED_AT: Final = 30
-"""Images in which they are looked for, spread over all."""
+LOOKED_AT: Final = 20
+"""Images in which overlaps are looked for, spread over all."""
 TOUCHING: Final = 0.005
 """Share of the road's pixels that may cover another shape without a word: outlines that touch."""
 
@@ -318,22 +319,28 @@ TOUCHING: Final = 0.005
 def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
     """Yield a warning where road covers earlier shapes of other classes, which count as road."""
     crossed = [drawing for drawing in drawn if _is_over(drawing, meant)]
-    places = np.linspace(0, len(crossed) - 1, min(LOOKED_AT, len(crossed)), dtype=int)
-    share, images, classes = 0.0, 0, Counter[str]()
-    for place in places.tolist():
+    looked = crossed[:: -(-len(crossed) // LOOKED_AT) or 1]
+    shares, classes = list[float](), Counter[str]()
+    for drawing in looked:
+        names = ["", *drawing.classes]
+        values = {name: value for value, name in enumerate(names)}
+        road = [values[name] for name in names if name in meant.road]
+        below = replace(
+            drawing, shapes=sorted(drawing.shapes, key=lambda shape: shape.label not in meant.road)
+        )
         with suppress(BadMessage, ValueError, TypeError, OverflowError):
-            under, road = _covered(crossed[place], meant)
-            if under.total() > TOUCHING * road:
-                share, images = share + under.total() / road, images + 1
-                classes += under
-    if images:
-        seen = f"{len(places)} images looked at" if len(places) < len(crossed) else "images"
-        total = len(places) if len(places) < len(crossed) else len(drawn)
-        names = ", ".join(name for name, _ in classes.most_common())
+            top, under = (each.pixels(values, Limits()) for each in (drawing, below))
+            is_road = np.isin(top, road)
+            hidden = under[is_road & ~np.isin(under, road)]
+            if len(hidden) > TOUCHING * np.count_nonzero(is_road):
+                shares.append(len(hidden) / np.count_nonzero(is_road))
+                classes.update(names[value] for value in np.unique(hidden).tolist())
+    if shares:
+        every = len(looked) if len(looked) < len(crossed) else len(drawn)
         yield (
-            f"road was drawn over {names} in {images} of {total} {seen}: {share / images:.1%} of "
-            "the road's pixels there, which count as road; draw road first, or name these classes "
-            "in `labels.ignore`"
+            f"road was drawn over {', '.join(name for name, _ in classes.most_common())} in "
+            f"{len(shares)} of {every} images: {100 * np.mean(shares):.1f} % of the road's pixels "
+            "there, which count as road; draw road first, or name these classes in `labels.ignore`"
         )
 
 
@@ -342,30 +349,3 @@ def _is_over(drawing: Drawing, meant: Meant) -> bool:
     labels = [shape.label for shape in drawing.shapes if shape.label not in meant.ignored]
     first = next((n for n, label in enumerate(labels) if label not in meant.road), len(labels))
     return not meant.road.isdisjoint(labels[first:])
-
-
-def _covered(drawing: Drawing, meant: Meant) -> tuple[Counter[str], int]:
-    """Return how many pixels of road cover an earlier shape, by its class, and how many there are.
-
-    Pixels are those of a reduced image.
-    """
-    assert drawing.size is not None
-    step = -(-max(drawing.size) // COARSE)
-    small = (-(-drawing.size[0] // step), -(-drawing.size[1] // step))
-    names = ["", *drawing.classes]
-    top, under = np.zeros((2, *small[::-1]), np.uint16)
-    road = np.zeros(small[::-1], np.bool_)
-    for shape in drawing.shapes:
-        if isinstance(shape, Outline):
-            ring = (np.asarray(shape.ring, np.float64) / step).tolist()
-            area = shape._replace(ring=ring).fill(small)
-        else:
-            area = shape.fill(drawing.size)[::step, ::step]
-        if shape.label in meant.road:
-            under = np.where(area & (top > 0), top, under)
-            top[area], road[area] = 0, True
-        else:
-            top[area], under[area], road[area] = names.index(shape.label), 0, False
-    pixels = np.bincount(under.ravel(), minlength=len(names)).tolist()
-    counts = {name: n for name, n in zip(names[1:], pixels[1:], strict=True) if n}
-    return Counter(counts), int(road.sum())

@@ -279,14 +279,14 @@ def test_road_over_an_earlier_class_is_told_with_its_share(tmp_path):
     content = streets("car road", "road car", "tree road")
     found, (note,) = read(tmp_path, "a.json", content)
     assert counts(found["0.png"])["road"] == 768
-    assert note.startswith("road was drawn over car in 1 of 3 images: 13.0% of the road's pixels")
+    assert note.startswith("road was drawn over car in 1 of 3 images: 13.0 % of the road's pixels")
 
 
 def test_images_without_a_road_are_told_and_can_be_left_out(tmp_path):
     content = streets("road", "car", "tree car", "road tree")
     found, (note,) = read(tmp_path, "a.json", content)
     assert len(found) == 4
-    assert note.startswith("2 of 4 images have shapes, but none of road, and count as images")
+    assert note.startswith("2 of 4 images have shapes, but none of road, and are counted")
     assert "(1.png, 2.png); `truth.skip_roadless` leaves them out" in note
     found, (note,) = read(tmp_path, "a.json", content, skip_roadless=True)
     assert [*found] == ["0.png", "3.png"]

@@ -6,21 +6,25 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.logs.truth.drawn import Drawing, LabelFormat, Outline, Size, flat, size_in
+from roadeval.logs.truth import drawn
 
 
 def _is_cityscapes(_: Path, content: Any) -> bool:
     return isinstance(content, dict) and {"imgWidth", "imgHeight", "objects"} <= content.keys()
 
 
-def _cityscapes(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
+def _cityscapes(
+    path: Path, content: Mapping[str, Any], _: drawn.Size | None
+) -> Iterator[drawn.Drawing]:
     shapes = (
-        Outline(str(thing["label"]), flat(thing["polygon"]))
+        drawn.Outline(str(thing["label"]), drawn.flat(thing["polygon"]))
         for thing in content["objects"]
         if not thing.get("deleted")
     )
-    yield Drawing(str(path), size_in(content, "imgWidth", "imgHeight"), shapes)
+    yield drawn.Drawing(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
 
 
-CITYSCAPES: Final = LabelFormat("Cityscapes", ".json", _is_cityscapes, _cityscapes, one_image=True)
+CITYSCAPES: Final = drawn.LabelFormat(
+    "Cityscapes", ".json", _is_cityscapes, _cityscapes, one_image=True
+)
 FORMATS: Final = (CITYSCAPES,)

@@ -11,19 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.truth.drawn import (
-    PROPOSED,
-    Drawing,
-    LabelFormat,
-    Outline,
-    Proposal,
-    Runs,
-    Shape,
-    Size,
-    Undrawn,
-    rectangle,
-    size_in,
-)
+from roadeval.logs.truth import drawn
 
 
 def _is_coco(_: Path, content: Any) -> bool:
@@ -31,7 +19,7 @@ def _is_coco(_: Path, content: Any) -> bool:
     return isinstance(content, dict) and keys <= content.keys()
 
 
-def _coco(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
+def _coco(path: Path, content: Mapping[str, Any], _: drawn.Size | None) -> Iterator[drawn.Drawing]:
     categories = _by_id(path, "category", content["categories"])
     names = {number: str(category["name"]) for number, category in categories.items()}
     images = _by_id(path, "image", content["images"])
@@ -43,9 +31,9 @@ def _coco(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Dr
     for number in annotations.keys() - images.keys():
         raise LogError(f"{path}: annotations are of image {number}, which is not listed")
     for number, image in images.items():
-        size = size_in(image)
+        size = drawn.size_in(image)
         shapes = _shapes(annotations[number], names, size)
-        yield Drawing(str(image["file_name"]), size, shapes)
+        yield drawn.Drawing(str(image["file_name"]), size, shapes)
 
 
 def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[Any, Any]:
@@ -61,8 +49,8 @@ def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[A
 
 
 def _shapes(
-    annotations: Iterable[Mapping[str, Any]], names: Mapping[Any, str], size: Size | None
-) -> Iterator[Shape]:
+    annotations: Iterable[Mapping[str, Any]], names: Mapping[Any, str], size: drawn.Size | None
+) -> Iterator[drawn.Shape]:
     for annotation in annotations:
         if (label := names.get(annotation["category_id"])) is None:
             raise BadMessage(f"an annotation of category {annotation['category_id']}, not listed")
@@ -70,22 +58,26 @@ def _shapes(
             case {"counts": counts, **rest}:
                 yield run_lengths(label, counts, rest.get("size"), size)
             case [[*_], *_] as rings if any(rings):
-                yield from (Outline(label, ring) for ring in rings if ring)
+                yield from (drawn.Outline(label, ring) for ring in rings if ring)
             case None | [] | [[]]:
                 left, top, width, height = annotation.get("bbox") or (0, 0, 0, 0)
-                box = rectangle(label, left, top, left + width, top + height) if width else None
-                yield Undrawn(label, "box without an outline", box)
+                box = (
+                    drawn.rectangle(label, left, top, left + width, top + height) if width else None
+                )
+                yield drawn.Undrawn(label, "box without an outline", box)
             case other:
-                yield Outline(label, other)
+                yield drawn.Outline(label, other)
 
 
-def run_lengths(label: str, counts: Any, stated: Any, size: Size | None) -> Runs:
+def run_lengths(label: str, counts: Any, stated: Any, size: drawn.Size | None) -> drawn.Runs:
     """Return an area of runs, with the height and width that are stated beside them."""
     if size is not None and stated is not None and (stated[1], stated[0]) != size:
         raise BadMessage(
             f"a mask of {label} that is {stated[1]}x{stated[0]}, on an image of {size[0]}x{size[1]}"
         )
-    return Runs(label, lengths_in(counts) if isinstance(counts, str) else counts, by_columns=True)
+    return drawn.Runs(
+        label, lengths_in(counts) if isinstance(counts, str) else counts, by_columns=True
+    )
 
 
 def lengths_in(text: str) -> Sequence[int]:
@@ -109,7 +101,7 @@ def lengths_in(text: str) -> Sequence[int]:
     return lengths
 
 
-def _as_coco(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+def _as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
     """Return one file, with a region of uncompressed runs for each image."""
     images, annotations = [], []
     for number, each in enumerate(proposals, 1):
@@ -126,9 +118,9 @@ def _as_coco(proposals: Sequence[Proposal]) -> dict[str, bytes]:
             {**about, "area": int(each.road.sum()), "bbox": box, "segmentation": runs}
         )
     content = {"images": images, "annotations": annotations}
-    content["categories"] = [{"id": 1, "name": PROPOSED}]
+    content["categories"] = [{"id": 1, "name": drawn.PROPOSED}]
     return {"instances.json": json.dumps(content).encode()}
 
 
-COCO: Final = LabelFormat("COCO", ".json", _is_coco, _coco, _as_coco)
+COCO: Final = drawn.LabelFormat("COCO", ".json", _is_coco, _coco, _as_coco)
 FORMATS: Final = (COCO,)

@@ -8,64 +8,54 @@ from typing import Final
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth.drawn import (
-    PROPOSED,
-    Drawing,
-    LabelFormat,
-    Outline,
-    Proposal,
-    Runs,
-    Shape,
-    Size,
-    Undrawn,
-    ellipse,
-    hull,
-    rectangle,
-    size_in,
-)
+from roadeval.logs.truth import drawn
 
 _NO_AREAS: Final = ("polyline", "points", "tag", "skeleton")
 
 
-def _cvat(path: Path, content: Element, _: Size | None) -> Iterator[Drawing]:
+def _cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
     if content.find("track") is not None:
         raise LogError(f"{path}: tracks of a video; export it as CVAT for images")
     for image in content.iter("image"):
-        yield Drawing(image.attrib["name"], size_in(image.attrib), _shapes(image))
+        yield drawn.Drawing(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
 
 
-def _shapes(elements: Iterable[Element]) -> Iterator[Shape]:
+def _shapes(elements: Iterable[Element]) -> Iterator[drawn.Shape]:
     # Equal heights stay in the order of the file. Datumaro writes shapes that a track has left.
     for element in sorted(elements, key=lambda shape: float(shape.get("z_order", 0))):
         if element.tag not in _NO_AREAS and element.get("outside") != "1":
             yield _shape(element)
 
 
-def _shape(element: Element) -> Shape:
+def _shape(element: Element) -> drawn.Shape:
     label, at = element.attrib["label"], element.attrib
     degrees = float(at.get("rotation", 0))
     match element.tag:
         case "polygon":
-            return Outline(label, [float(n) for n in at["points"].replace(";", ",").split(",")])
+            return drawn.Outline(
+                label, [float(n) for n in at["points"].replace(";", ",").split(",")]
+            )
         case "box":
             left, top, right, bottom = (float(at[name]) for name in ("xtl", "ytl", "xbr", "ybr"))
-            box = rectangle(label, left, top, right, bottom)
+            box = drawn.rectangle(label, left, top, right, bottom)
             return box.turned(degrees, ((left + right) / 2, (top + bottom) / 2))
         case "ellipse":
             x, y, across, down = (float(at[name]) for name in ("cx", "cy", "rx", "ry"))
-            return ellipse(label, x, y, across, down).turned(degrees, (x, y))
+            return drawn.ellipse(label, x, y, across, down).turned(degrees, (x, y))
         case "cuboid":
             corners = [side + end for side in ("tl", "bl", "tr", "br") for end in "12"]
-            return hull(label, [float(at[axis + corner]) for corner in corners for axis in "xy"])
+            return drawn.hull(
+                label, [float(at[axis + corner]) for corner in corners for axis in "xy"]
+            )
         case "mask":
             left, top, width, height = (int(at[n]) for n in ("left", "top", "width", "height"))
             lengths = [int(number) for number in at["rle"].split(",")]
-            return Runs(label, lengths, (left, top, width, height))
+            return drawn.Runs(label, lengths, (left, top, width, height))
         case other:
-            return Undrawn(label, other)
+            return drawn.Undrawn(label, other)
 
 
-def _as_cvat(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+def _as_cvat(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
     """Return one file, with a mask of runs for each image that shows road."""
     root = Element("annotations")
     SubElement(root, "version").text = "1.1"
@@ -74,13 +64,13 @@ def _as_cvat(proposals: Sequence[Proposal]) -> dict[str, bytes]:
         image = SubElement(root, "image", {"id": str(number), "name": each.image, **size})
         if each.road.any():
             runs = ", ".join(map(str, each.runs()))
-            about = {"label": PROPOSED, "source": "auto", "occluded": "0", "z_order": "0"}
+            about = {"label": drawn.PROPOSED, "source": "auto", "occluded": "0", "z_order": "0"}
             SubElement(image, "mask", {**about, "rle": runs, "left": "0", "top": "0", **size})
     content: bytes = tostring(root, "utf-8", xml_declaration=True)
     return {"annotations.xml": content}
 
 
-CVAT: Final = LabelFormat(
+CVAT: Final = drawn.LabelFormat(
     "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _cvat, _as_cvat
 )
 

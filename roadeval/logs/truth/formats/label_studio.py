@@ -15,18 +15,7 @@ import numpy as np
 
 from roadeval.images import Limits, to_labels
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.truth.drawn import (
-    Drawing,
-    LabelFormat,
-    Outline,
-    Proposal,
-    Runs,
-    Shape,
-    Size,
-    ellipse,
-    rectangle,
-    size_in,
-)
+from roadeval.logs.truth import drawn
 
 _UPLOADED: Final = re.compile(r"(?:[0-9a-f]{8}-)?(.+)")
 """The name of an uploaded image, without the eight digits that the upload puts before it."""
@@ -44,8 +33,8 @@ def _is_label_studio(_: Path, content: Any) -> bool:
 
 
 def _label_studio(
-    _: Path, content: list[Mapping[str, Any]], size: Size | None
-) -> Iterator[Drawing]:
+    _: Path, content: list[Mapping[str, Any]], size: drawn.Size | None
+) -> Iterator[drawn.Drawing]:
     annotations: defaultdict[Any, list[Mapping[str, Any]]] = defaultdict(list)
     tasks = {}
     for place, task in enumerate(content):
@@ -56,7 +45,7 @@ def _label_studio(
         regions = [region for made in annotations[number] for region in _results(made)]
         stated = next(filter(None, (_size(region) for region in regions)), None)
         about = f"task {number}"
-        yield Drawing(
+        yield drawn.Drawing(
             _image(task, regions), stated, _shapes(annotations[number], about, stated or size)
         )
 
@@ -69,8 +58,8 @@ def _results(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [region for values in lists for region in values if isinstance(region, dict)]
 
 
-def _size(region: Mapping[str, Any]) -> Size | None:
-    return size_in({**region, **region.get("value", {})}, "original_width", "original_height")
+def _size(region: Mapping[str, Any]) -> drawn.Size | None:
+    return drawn.size_in({**region, **region.get("value", {})}, "original_width", "original_height")
 
 
 def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str:
@@ -95,8 +84,8 @@ def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str
 
 
 def _shapes(
-    annotations: Sequence[Mapping[str, Any]], about: str, size: Size | None
-) -> Iterator[Shape]:
+    annotations: Sequence[Mapping[str, Any]], about: str, size: drawn.Size | None
+) -> Iterator[drawn.Shape]:
     made = [each for each in annotations if not each.get("was_cancelled")]
     if len(made) > 1:
         made = [each for each in made if each.get("ground_truth")] or made
@@ -117,7 +106,7 @@ def _shapes(
             yield _shape(region, size)
 
 
-def _shape(region: Mapping[str, Any], size: Size | None) -> Shape:
+def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
     named = [v for k, v in region.items() if k.endswith("labels") and isinstance(v, list)]
     labels = [str(label) for values in named for label in values]
     if len(labels) != 1:
@@ -131,19 +120,23 @@ def _shape(region: Mapping[str, Any], size: Size | None) -> Shape:
         return _brushed(label, region["rle"], size)
     if "imageDataURL" in region:
         pixels = to_labels(b64decode(region["imageDataURL"].partition(",")[2]), Limits())
-        area = Proposal("", pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
-        return Runs(label, area.runs(), (0, 0, *area.size))
+        area = drawn.Proposal("", pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
+        return drawn.Runs(label, area.runs(), (0, 0, *area.size))
     if "points" in region:
-        return Outline(label, [n for x, y in region["points"] for n in (x * across, y * down)])
+        return drawn.Outline(
+            label, [n for x, y in region["points"] for n in (x * across, y * down)]
+        )
     x, y = region["x"] * across, region["y"] * down
     if "radiusX" in region:
         across, down = region["radiusX"] * across, region["radiusY"] * down
-        return ellipse(label, x, y, across, down).turned(degrees, (x, y))
+        return drawn.ellipse(label, x, y, across, down).turned(degrees, (x, y))
     right, bottom = x + region["width"] * across, y + region["height"] * down
-    return rectangle(label, x, y, right, bottom).turned(degrees, (x, y))  # about its first corner
+    return drawn.rectangle(label, x, y, right, bottom).turned(
+        degrees, (x, y)
+    )  # about its first corner
 
 
-def _brushed(label: str, numbers: Sequence[int], size: Size) -> Runs:
+def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs:
     """Return an area that was painted with the brush.
 
     The bytes are bits: 32 with the number of values, which are four a pixel; 5 with the bits of a
@@ -173,9 +166,9 @@ def _brushed(label: str, numbers: Sequence[int], size: Size) -> Runs:
         start = end
     if start != total:
         raise BadMessage(f"a mask of {label} that does not fit its image")
-    area = Proposal("", values.reshape(size[1], size[0], 4)[..., 3] > OPAQUE)
-    return Runs(label, area.runs())
+    area = drawn.Proposal("", values.reshape(size[1], size[0], 4)[..., 3] > OPAQUE)
+    return drawn.Runs(label, area.runs())
 
 
-LABEL_STUDIO: Final = LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio)
+LABEL_STUDIO: Final = drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio)
 FORMATS: Final = (LABEL_STUDIO,)

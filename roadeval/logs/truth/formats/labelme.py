@@ -12,21 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.images import Limits, to_rgb
-from roadeval.logs.truth.drawn import (
-    PROPOSED,
-    Drawing,
-    LabelFormat,
-    Outline,
-    Proposal,
-    Runs,
-    Shape,
-    Size,
-    Undrawn,
-    ellipse,
-    hull,
-    rectangle,
-    size_in,
-)
+from roadeval.logs.truth import drawn
 
 SMALLEST: Final = 64
 """Area of an outline that is written, in quarters of a pixel."""
@@ -39,33 +25,35 @@ def _is_labelme(_: Path, content: Any) -> bool:
     return isinstance(content, dict) and {"shapes", "imageWidth", "imageHeight"} <= content.keys()
 
 
-def _labelme(path: Path, content: Mapping[str, Any], _: Size | None) -> Iterator[Drawing]:
+def _labelme(
+    path: Path, content: Mapping[str, Any], _: drawn.Size | None
+) -> Iterator[drawn.Drawing]:
     areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in _LINES)
-    size = size_in(content, "imageWidth", "imageHeight")
-    yield Drawing(str(path), size, map(_shape, areas))
+    size = drawn.size_in(content, "imageWidth", "imageHeight")
+    yield drawn.Drawing(str(path), size, map(_shape, areas))
 
 
-def _shape(shape: Mapping[str, Any]) -> Shape:
+def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
     label, points = str(shape["label"]), [float(n) for point in shape["points"] for n in point]
     match shape.get("shape_type") or "polygon", points:
         case "rectangle", [left, top, right, bottom]:
-            return rectangle(label, left, top, right, bottom)
+            return drawn.rectangle(label, left, top, right, bottom)
         case kind, [_, _, _, _, _, _, *_] if kind in _CORNERS:
-            return Outline(label, points)
+            return drawn.Outline(label, points)
         case "circle", [x, y, edge_x, edge_y]:
             radius = math.hypot(edge_x - x, edge_y - y)
-            return ellipse(label, x, y, radius, radius)
+            return drawn.ellipse(label, x, y, radius, radius)
         case "cuboid", [_, _, _, _, _, _, *_]:
-            return hull(label, points)
+            return drawn.hull(label, points)
         case "mask", [left, top, _, _]:
             pixels = to_rgb(b64decode(shape["mask"]), Limits())[..., 0] > 0
-            area = Proposal("", pixels)
-            return Runs(label, area.runs(), (int(left), int(top), *area.size))
+            area = drawn.Proposal("", pixels)
+            return drawn.Runs(label, area.runs(), (int(left), int(top), *area.size))
         case other, _:
-            return Undrawn(label, f"{other} of {len(points) // 2} points")
+            return drawn.Undrawn(label, f"{other} of {len(points) // 2} points")
 
 
-def _as_labelme(proposals: Sequence[Proposal]) -> dict[str, bytes]:
+def _as_labelme(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
     """Return a file for each image, with its outlines; a hole is an outline of another class."""
     found = {}
     for each in proposals:
@@ -85,7 +73,7 @@ def _as_labelme(proposals: Sequence[Proposal]) -> dict[str, bytes]:
     return found
 
 
-def _outlines(proposal: Proposal) -> Iterator[tuple[str, list[list[float]]]]:
+def _outlines(proposal: drawn.Proposal) -> Iterator[tuple[str, list[list[float]]]]:
     """Yield outlines with few points, within a pixel; small holes and islands are left out."""
     import cv2
 
@@ -95,8 +83,10 @@ def _outlines(proposal: Proposal) -> Iterator[tuple[str, list[list[float]]]]:
     for place in np.argsort(inner, kind="stable").tolist():
         ring = cv2.approxPolyDP(rings[place], 2.0, closed=True)[:, 0, :]
         if len(ring) > 2 and cv2.contourArea(rings[place]) >= SMALLEST:
-            yield HOLE if inner[place] else PROPOSED, ((ring - 0.5) / 2).tolist()
+            yield HOLE if inner[place] else drawn.PROPOSED, ((ring - 0.5) / 2).tolist()
 
 
-LABELME: Final = LabelFormat("LabelMe", ".json", _is_labelme, _labelme, _as_labelme, one_image=True)
+LABELME: Final = drawn.LabelFormat(
+    "LabelMe", ".json", _is_labelme, _labelme, _as_labelme, one_image=True
+)
 FORMATS: Final = (LABELME,)

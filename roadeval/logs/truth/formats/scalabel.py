@@ -9,17 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.truth.drawn import (
-    Drawing,
-    LabelFormat,
-    Outline,
-    Shape,
-    Size,
-    Undrawn,
-    flat,
-    rectangle,
-    size_in,
-)
+from roadeval.logs.truth import drawn
 from roadeval.logs.truth.formats.coco import run_lengths
 
 _STEPS: Final = np.linspace(0, 1, 25)[1:, None]
@@ -38,15 +28,15 @@ def _is_scalabel(_: Path, content: Any) -> bool:
     return any("name" in frame and {"labels", "objects"} & {*frame} for frame in _frames(content))
 
 
-def _scalabel(_path: Path, content: Any, _: Size | None) -> Iterator[Drawing]:
+def _scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
     config = content.get("config") if isinstance(content, dict) else None
-    common = size_in((config or {}).get("imageSize") or {})
+    common = drawn.size_in((config or {}).get("imageSize") or {})
     for frame in _frames(content):
-        size = size_in(frame.get("size") or {}) or common
-        yield Drawing(str(frame["name"]), size, _shapes(frame, size))
+        size = drawn.size_in(frame.get("size") or {}) or common
+        yield drawn.Drawing(str(frame["name"]), size, _shapes(frame, size))
 
 
-def _shapes(frame: Mapping[str, Any], size: Size | None) -> Iterator[Shape]:
+def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn.Shape]:
     for part in frame.get("labels") or frame.get("objects") or ():
         label = str(part["category"])
         if (runs := part.get("rle")) is not None:
@@ -56,10 +46,12 @@ def _shapes(frame: Mapping[str, Any], size: Size | None) -> Iterator[Shape]:
             whole = polygons if isinstance(polygons[0], dict) else [_with_types(polygons)]
             for polygon in whole:
                 if polygon.get("closed", True):
-                    yield Outline(label, _ring(label, polygon["vertices"], polygon.get("types")))
+                    yield drawn.Outline(
+                        label, _ring(label, polygon["vertices"], polygon.get("types"))
+                    )
         elif box := part.get("box2d"):
             corners = (box[name] for name in ("x1", "y1", "x2", "y2"))
-            yield Undrawn(label, "box without an outline", rectangle(label, *corners))
+            yield drawn.Undrawn(label, "box without an outline", drawn.rectangle(label, *corners))
 
 
 def _with_types(points: Sequence[Sequence[Any]]) -> Mapping[str, Any]:
@@ -74,7 +66,7 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     BDD100K's toolkit draws them; two in a row lie before a corner, as Scalabel draws them.
     """
     if types is None or "C" not in types:
-        return flat(points)
+        return drawn.flat(points)
     if len(types) != len(points) or {*types} - {*"LC"} or types[0] != "L":
         raise BadMessage(f"a polygon of {label} whose curves are not as Scalabel writes them")
     corners = np.array([*points, points[0]], np.float64)
@@ -94,4 +86,4 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     return np.ravel(ring).tolist()
 
 
-FORMATS: Final = (LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _scalabel),)
+FORMATS: Final = (drawn.LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _scalabel),)

@@ -9,16 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.truth.drawn import (
-    Drawing,
-    LabelFormat,
-    Outline,
-    Shape,
-    Size,
-    Undrawn,
-    ellipse,
-    rectangle,
-)
+from roadeval.logs.truth import drawn
 
 _CLASS: Final = ("class", "label", "category", "type", "name", "object")
 """What the attribute is called that holds the class, where regions have several."""
@@ -43,7 +34,7 @@ def _is_via(_: Path, content: Any) -> bool:
     return any(isinstance(image, dict) and {"filename", "regions"} <= {*image} for image in images)
 
 
-def _via(path: Path, content: Any, _: Size | None) -> Iterator[Drawing]:
+def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
     images = _images(content).values()
     regions = chain.from_iterable(map(_regions, images))
     names = {name for region in regions for name in region.get("region_attributes") or ()}
@@ -60,10 +51,12 @@ def _via(path: Path, content: Any, _: Size | None) -> Iterator[Drawing]:
             for region in _regions(image)
             if region["shape_attributes"]["name"] not in _NO_AREAS
         )
-        yield Drawing(str(image["filename"]), None, (_shape(area, attribute) for area in areas))
+        yield drawn.Drawing(
+            str(image["filename"]), None, (_shape(area, attribute) for area in areas)
+        )
 
 
-def _shape(region: Mapping[str, Any], attribute: str) -> Shape:
+def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
     at, value = region["shape_attributes"], (region.get("region_attributes") or {}).get(attribute)
     if isinstance(value, dict):  # boxes to tick
         (value,) = (name for name, is_ticked in value.items() if is_ticked)
@@ -72,17 +65,17 @@ def _shape(region: Mapping[str, Any], attribute: str) -> Shape:
     match at["name"]:
         case "polygon":
             pairs = zip(at["all_points_x"], at["all_points_y"], strict=True)
-            return Outline(value, [number for pair in pairs for number in pair])
+            return drawn.Outline(value, [number for pair in pairs for number in pair])
         case "rect":
             left, top = at["x"], at["y"]
-            return rectangle(value, left, top, left + at["width"], top + at["height"])
+            return drawn.rectangle(value, left, top, left + at["width"], top + at["height"])
         case "circle":
-            return ellipse(value, at["cx"], at["cy"], at["r"], at["r"])
+            return drawn.ellipse(value, at["cx"], at["cy"], at["r"], at["r"])
         case "ellipse":
             x, y, degrees = at["cx"], at["cy"], math.degrees(at.get("theta", 0))
-            return ellipse(value, x, y, at["rx"], at["ry"]).turned(degrees, (x, y))
+            return drawn.ellipse(value, x, y, at["rx"], at["ry"]).turned(degrees, (x, y))
         case other:
-            return Undrawn(value, str(other))
+            return drawn.Undrawn(value, str(other))
 
 
-FORMATS: Final = (LabelFormat("VIA", ".json", _is_via, _via),)
+FORMATS: Final = (drawn.LabelFormat("VIA", ".json", _is_via, _via),)

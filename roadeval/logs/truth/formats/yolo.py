@@ -11,15 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.truth.drawn import (
-    Drawing,
-    LabelFormat,
-    Outline,
-    Shape,
-    Size,
-    Undrawn,
-    rectangle,
-)
+from roadeval.logs.truth import drawn
 
 _LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]", re.MULTILINE)
 """How a line begins: names of classes, in a file beside the labels, do not."""
@@ -31,13 +23,13 @@ def _is_yolo(_: Path, content: str) -> bool:
     return not content.strip() or _LINE.search(content) is not None
 
 
-def _yolo(path: Path, content: str, size: Size | None) -> Iterator[Drawing]:
+def _yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.Drawing]:
     if size is None:
         raise LogError(f"{path}: its points are shares of the image's size, which is not known")
-    yield Drawing(str(path), size, _shapes(content, size))
+    yield drawn.Drawing(str(path), size, _shapes(content, size))
 
 
-def _shapes(content: str, size: Size) -> Iterator[Shape]:
+def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
     for number, line in enumerate(content.splitlines(), 1):
         if not line.strip():
             continue
@@ -53,11 +45,13 @@ def _shapes(content: str, size: Size) -> Iterator[Shape]:
             raise BadMessage(f"line {number} has points that are no shares of the image's size")
         if len(flat) == 4:
             x, y, width, height = (number / 2 for number in flat)
-            box = rectangle(label, 2 * x - width, 2 * y - height, 2 * x + width, 2 * y + height)
-            yield Undrawn(label, "box without an outline", box)
+            box = drawn.rectangle(
+                label, 2 * x - width, 2 * y - height, 2 * x + width, 2 * y + height
+            )
+            yield drawn.Undrawn(label, "box without an outline", box)
         else:
-            yield Outline(label, flat)
+            yield drawn.Outline(label, flat)
 
 
-YOLO: Final = LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo, one_image=True)
+YOLO: Final = drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo, one_image=True)
 FORMATS: Final = (YOLO,)
