@@ -329,7 +329,7 @@ def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
             drawing, shapes=sorted(drawing.shapes, key=lambda shape: shape.label not in meant.road)
         )
         with suppress(BadMessage, ValueError, TypeError, OverflowError):
-            top, under = (each.pixels(values, Limits()) for each in (drawing, below))
+            top, under = (way.pixels(values, Limits()) for way in (drawing, below))
             is_road = np.isin(top, road)
             hidden = under[is_road & ~np.isin(under, road)]
             if len(hidden) > TOUCHING * np.count_nonzero(is_road):

@@ -7,9 +7,11 @@ import re
 from base64 import b64decode
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import SplitResult, parse_qs, unquote, urlsplit
 
 import numpy as np
 
@@ -17,12 +19,11 @@ from roadeval.images import Limits, to_labels
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.truth import drawn
 
-_UPLOADED: Final = re.compile(r"(?:[0-9a-f]{8}-)?(.+)")
-"""The name of an uploaded image, without the eight digits that the upload puts before it."""
-_PLACE: Final = ("points", "x", "rle", "imageDataURL")
-"""What says where a region is."""
+_UPLOADED: Final = re.compile(r"^[0-9a-f]{8}-(?=.)")
+"""What an upload puts before an image's name."""
 _AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL")
-"""What says which pixels it has: a key point has none of these, and is left out."""
+"""What says which pixels a region has: a key point has none of these, and is left out."""
+_UNREADABLE: Final = {"points": ()}
 OPAQUE: Final = 127
 """A pixel of a brush's edge belongs to it if it is opaque by more than a half."""
 
@@ -42,24 +43,24 @@ def _label_studio(
         tasks[number] = task
         annotations[number] += task.get("annotations", [task])
     for number, task in tasks.items():
-        regions = [region for made in annotations[number] for region in _results(made)]
-        stated = next(filter(None, (_size(region) for region in regions)), None)
-        about = f"task {number}"
-        yield drawn.Drawing(
-            _image(task, regions), stated, _shapes(annotations[number], about, stated or size)
-        )
+        regions: list[Mapping[str, Any]] = []
+        with suppress(AttributeError, TypeError):
+            regions = [region for made in annotations[number] for region in _regions(made)]
+        sizes = (drawn.size_in(region, "original_width", "original_height") for region in regions)
+        stated = next(filter(None, sizes), None)
+        shapes = _shapes(annotations[number], f"task {number}", stated or size)
+        yield drawn.Drawing(_image(task, regions), stated, shapes)
 
 
-def _results(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the regions of an annotation: its results, or, in JSON-MIN, all lists of a task."""
-    if "result" in annotation:
-        return list(annotation["result"])
-    lists = (value for value in annotation.values() if isinstance(value, list))
-    return [region for values in lists for region in values if isinstance(region, dict)]
-
-
-def _size(region: Mapping[str, Any]) -> drawn.Size | None:
-    return drawn.size_in({**region, **region.get("value", {})}, "original_width", "original_height")
+    lists = [values for values in annotation.values() if isinstance(values, list)]
+    listed = annotation["result"] if "result" in annotation else chain.from_iterable(lists)
+    regions: list[Mapping[str, Any]] = []
+    for region in listed:
+        is_whole = isinstance(region, dict) and isinstance(region.get("value", {}), dict)
+        regions.append({**region, **region.get("value", {})} if is_whole else _UNREADABLE)
+    return regions
 
 
 def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str:
@@ -68,39 +69,35 @@ def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str
     texts = {name: text for name, text in data.items() if isinstance(text, str)}
     wanted = [texts[name] for r in regions if (name := r.get("to_name")) in texts]
     files = [text for text in texts.values() if re.search(r"\.[a-zA-Z]\w{2,3}($|\?)", text)]
-    address = next(iter([*wanted, *files, *(text for text in texts.values() if "/" in text)]), None)
-    if address is None:
-        raise ValueError("a task without an image")
-    parts = urlsplit(address) if "?" in address or "://" in address else None
-    path = address if parts is None else parts.path
-    if parts is not None and (local := parse_qs(parts.query).get("d")):  # a file of its own disk
-        (path,) = local
-    if parts is not None and (hidden := parse_qs(parts.query).get("fileuri")):
-        path = urlsplit(b64decode(hidden[0]).decode()).path
+    others = [text for text in texts.values() if "/" in text]
+    (address, *_) = [*wanted, *files, *others]
+    is_address = "?" in address or "://" in address
+    parts = urlsplit(address) if is_address else SplitResult("", "", address, "", "")
+    query = parse_qs(parts.query)
+    # A file of the server's own disk, or of a storage behind it.
+    path = query["d"][0] if "d" in query else parts.path
+    if "fileuri" in query:
+        path = urlsplit(b64decode(query["fileuri"][0]).decode()).path
     *folders, name = unquote(path).strip("/").split("/")
-    uploaded = _UPLOADED.fullmatch(name)
-    above = [] if "upload" in folders else folders[-1:]
-    return "/".join([*above, uploaded[1] if uploaded else name])
+    return "/".join([*([] if "upload" in folders else folders[-1:]), _UPLOADED.sub("", name)])
 
 
 def _shapes(
     annotations: Sequence[Mapping[str, Any]], about: str, size: drawn.Size | None
 ) -> Iterator[drawn.Shape]:
-    made = [each for each in annotations if not each.get("was_cancelled")]
+    made = [annotation for annotation in annotations if not annotation.get("was_cancelled")]
+    made = [made[0]] if len(made) == 1 else [a for a in made if a.get("ground_truth")] or made
     if len(made) > 1:
-        made = [each for each in made if each.get("ground_truth")] or made
-    if len(made) > 1:
-        who = " and ".join(str(each.get("completed_by", each.get("annotator"))) for each in made)
+        who = " and ".join(str(a.get("completed_by", a.get("annotator"))) for a in made)
         raise BadMessage(
             f"{about} has {len(made)} annotations (of annotators {who}): mark one of them as "
             "ground truth in Label Studio and export JSON, or delete the others"
         )
-    # A region and its class may be two results of one id.
+    # A region and its class may be two results of one id, or of one place where there are no ids.
     merged: dict[Any, dict[str, Any]] = {}
-    for region in _results(made[0]) if made else ():
-        value = {**region, **region.get("value", {})}
-        place = next((json.dumps(value[name]) for name in _PLACE if name in value), None)
-        merged.setdefault(region.get("id", place), {}).update(value)
+    for region in _regions(made[0]) if made else ():
+        place = json.dumps([region.get(name) for name in ("x", *_AREAS)])
+        merged.setdefault(region.get("id", place), {}).update(region)
     for region in merged.values():
         if any(region.get(name) is not None for name in _AREAS):
             yield _shape(region, size)
@@ -123,17 +120,14 @@ def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
         area = drawn.Proposal("", pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
         return drawn.Runs(label, area.runs(), (0, 0, *area.size))
     if "points" in region:
-        return drawn.Outline(
-            label, [n for x, y in region["points"] for n in (x * across, y * down)]
-        )
+        return drawn.Outline(label, drawn.flat((x * across, y * down) for x, y in region["points"]))
     x, y = region["x"] * across, region["y"] * down
     if "radiusX" in region:
         across, down = region["radiusX"] * across, region["radiusY"] * down
         return drawn.ellipse(label, x, y, across, down).turned(degrees, (x, y))
     right, bottom = x + region["width"] * across, y + region["height"] * down
-    return drawn.rectangle(label, x, y, right, bottom).turned(
-        degrees, (x, y)
-    )  # about its first corner
+    # It turns about its first corner.
+    return drawn.rectangle(label, x, y, right, bottom).turned(degrees, (x, y))
 
 
 def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs:
@@ -170,5 +164,4 @@ def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs
     return drawn.Runs(label, area.runs())
 
 
-LABEL_STUDIO: Final = drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio)
-FORMATS: Final = (LABEL_STUDIO,)
+FORMATS: Final = (drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio),)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -42,21 +43,16 @@ def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn
         if (runs := part.get("rle")) is not None:
             yield run_lengths(label, runs["counts"], runs.get("size"), size)
         elif polygons := part.get("poly2d"):
-            # Formerly a single list of points, each with its type.
-            whole = polygons if isinstance(polygons[0], dict) else [_with_types(polygons)]
-            for polygon in whole:
-                if polygon.get("closed", True):
-                    yield drawn.Outline(
-                        label, _ring(label, polygon["vertices"], polygon.get("types"))
-                    )
+            if not isinstance(polygons[0], dict):  # formerly points, each with its type
+                types = "".join(point[2] for point in polygons)
+                polygons = [{"vertices": [point[:2] for point in polygons], "types": types}]
+            for polygon in polygons:
+                if polygon.get("closed", not label.startswith("lane")):
+                    ring = _ring(label, polygon["vertices"], polygon.get("types"))
+                    yield drawn.Outline(label, ring)
         elif box := part.get("box2d"):
             corners = (box[name] for name in ("x1", "y1", "x2", "y2"))
             yield drawn.Undrawn(label, "box without an outline", drawn.rectangle(label, *corners))
-
-
-def _with_types(points: Sequence[Sequence[Any]]) -> Mapping[str, Any]:
-    types = "".join(point[2] for point in points)
-    return {"vertices": [point[:2] for point in points], "types": types}
 
 
 def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> Sequence[float]:
@@ -67,22 +63,16 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     """
     if types is None or "C" not in types:
         return drawn.flat(points)
-    if len(types) != len(points) or {*types} - {*"LC"} or types[0] != "L":
-        raise BadMessage(f"a polygon of {label} whose curves are not as Scalabel writes them")
-    corners = np.array([*points, points[0]], np.float64)
-    ring, place = [corners[0]], 1
-    while place < len(points):
-        if types[place] == "L":
-            ring.append(corners[place])
-            place += 1
-            continue
-        if types[place : place + 2] != "CC" or place + 2 > len(points):
+    corners, ring = np.array([*points, points[0]], np.float64), [np.array(points[0])]
+    for part in re.finditer("L|CC[CL]?|.", types[1 : len(points)]):
+        if part[0] == "L":
+            ring.append(corners[part.end()])
+        elif part[0].startswith("CC"):
+            start, (one, two, end) = ring[-1], corners[part.start() + 1 :][:3]
+            curve = start * (1 - _STEPS) ** 3 + 3 * one * _STEPS * (1 - _STEPS) ** 2
+            ring += [*(curve + 3 * two * _STEPS**2 * (1 - _STEPS) + end * _STEPS**3)]
+        else:
             raise BadMessage(f"a curve of {label} that has not two control points")
-        one, two, end = corners[place : place + 3]
-        start, t = ring[-1], _STEPS
-        curve = start * (1 - t) ** 3 + 3 * one * t * (1 - t) ** 2
-        ring += [*(curve + 3 * two * t**2 * (1 - t) + end * t**3)]
-        place += 3
     return np.ravel(ring).tolist()
 
 

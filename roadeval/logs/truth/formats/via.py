@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,28 +15,26 @@ _CLASS: Final = ("class", "label", "category", "type", "name", "object")
 _NO_AREAS: Final = ("point", "polyline")
 
 
-def _images(content: Any) -> Mapping[str, Mapping[str, Any]]:
-    if not isinstance(content, dict):
-        return {}
-    images = content.get("_via_img_metadata", content)
-    return images if isinstance(images, dict) else {}
+def _images(content: Any) -> Iterable[Mapping[str, Any]]:
+    images = content.get("_via_img_metadata", content) if isinstance(content, dict) else {}
+    wanted = {"filename", "regions"}
+    return (i for i in images.values() if isinstance(i, dict) and wanted <= i.keys())
 
 
-def _regions(image: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
+def _regions(image: Mapping[str, Any]) -> list[Any]:
     """Return the regions of an image: a list, in VIA 1 a table."""
-    regions = image["regions"]
-    return regions.values() if isinstance(regions, dict) else regions
+    regions = image["regions"] or []
+    return [*regions.values()] if isinstance(regions, dict) else regions
 
 
 def _is_via(_: Path, content: Any) -> bool:
-    images = _images(content).values()
-    return any(isinstance(image, dict) and {"filename", "regions"} <= {*image} for image in images)
+    return any(_images(content))
 
 
 def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
-    images = _images(content).values()
-    regions = chain.from_iterable(map(_regions, images))
-    names = {name for region in regions for name in region.get("region_attributes") or ()}
+    regions = [region for image in _images(content) for region in _regions(image)]
+    given = (region.get("region_attributes") for region in regions if isinstance(region, dict))
+    names = {name for attributes in given if isinstance(attributes, dict) for name in attributes}
     usual = [name for usual in _CLASS for name in sorted(names) if name.lower() == usual]
     if len(names) > 1 and not usual:
         raise LogError(
@@ -45,15 +42,14 @@ def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawi
             "that is the class to `class`"
         )
     attribute = next(iter([*usual, *names]), "class")
-    for image in images:
-        areas = (
-            region
-            for region in _regions(image)
-            if region["shape_attributes"]["name"] not in _NO_AREAS
-        )
-        yield drawn.Drawing(
-            str(image["filename"]), None, (_shape(area, attribute) for area in areas)
-        )
+    for image in _images(content):
+        yield drawn.Drawing(str(image["filename"]), None, _shapes(_regions(image), attribute))
+
+
+def _shapes(regions: Iterable[Mapping[str, Any]], attribute: str) -> Iterator[drawn.Shape]:
+    for region in regions:
+        if region["shape_attributes"]["name"] not in _NO_AREAS:
+            yield _shape(region, attribute)
 
 
 def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
@@ -64,8 +60,8 @@ def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
         raise BadMessage(f"a region without a {attribute}")
     match at["name"]:
         case "polygon":
-            pairs = zip(at["all_points_x"], at["all_points_y"], strict=True)
-            return drawn.Outline(value, [number for pair in pairs for number in pair])
+            points = zip(at["all_points_x"], at["all_points_y"], strict=True)
+            return drawn.Outline(value, drawn.flat(points))
         case "rect":
             left, top = at["x"], at["y"]
             return drawn.rectangle(value, left, top, left + at["width"], top + at["height"])
