@@ -26,6 +26,10 @@ from roadeval.runtime.threads import ended, ordered
 
 Array = npt.NDArray[Any]
 
+LEAST_OPENING_S: Final = 30.0
+"""Seconds that a file may take to open, however few an image may take."""
+WORKING: Final = 8
+"""Times the memory of an output that a network may take while it computes."""
 QUOTED: Final = 240
 """Letters of onnxruntime's complaint that a message quotes."""
 LARGEST: Final = (1 << 31) - 1
@@ -33,7 +37,7 @@ LARGEST: Final = (1 << 31) - 1
 _SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
 _LATE: Final = (
-    "takes longer than {:g} s to {}, or has no end: mend it, or allow more by `net.seconds`"
+    "takes longer than {:g} s{} to {}, or has no end: mend it, or allow more by `net.seconds`"
 )
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
 _PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
@@ -84,22 +88,30 @@ class OnnxFile:
     makers: Mapping[str, str]
     """By output: the operator that makes its numbers, see `maker`."""
 
-    def run(self, values: Array, outputs: tuple[str, ...], seconds: float) -> list[Array]:
+    def run(
+        self,
+        values: Array,
+        outputs: tuple[str, ...],
+        seconds: float,
+        grown: float = math.inf,
+    ) -> list[Array]:
         """Compute some outputs for the values of the one input, within some seconds.
 
-        A `NetworkError` if that fails, or an output is no array of numbers.
+        The process may grow by ``grown`` bytes meanwhile. A `NetworkError` if that fails, or an
+        output is no array of numbers.
         """
         from onnxruntime import RunOptions
 
         options = RunOptions()
         options.log_severity_level = 4
-        with ended(partial(setattr, options, "terminate", True), seconds) as late:
+        with ended(partial(setattr, options, "terminate", True), seconds, grown) as late:
             try:
                 with _explained(self.path):
                     arrays = self.session.run(outputs, {self.inputs[0].name: values}, options)
             except NetworkError as error:
                 if late.is_set():
-                    raise self.error(_LATE.format(seconds, "run")) from error
+                    more = f" or more than {grown / MIB:,.0f} MiB" if math.isfinite(grown) else ""
+                    raise self.error(_LATE.format(seconds, more, "run")) from error
                 raise
         for name, array in zip(outputs, arrays, strict=True):
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf":
@@ -123,6 +135,7 @@ def tried(
     """Return arrays of the shapes and types of some outputs, found by an input of zeros.
 
     A `NetworkError` if one takes more than ``limit`` bytes: before it runs, where the file says so.
+    All that is computed may take `WORKING` times that.
     """
     named = {tensor.name: tensor for tensor in file.outputs}
     declared = [replace(file.inputs[0], shape=shape), *(named[name] for name in outputs)]
@@ -130,7 +143,7 @@ def tried(
         _check_size(file, tensor, limit)
     # In a thread, so that a signal is heard meanwhile.
     values = np.zeros(shape, file.inputs[0].dtype)
-    (arrays,) = ordered(lambda _: file.run(values, outputs, seconds), [None], 1)
+    (arrays,) = ordered(lambda _: file.run(values, outputs, seconds, WORKING * limit), [None], 1)
     for name, array in zip(outputs, arrays, strict=True):
         _check_size(file, Tensor(name, str(array.dtype), array.shape), limit)
     return [np.broadcast_to(array.dtype.type(), array.shape) for array in arrays]
@@ -194,10 +207,11 @@ def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
     # -P: an onnxruntime.py that lies beside the network must not be what is imported.
     probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
     # 1 is an exception, which is raised again below.
+    seconds = max(seconds, LEAST_OPENING_S)
     try:
         ending = subprocess.run(probe, check=False, capture_output=True, timeout=seconds)
     except subprocess.TimeoutExpired as error:
-        raise NetworkError(f"{path}: {_LATE.format(seconds, 'open')}") from error
+        raise NetworkError(f"{path}: {_LATE.format(seconds, '', 'open')}") from error
     if ending.returncode not in (0, 1):
         raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
     options = onnxruntime.SessionOptions()

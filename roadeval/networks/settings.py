@@ -63,9 +63,10 @@ class NetSettings:
     """Between 0 and 1, by default 0.5; without ``decide`` it stands for ``decide = "threshold"``.
     With ``argmax`` it is held against the share of road's best class in the best two."""
     seconds: Positive = 30.0
-    """A network that takes longer to open, or for an image, is ended: a failure."""
+    """A network that takes longer for an image is ended: a failure."""
     megabytes: Annotated[int, Field(ge=1, le=65536)] = 512
-    """Memory that its input or an output may take, in MiB."""
+    """Memory that its input or an output may take, in MiB; all that it computes for an image may
+    take eight times that."""
 
     @property
     def channel_count(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -11,6 +12,8 @@ from contextlib import contextmanager
 from functools import partial
 from threading import Thread
 from typing import Final, TypeVar
+
+from roadeval.runtime.memory import resident
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -62,18 +65,21 @@ def in_thread(call: Callable[[], R]) -> Future[R]:
 
 
 @contextmanager
-def ended(end: Callable[[], None], seconds: float) -> Iterator[threading.Event]:
+def ended(
+    end: Callable[[], None], seconds: float, grown: float = math.inf
+) -> Iterator[threading.Event]:
     """Call ``end`` where the work within takes longer than some seconds; the event is then set.
 
-    It is called, too, where `ordered`, of which this is a thread, is stopped: no exception reaches
-    what a library computes.
+    So it is where the process grows by more than ``grown`` bytes. It is called, too, where
+    `ordered`, of which this is a thread, is stopped: no exception reaches what a library computes.
     """
     done, late = threading.Event(), threading.Event()
     stopped, until = getattr(_LOCAL, "stopped", done), time.monotonic() + seconds
+    most = resident() + grown
 
     def watch() -> None:
         while not done.wait(WATCHED_S):
-            if time.monotonic() > until:
+            if time.monotonic() > until or resident() > most:
                 late.set()
             if late.is_set() or stopped.is_set():
                 end()

@@ -114,11 +114,24 @@ def test_a_loop_without_end_is_ended(where, tmp_path):
         branch = helper.make_graph(nodes, "branch", [], result)
         nodes = [helper.make_node("If", ["yes"], [ROAD], then_branch=branch, else_branch=branch)]
     path = written(tmp_path / "n.onnx", nodes, {"yes": True})
-    with pytest.raises(NetworkError, match=r"takes longer than 0\.5 s to run.*net\.seconds"):
+    with pytest.raises(NetworkError, match=r"takes longer than 0\.5 s or .* to run.*net\.seconds"):
         Network.of(NetSettings(file=str(path), seconds=0.5))
 
 
-def test_a_network_that_takes_too_long_to_open_is_refused(tmp_path):
+def test_a_loop_that_takes_ever_more_memory_is_ended(tmp_path):
+    loop = without_end("yes")
+    loop.output[:] = ["last", ROAD]
+    loop.attribute[0].g.node.append(helper.make_node("Tile", ["was", "many"], ["kept"]))
+    kept = helper.make_tensor_value_info("kept", TensorProto.FLOAT, None)
+    loop.attribute[0].g.output.append(kept)
+    values = {"yes": True, "many": np.int64([1, 1, 20, 20])}
+    path = written(tmp_path / "n.onnx", [loop], values)
+    with pytest.raises(NetworkError, match="or more than 64 MiB to run"):
+        Network.of(NetSettings(file=str(path), megabytes=8))
+
+
+def test_a_network_that_takes_too_long_to_open_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("roadeval.networks.onnx_file.LEAST_OPENING_S", 0.001)
     path = network(tmp_path / "n.onnx")
     with pytest.raises(NetworkError, match=r"takes longer than 0\.001 s to open.*net\.seconds"):
         Network.of(NetSettings(file=str(path), seconds=0.001))
