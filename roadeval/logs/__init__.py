@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from roadeval.logs.topics.reader import TopicInfo
     from roadeval.logs.truth.drawn import Proposal
     from roadeval.logs.truth.labels import LabelSource, label_files
+    from roadeval.logs.truth.pairing import NamedLabels
     from roadeval.logs.truth.picks import (
         PICK,
         Picked,

@@ -418,7 +418,8 @@ class FrameStream:
         if selection.image.kind is TopicKind.VIDEO:
             self._pictures = Video(images, images.limits)
         self._selection = selection
-        self._numbers = numbers
+        self.numbers: Final = numbers
+        """The numbers of the frames that are asked for, in order."""
         begin = int(images.log_times[numbers[0]])
         self._labels: dict[str, tuple[LabelSource, Partners]] = {
             name: (source, source.partners(begin)) for name, source in selection.labels.items()
@@ -438,19 +439,19 @@ class FrameStream:
         return next(self._iterator)
 
     def __len__(self) -> int:
-        return len(self._numbers)
+        return len(self.numbers)
 
     @property
     def log_times(self) -> npt.NDArray[np.int64]:
         """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
-        return self._selection.camera.images.log_times[np.asarray(self._numbers, np.intp)]
+        return self._selection.camera.images.log_times[np.asarray(self.numbers, np.intp)]
 
     def unpaired(self) -> Iterator[str]:
         """Yield a sentence on labels with stamps that no frame has, and on frames that lost theirs.
 
         Nothing is known of them where frames between others are not read.
         """
-        first, last, asked = self._numbers[0], self._numbers[-1], len(self._numbers)
+        first, last, asked = self.numbers[0], self.numbers[-1], len(self.numbers)
         for name, (source, partners) in self._labels.items():
             if not isinstance(source.pairing.images, TopicReader) or asked <= last - first:
                 continue

@@ -241,7 +241,7 @@ class Log:
         reader = other._readers[named(other.topics, topic, "topic").name]
         same = other.path.resolve() == self.path.resolve()
         name = "" if same else other.name
-        return beside_log(reader, settings, camera, lambda: other.digest, name, offset_ms)
+        return beside_log(reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms)
 
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with what is asked of one camera of several."""

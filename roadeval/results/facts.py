@@ -230,6 +230,8 @@ class Facts(Document):
     """The rates with each further seed of the training; empty with one."""
     oracles: dict[str, Totals] = field(default_factory=dict)
     """Totals where a stage was replaced by the truth."""
+    misfits: list[str] = field(default_factory=list)
+    """Truth or masks that do not fit the images, a sentence each; the verdict begins with them."""
     windows: int = 0
     claims: dict[str, dict[str, int]] = field(default_factory=dict)
     """In how many windows each claim of the paper holds."""
@@ -270,11 +272,11 @@ class Facts(Document):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "seeds", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled", "estimate"),
+        *("cameras", "unlabelled", "estimate", "misfits"),
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "seeds", "methods", "masks", "files"),
-        *("cameras", "unlabelled", "estimate"),
+        *("cameras", "unlabelled", "estimate", "misfits"),
     )
 
     @cached_property

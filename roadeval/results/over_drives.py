@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import OUTCOMES, as_tree
+from roadeval.data.words import listing
 from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import TESTED, Effect, corrected
@@ -66,7 +67,7 @@ def summarise(
     masks = _by(tables["scores"], "variant", "stage")
     totals = as_tree((mask, _over_all(rows)) for mask, rows in masks.items())
     return FleetFacts(
-        verdict=verdict(totals, differences),
+        verdict=" ".join([*_misfits(drives), verdict(totals, differences)]),
         version=VERSION,
         drives=[*members],
         counts=dict(Counter(drive["status"] for drive in drives)),
@@ -105,6 +106,17 @@ def _of_copies(same: Mapping[str, str], cameras: Mapping[str, str | None]) -> It
             f"{copy} is a copy of {of}{more}: differences count copies as one "
             "drive, the means of rates do not"
         )
+
+
+def _misfits(drives: Rows) -> Iterator[str]:
+    """Yield on which drives truth or masks do not fit the images, with what the first one says."""
+    rows = [row for row in drives if row["misfits"]]
+    if rows:
+        named = listing([row["drive"] for row in rows[:WARNINGS]])
+        more = f" and {len(rows) - WARNINGS} more" if len(rows) > WARNINGS else ""
+        first = rows[0]["misfits"].splitlines()[0]
+        where = f"{len(rows)} of {len(drives)} drives ({named}{more})"
+        yield f"Truth or masks do not fit the images on {where}: {first}"
 
 
 def _of_drives(drives: Rows) -> Iterator[str]:

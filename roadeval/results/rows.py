@@ -155,6 +155,7 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
         **{column: getattr(facts.frames, column) for column in ACCOUNT},
         "losses": "\n".join(facts.losses) or None,
         "warnings": "\n".join(facts.warnings) or None,
+        "misfits": "\n".join(facts.misfits) or None,
         "verdict": facts.verdict,
     }
 

@@ -260,6 +260,7 @@ trained_on   count  frames left out because a model learnt from them
 evaluated    count  frames that were scored
 losses       text   what was lost of the log, a sentence a line
 warnings     text   warnings, a sentence a line
+misfits      text   truth or masks that do not fit the images, a sentence a line
 verdict      text   the verdict on this drive alone
 model        name   SHA-256 of the model file; empty if it trained its own
 

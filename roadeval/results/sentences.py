@@ -20,7 +20,15 @@ from roadeval.data.words import (
     number,
     percent,
 )
-from roadeval.evaluation.score import FILTER, TESTED, Effect, final_stages
+from roadeval.evaluation.score import (
+    FILTER,
+    TESTED,
+    TRUTH,
+    Effect,
+    Finding,
+    Misfit,
+    final_stages,
+)
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats import Difference
 from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
@@ -191,6 +199,39 @@ def correction(differences: Iterable[Difference]) -> str:
         f"{MARK} significant after Holm's correction for the {many} of ERR of final "
         f"masks{families}; others are not corrected."
     )
+
+
+def misfit(found: Finding, period_ms: float | None, remedy: str) -> str:
+    """Return what does not fit, and what to do, in two sentences.
+
+    ``period_ms`` is the time from one frame to the next, if it is known.
+
+    >>> misfit(Finding("truth", Misfit.LAG, frames=3), 100, "Set `truth.first` to 3.")
+    'The truth is 3 frames (300 ms) late: it fits earlier images better. Set `truth.first` to 3.'
+    """
+    subject, verb = ("The truth", "is") if found.subject == TRUTH else (None, "are")
+    subject = subject or f"The masks of {found.subject}"
+    match found.misfit:
+        case Misfit.LAG:
+            size = abs(found.frames)
+            time = f" ({size * period_ms:.0f} ms)" if period_ms else ""
+            word, which = ("late", "earlier") if found.frames > 0 else ("early", "later")
+            what = f"{counted(size, 'frame')}{time} {word}: {_it(verb)} {which} images better"
+        case Misfit.MIRRORED:
+            what = f"mirrored: with left and right exchanged {_it(verb)} the images better"
+        case Misfit.UPSIDE_DOWN:
+            what = f"upside down: turned over {_it(verb)} the images better"
+        case Misfit.INVERTED:
+            what = "inverted: there is road high in the image, and none before the vehicle"
+        case _:
+            ways = ((found.right, "right", "left"), (found.down, "down", "up"))
+            parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]
+            what = f"moved by {' and '.join(parts)}: moved back {_it(verb)} images and truth better"
+    return f"{subject} {verb} {what}. {remedy}"
+
+
+def _it(verb: str) -> str:
+    return "it fits" if verb == "is" else "they fit"
 
 
 def verdict(

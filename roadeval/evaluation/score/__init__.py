@@ -18,6 +18,7 @@ from roadeval.evaluation.score.counts import (
     sum_up,
     windows,
 )
+from roadeval.evaluation.score.fit import LAST_LAG, SPOTS, TRUTH, Finding, FitCheck, Misfit
 from roadeval.evaluation.score.frame import (
     BlindPrior,
     judge,

@@ -90,10 +90,12 @@ class _Edges:
 
     def every(self, step: int) -> _Edges:
         """Return every so many of the points."""
-        x, y, cosine, sine, *inward = (
-            each[::step] for each in (self.x, self.y, self.cosine, self.sine, *self.inward)
+        right, down = self.inward
+        return _Edges(
+            *(self.x[::step], self.y[::step]),
+            *(self.cosine[::step], self.sine[::step]),
+            (right[::step], down[::step]),
         )
-        return _Edges(x, y, cosine, sine, (inward[0], inward[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +138,7 @@ def _edges(road: Plane, ignored: Plane | None) -> _Edges:
 def _agreement(
     edges: _Edges, slopes: _Slopes, right: npt.NDArray[np.intp], below: npt.NDArray[np.intp]
 ) -> Floats:
-    """Return how well edges that are moved back by some steps lie on slopes, ``(K,)``, at most 1."""
+    """Return how well edges lie on slopes once moved back by some steps, ``(K,)``, at most 1."""
     height, width = slopes.across.shape
     x, y = edges.x - right[:, None], edges.y - below[:, None]
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
@@ -279,7 +281,7 @@ class FitCheck:
                 yield found
 
     def _finding(self, name: str, *, alone: bool) -> Finding | None:
-        """Return what is sure about a subject; held against the images ``alone``, or the truth, too."""
+        """Return what is sure about a subject, by the images ``alone`` or by the truth as well."""
         fits = self._fits.get(name, {})
         plain = fits.get(_PLAIN, {})
         if len(plain) < _LEAST:
@@ -293,7 +295,8 @@ class FitCheck:
                 continue
             before = ways if key[0] is Misfit.MOVED else plain
             spots = [spot for spot in values if spot in before]
-            # What was computed here may have learnt that the truth is mirrored, not that it is late.
+            # What was computed here may have learnt that the truth is mirrored, not that it is
+            # late.
             images_only = alone or (name == TRUTH and key[0] is not Misfit.LAG)
             columns = slice(0, 1 if images_only else 2)
             own, base = (

@@ -22,7 +22,7 @@ from roadeval.data import Calibration, FrameResult, Role, VariantLayout
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.score import BlindPrior, Scoreboard
+from roadeval.evaluation.score import BlindPrior, FitCheck, Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.pipeline.chain import Chain
@@ -121,6 +121,8 @@ class Run:
     the first frame: a file that they name may be gone after the last.
     """
     board: Scoreboard
+    fit: FitCheck
+    """Whether truth and masks fit the images, as far as frames were added."""
     camera: str = ""
     """What the camera is called in a rig; elsewhere its topic is its name."""
     failures: Failures = field(default_factory=Failures)
@@ -145,6 +147,9 @@ class Run:
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
         """Add a frame, in the camera's order; return it with the lines that take that order."""
         doubts = self.board.add(done.result)
+        frame, variants = done.result.frame, done.result.variants
+        own = [[*v.masks()][-1][1] for v in variants if v.variant not in frame.external]
+        self.fit.add(frame, own)
         if done.result.role in TRIED:
             self.failures.first = None
         lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
@@ -236,6 +241,7 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
+        FitCheck(again().numbers, config.frames.every),
         camera,
     )
 

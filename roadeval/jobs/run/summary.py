@@ -15,6 +15,9 @@ from roadeval.config import AS_IT_IS
 from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import (
+    TRUTH,
+    Finding,
+    Misfit,
     Scoreboard,
     Unlabelled,
     drive_effects,
@@ -26,7 +29,7 @@ from roadeval.evaluation.score import (
 )
 from roadeval.evaluation.stats import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
-from roadeval.logs import PICK, Picks
+from roadeval.logs import PICK, LogConfig, NamedLabels, Picks, Selection
 from roadeval.results.facts import (
     DriveFacts,
     EstimateFacts,
@@ -37,7 +40,7 @@ from roadeval.results.facts import (
     UnlabelledFacts,
     as_parts,
 )
-from roadeval.results.sentences import verdict
+from roadeval.results.sentences import misfit, verdict
 from roadeval.results.tables import TableFacts
 from roadeval.version import VERSION
 
@@ -56,16 +59,18 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     given = settings.model is not None and not settings.adapt
     unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run)
     thresholds = dict(_thresholds(run))
-    varying = " The images' sizes vary." if run.frames.accounting.odd_sizes else ""
+    varying = ["The images' sizes vary."] if run.frames.accounting.odd_sizes else []
+    misfits = [*_misfits(run)]
+    said = verdict(
+        *(found["totals"], effects, found["claims"], thresholds),
+        unlabelled=unlabelled,
+        estimated=estimated,
+    )
     return Facts(
         **found,
         **as_parts(effects),
-        verdict=verdict(
-            *(found["totals"], effects, found["claims"], thresholds),
-            unlabelled=unlabelled,
-            estimated=estimated,
-        )
-        + varying,
+        verdict=" ".join([*misfits, said, *varying]),
+        misfits=misfits,
         unlabelled=unlabelled,
         estimate=estimated,
         thresholds=thresholds,
@@ -153,6 +158,29 @@ def _not_random(run: Run, picks: Picks) -> str:
     return ""
 
 
+def _misfits(run: Run) -> Iterator[str]:
+    """Yield what of truth and masks does not fit the images, and what to do about it."""
+    for finding in run.fit.findings():
+        yield misfit_in_words(finding, run.selection, run.config)
+
+
+def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -> str:
+    """Return what of truth or masks does not fit the images, and what to do about it."""
+    rate, is_truth = selection.image.rate_hz, finding.subject == TRUTH
+    period_ms = 1000 / rate if rate else None
+    source = selection.truth if is_truth else selection.masks[finding.subject]
+    pictures = None if source is None else source.pictures
+    remedy = "No number is corrected for it: mend them where they are made."
+    is_late = finding.misfit is Misfit.LAG
+    if is_late and isinstance(pictures, NamedLabels) and pictures.by == "number":
+        setting = "truth" if is_truth else f"masks.{finding.subject}"
+        remedy = f"`{setting}.first` {pictures.first + finding.frames} pairs them anew."
+    elif is_late and is_truth and period_ms:
+        offset = config.topics.sync_offset_ms - finding.frames * period_ms
+        remedy = f"`topics.sync_offset_ms` {offset:.0f} pairs them anew."
+    return misfit(finding, period_ms, remedy)
+
+
 def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield what the threshold of the training frames would bring to methods that learn nothing."""
     found = run.board.thresholds()
@@ -190,6 +218,7 @@ def of_cameras(
     totals = as_tree((mask, over_cameras(sums)) for mask, sums in by_mask.items())
     settings = first.evaluation
     effects = drive_effects([board.masks() for board in boards], settings)
+    misfits = [f"{name}: {text}" for name, own in found.items() for text in own.misfits]
     claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
     accounts = [asdict(each.frames) for each in found.values()]
     skipped = Counter[str]()
@@ -199,7 +228,8 @@ def of_cameras(
     return replace(
         first,
         **as_parts(effects),
-        verdict=verdict(totals, effects, claims),
+        verdict=" ".join([*misfits, verdict(totals, effects, claims)]),
+        misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
         totals=totals,

@@ -409,6 +409,7 @@ def beside_log(
     camera: Camera,
     digest: Callable[[], str],
     log: str = "",
+    *,
     offset_ms: float = 0.0,
 ) -> LabelSource:
     """Settle labels that have names, or those of a topic of another ``log``.
