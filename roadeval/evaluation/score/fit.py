@@ -23,7 +23,7 @@ from roadeval.data.arrays import Floats, Plane
 
 TRUTH: Final = "truth"
 """The subject that is no mask of a method."""
-SPOTS: Final = 20
+SPOTS: Final = 24
 """Frames of a drive that are looked at, spread evenly."""
 LAST_LAG: Final = 5
 """Frames before and after each of them."""
@@ -31,20 +31,26 @@ _FAR: Final = 14
 """Pixels that a mask may have been moved by."""
 _WIDEST: Final = 640
 """Columns of the images that are looked at: larger ones are reduced."""
+_MARGIN: Final = _FAR + 2
+"""Pixels at the image's border whose edges do not count: those of what was moved in from beyond."""
 _GROWN: Final = 8
 """Pixels that its edge may lie farther out or in all around."""
 _NEAR: Final = 2.5
 """Pixels of a move that is named, at least: masks of many a method lie a little off."""
-_FEWER: Final = 3
+_FEWER: Final = 2
 """Every so many points of the edge are held against the moves."""
 _POINTS: Final = 400
 """Points of a mask's edge that are looked at."""
 _LEAST: Final = 6
 """Spots without which nothing is found."""
-_SURE: Final = 4.0
+_SURE: Final = 3.5
 """Least mean gain of what fits better over the spots, in standard errors."""
-_MUCH: Final = 1.08
-"""How many times as well as the plain pairing it fits, at least."""
+_RATHER: Final = 1.0
+"""The same of a move over an edge that lies farther out, or in, all around."""
+_MUCH: Final = 0.05
+"""Least mean gain, as a share of how well the plain pairing fits."""
+_SMALLEST: Final = 96
+"""Rows and columns of images, at least, that are looked at."""
 _UPSIDE: Final = 0.4
 """The share of road high in the image is larger by so much than that before the vehicle, on
 average, where road and other pixels are exchanged."""
@@ -125,11 +131,10 @@ def _edges(road: Plane, ignored: Plane | None) -> _Edges:
     edge = cv2.morphologyEx(road, cv2.MORPH_GRADIENT, cross)
     if ignored is not None:
         edge[cv2.dilate(ignored, np.ones((7, 7), np.uint8)) > 0] = 0
-    margin = 4
-    inner = np.flatnonzero(edge[margin:-margin, margin:-margin])
+    inner = np.flatnonzero(edge[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN])
     inner = inner[:: max(1, len(inner) // _POINTS)]
-    y, x = (place + margin for place in np.divmod(inner, road.shape[1] - 2 * margin))
-    across, down = (np.asarray(s[y, x], float) for s in (slopes.across, slopes.down))
+    y, x = (place + _MARGIN for place in np.divmod(inner, road.shape[1] - 2 * _MARGIN))
+    across, down = (s[y, x].astype(np.float32) for s in (slopes.across, slopes.down))
     size = np.maximum(np.hypot(across, down), 1e-9)
     right, below = across / size, down / size
     return _Edges(x, y, right**2 - below**2, 2 * right * below, (right, below))
@@ -139,14 +144,12 @@ def _agreement(
     edges: _Edges, slopes: _Slopes, right: npt.NDArray[np.intp], below: npt.NDArray[np.intp]
 ) -> Floats:
     """Return how well edges lie on slopes once moved back by some steps, ``(K,)``, at most 1."""
-    height, width = slopes.across.shape
-    x, y = edges.x - right[:, None], edges.y - below[:, None]
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    place = np.where(inside, y * width + x, 0)
+    width = slopes.across.shape[1]
+    place = edges.y * width + edges.x - (below * width + right)[:, None]
     across, down = (s.ravel()[place].astype(np.float32) for s in (slopes.across, slopes.down))
     size = np.hypot(across, down)
     along = edges.cosine * (across**2 - down**2) + edges.sine * 2 * across * down
-    fit = inside * along / np.maximum(size * (size + slopes.usual), 1e-9)
+    fit = along / np.maximum(size * (size + slopes.usual), 1e-9)
     return np.asarray(fit.sum(1) / max(len(edges.x), 1), np.float64)
 
 
@@ -199,6 +202,8 @@ class FitCheck:
 
     def add(self, frame: Frame, computed: Sequence[Packed] = ()) -> None:
         """Look at the next frame; ``computed`` are the masks that were made of it here."""
+        if min(frame.image.shape[:2]) < _SMALLEST:
+            return
         is_spot = frame.number >= self._due and (frame.truth is not None or frame.external)
         reach = LAST_LAG * self._stride
         self._open = [spot for spot in self._open if frame.number - spot[1] <= reach]
@@ -283,37 +288,64 @@ class FitCheck:
     def _finding(self, name: str, *, alone: bool) -> Finding | None:
         """Return what is sure about a subject, by the images ``alone`` or by the truth as well."""
         fits = self._fits.get(name, {})
-        plain = fits.get(_PLAIN, {})
-        if len(plain) < _LEAST:
+        if len(fits.get(_PLAIN, ())) < _LEAST:
             return None
-        # A move must fit better than an edge that lies farther out, or in, all around.
-        own_ways = [v for key, v in fits.items() if key == _PLAIN or key[0] is Misfit.GROWN]
-        ways = max(own_ways, key=lambda v: float(np.nansum([*v.values()])))
-        best: tuple[float, Hypothesis, Floats, Floats] | None = None
-        for key, values in fits.items():
-            if key == _PLAIN or key[0] is Misfit.GROWN or (alone and key[0] is Misfit.MOVED):
-                continue
-            before = ways if key[0] is Misfit.MOVED else plain
-            spots = [spot for spot in values if spot in before]
-            # What was computed here may have learnt that the truth is mirrored, not that it is
-            # late.
-            images_only = alone or (name == TRUTH and key[0] is not Misfit.LAG)
-            columns = slice(0, 1 if images_only else 2)
-            own, base = (
-                np.array([v[spot] for spot in spots])[:, columns] for v in (values, before)
-            )
-            gains = np.nansum(own - base, axis=1)
-            if len(spots) >= _LEAST and (best is None or gains.mean() > best[0]):
-                best = float(gains.mean()), key, gains, np.nansum(base + 0 * own, axis=1)
-        if best is not None:
-            mean, (misfit, frames, right, down), gains, base = best
-            error = float(gains.std(ddof=1)) / math.sqrt(len(gains))
-            far = misfit is not Misfit.MOVED or math.hypot(right, down) > _NEAR
-            if far and mean > _SURE * error and mean > (_MUCH - 1) * max(base.mean(), 0.02):
-                return Finding(name, misfit, frames * self._stride, right, down)
+        gains: dict[Hypothesis, _Gain] = {}
+        for each in fits:
+            # Masks that were computed here may have learnt that the truth is mirrored, never that it
+            # is late.
+            images_only = alone or (name == TRUTH and each[0] is not Misfit.LAG)
+            if each != _PLAIN and not (alone and each[0] is Misfit.MOVED):
+                gain = self._gain(name, each, images_only=images_only)
+                gains |= {each: gain} if gain else {}
+        key = max(
+            (each for each in gains if each[0] is not Misfit.GROWN),
+            key=lambda each: gains[each].mean,
+            default=_PLAIN,
+        )
+        misfit, frames, right, down = key
+        is_sure = key != _PLAIN and gains[key].errors > _SURE and gains[key].share > _MUCH
+        if misfit is Misfit.MOVED:
+            # A move must fit better than an edge that lies farther out, or in, all around.
+            ways = [each for each in gains if each[0] is Misfit.GROWN]
+            way = max(ways, key=lambda each: gains[each].mean, default=_PLAIN)
+            better = self._gain(name, key, way)
+            is_near = math.hypot(right, down) <= _NEAR
+            is_sure = is_sure and not is_near and better is not None and better.errors > _RATHER
+        if is_sure:
+            return Finding(name, misfit, frames * self._stride, right, down)
         if np.nanmean(self._upside[name]) > _UPSIDE:
             return Finding(name, Misfit.INVERTED)
         return None
+
+    def _gain(
+        self,
+        name: str,
+        key: Hypothesis,
+        base: Hypothesis = _PLAIN,
+        *,
+        images_only: bool = False,
+    ) -> _Gain | None:
+        """Return how much better a hypothesis fits than another; None where few spots tell."""
+        values, before = self._fits[name][key], self._fits[name][base]
+        spots = [spot for spot in values if spot in before]
+        if len(spots) < _LEAST:
+            return None
+        columns = slice(0, 1 if images_only else 2)
+        ours, theirs = (np.array([v[spot] for spot in spots])[:, columns] for v in (values, before))
+        gain = np.nansum(ours - theirs, axis=1)
+        error = max(float(gain.std(ddof=1)) / math.sqrt(len(gain)), 1e-9)
+        fit = max(float(np.nansum(theirs + 0 * ours, axis=1).mean()), 0.02)
+        return _Gain(mean := float(gain.mean()), mean / error, mean / fit)
+
+
+@dataclass(frozen=True)
+class _Gain:
+    """How much better something fits on average: plainly, in standard errors, and as a share."""
+
+    mean: float
+    errors: float
+    share: float
 
 
 def _look_at(frame: Frame, computed: Sequence[Packed]) -> _Seen:
