@@ -292,8 +292,8 @@ class FitCheck:
             return None
         gains: dict[Hypothesis, _Gain] = {}
         for each in fits:
-            # Masks that were computed here may have learnt that the truth is mirrored, never that it
-            # is late.
+            # Masks that were computed here may have learnt that the truth is mirrored, but not
+            # that it is late.
             images_only = alone or (name == TRUTH and each[0] is not Misfit.LAG)
             if each != _PLAIN and not (alone and each[0] is Misfit.MOVED):
                 gain = self._gain(name, each, images_only=images_only)
