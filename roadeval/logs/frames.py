@@ -520,7 +520,8 @@ def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int])
         ends.append(partners.near)
     *last, first = ends
     begin, end = max(first - REACH, 0), max(last) + REACH
-    if images.chunks_of(numbers) <= 2 * (end - begin):  # a label's and its image's
+    # A label's chunk and its image's.
+    if source.pairing.is_small or images.chunks_of(numbers) <= 2 * (end - begin):
         yield from (number for number in numbers if partners.of(number) is not None)
         return
     wanted = frozenset(numbers)

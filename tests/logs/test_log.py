@@ -17,6 +17,7 @@ from roadeval.logs import (
     open_log,
 )
 from roadeval.logs.container import records
+from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
@@ -172,6 +173,7 @@ def test_labelled_frames_are_found_by_their_labels_alone(
 def test_labels_are_paired_only_within_the_range(
     tmp_path: Path, frames: FrameSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(reader, "SMALL", 0)
     stamps = range(20_000_000, 20_024_000, 100)
     image, mask = jpeg(grey(9)), grey(0)
     mask[3:] = 255
