@@ -436,6 +436,7 @@ def beside_log(
     else:
         words = by if settings.pair else camera.clock
     meaning = meaning_of(labels, settings, camera, pairing)
+    notes += (pairing.note,) if pairing.note else ()
     why = f"{count}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
 

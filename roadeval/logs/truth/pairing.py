@@ -35,7 +35,7 @@ from roadeval.logs.files import (
     without_hashes,
 )
 from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.settings import LabelPlace, TopicSettings
+from roadeval.logs.settings import NS, LabelPlace, TopicSettings
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.runtime.text import visible
 
@@ -253,6 +253,8 @@ REACH: Final = 4
 the first ones are in order, those within so many frame periods: others cost a chunk each."""
 ALONE_NS: Final = 50_000_000
 """Half the period of a camera of 10 Hz."""
+CLOCKS_NS: Final = 3_000_000_000
+"""Least difference by which two clocks are told: of GPS, TAI and UTC any two lie farther apart."""
 LOOKED_AT: Final = 10
 """First images of a log that decide by what labels are paired."""
 
@@ -376,6 +378,8 @@ class Pairing:
     """Whether all stamps may be read to find an equal one."""
     unused: int = 0
     """Labels that belong to no frame of the log, as far as that is known beforehand."""
+    note: str = ""
+    """What is unusual about it, for people."""
     unsure: int = 0
     """Frames without a label because their number is not certain: an unknown number of images, or
     of the other log's labels, is lost before them."""
@@ -557,20 +561,94 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
     each image.
     """
     images, clock, offset = camera.images, camera.clock, round(offset_ms * 1e6)
+    note = ""
+    if clock is Clock.STAMP and isinstance(labels, TopicReader):
+        check_clocks(images, labels, offset)
+    elif clock is Clock.STAMP and isinstance(labels, NamedLabels) and len(labels):
+        clock, note = _clock_of_names(images, labels, camera.tolerance_ns, offset)
     if clock is Clock.STAMP:
         period = median_period(images.log_times)
         in_order = period > 0 and _rise(images) and _rise(labels)
         is_small = images.is_small and (isinstance(labels, NamedLabels) or labels.is_small)
         reach = max(REACH * period, camera.tolerance_ns) if in_order and not is_small else None
         stamps = Later(labels, offset) if offset else labels
-        return Pairing(images, stamps, camera.tolerance_ns, reach, is_small)
+        return Pairing(images, stamps, camera.tolerance_ns, reach, is_small, note=note)
     if clock is Clock.LOG_TIME:
         times = Times(images.log_times), Times(labels.log_times + offset)
-        return Pairing(*times, camera.tolerance_ns)
+        return Pairing(*times, camera.tolerance_ns, note=note)
     count = min(labels.sure, len(labels) if len(images) == len(labels) else 0)
     unsure = len(images) - min(images.sure, labels.sure)
     frames = Times(range(len(images)), images.sure)
     return Pairing(frames, Times(range(count)), camera.tolerance_ns, unsure=unsure)
+
+
+def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
+    """Refuse, as a `LogError`, labels that another clock has stamped than the images.
+
+    From stamp to log time it is then another time than for the images, and the same at both ends.
+    Labels that were only logged late have stamps among the images', or log times behind theirs.
+    """
+    if not len(labels):
+        return
+    both = (images, labels)
+    ours, theirs = ([reader.stamp(0), reader.stamp(len(reader) - 1)] for reader in both)
+    begin, end = (theirs[place] + offset - ours[place] for place in (0, 1))
+    logged, last = (int(labels.log_times[at]) - int(images.log_times[at]) for at in (0, -1))
+    apart = begin - logged
+    if (
+        min(*ours, *theirs) <= 0
+        or abs(apart) < CLOCKS_NS
+        or 4 * abs(end - last - apart) > abs(apart)
+    ):
+        return
+    outside = 2 * (-begin if apart < 0 else end) > abs(apart)
+    one_log = labels.channels[0].container in [channel.container for channel in images.channels]
+    if outside or (one_log and 2 * max(-logged, last) <= abs(apart)):
+        seconds = apart / NS
+        whole = round(seconds) if abs(seconds - round(seconds)) < 0.2 else round(seconds, 3)
+        side = "before" if whole < 0 else "after"
+        raise LogError(
+            f"{labels.name}: its stamps are of another clock than those of {images.name}: they lie "
+            f"about {abs(whole):g} s {side} them for the same log times; `topics.sync_offset_ms` "
+            f"{round(-whole * 1000)} moves the truth's to the images'"
+        )
+
+
+def _clock_of_names(
+    images: TopicReader, labels: NamedLabels, most: int, offset: int
+) -> tuple[Clock, str]:
+    """Return what the times in the labels' names are, and what is said of it.
+
+    Where none is the stamp of an image, they are log times if those are other frames' than the
+    stamps nearby, and the labels follow them, or are nearer to them.
+    """
+    keys, logged = labels.log_times + offset, images.log_times
+    keys = keys[np.unique(np.linspace(0, len(keys) - 1, 2 * LOOKED_AT, dtype=int))]
+    frames = []
+    for key in keys.tolist():
+        hint = min(int(np.searchsorted(logged, key)), len(images) - 1)
+        middle = _seek(images, key, hint)
+        frames.append(
+            [_closest(images, key, middle, None), _closest(Times(logged), key, hint, None)]
+        )
+    by_stamp, by_log = np.array(frames).T
+    behind = keys - [images.stamp(frame) for frame in by_stamp.tolist()]
+    after = keys - logged[by_log]
+    step = next(10**n for n in range(9, 2, -1) if n == 3 or not (keys % 10**n).any())
+    if np.median(np.abs(behind)) < step or np.abs([behind, after]).min() > most:
+        return Clock.STAMP, ""
+    stamped, away = (float(np.median(times)) / 1e6 for times in (behind, after))
+    is_nearer = (stamped < 0, abs(stamped)) <= (away < 0, abs(away))
+    if np.median(np.abs(after)) >= step and (is_nearer or (by_stamp == by_log).all()):
+        return Clock.STAMP, (
+            f"no name is the stamp of a frame: by median they lie {stamped:.1f} ms after the "
+            "nearest one; if they are of another one, `topics.sync_offset_ms` moves them"
+        )
+    met = int(np.count_nonzero(np.abs(after) <= most))
+    return Clock.LOG_TIME, (
+        f"no name is the stamp of a frame: log times pair them, for {met} of the {len(keys)} that "
+        f"were looked at lie {away:.1f} ms after a frame's log time, by median"
+    )
 
 
 def _rise(stamps: Stamps) -> bool:
