@@ -322,8 +322,14 @@ def from_labels(found: EstimateFacts | None, variant: str) -> Iterator[str]:
         more = f"; {number(own.to_halve)} more drawn at random would halve that interval"
     yield (
         f"{variant}: {TESTED} {percent(own.mean, 1)} % ({ends}) from {number(own.labels)} labelled "
-        f"frames, drawn at random, of {number(own.frames)}{more}."
+        f"frames, drawn at random, of {number(own.frames)}{more}. Errors on up to "
+        f"{percent(own.missed, 0)} % of the frames may be missed by so few."
     )
+    if own.unseen:
+        yield (
+            f"{number(own.unseen)} frames are far more in doubt than any that was drawn: the upper "
+            "end takes them for wrong altogether. Label them."
+        )
     worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in found.apart.items())
     if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:
         yield f"Frames that were picked by rank are not in it; the worst: {listing(shown)}."

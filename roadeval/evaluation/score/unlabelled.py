@@ -23,7 +23,7 @@ from roadeval.evaluation.score.rows import near, separate
 from roadeval.evaluation.stats import draw_order
 
 SIGNS: Final[Mapping[str, str]] = {
-    "entropy": "how unsure road is, mean over pixels, from 0 to 1 bit",
+    "entropy": "how unsure road is, mean over every 16th pixel, from 0 to 1 bit",
     "disagreement": "share of pixels on which another variant differs, mean over the others",
     "flicker": "share of pixels that change from the frame before",
 }
@@ -41,7 +41,10 @@ def _entropies() -> Values:
 
 
 def entropy(probability: Probability) -> float:
-    """Return the mean entropy of ``(H, W)`` uint16 codes of a probability, from 0 to 1 bit."""
+    """Return the mean entropy of ``(H, W)`` uint16 codes of a probability, from 0 to 1 bit.
+
+    The mean is over every 16th pixel: one of `_STEP` rows and columns.
+    """
     return float(_entropies()[probability[::_STEP, ::_STEP]].mean())
 
 

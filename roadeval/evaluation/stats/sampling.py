@@ -22,6 +22,10 @@ FINER: Final = 4
 """Each frame has at least two to the power of so many less one points of the order's ring."""
 LEAST_LEFT: Final = 0.05
 """One minus the leverage of a frame is at least this."""
+FAR: Final = 2.0
+"""Scores that lie so many interquartile ranges above the upper quartile are those of bursts. With
+3 the interval held in 74 % of draws where the score of a burst is twice that of other frames, with
+2 in 93 % or more, and drives without bursts get hardly wider ones."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,14 @@ class Estimate:
     """Labelled frames that were drawn, and frames in all."""
     to_halve: int | None
     """So many further labels, drawn at random, would halve the interval; None where none can."""
+    unseen: int = 0
+    """Frames far more in doubt than all others, where none of them was drawn: the interval takes
+    in whatever their rate is."""
+
+    @property
+    def missed(self) -> float:
+        """The greatest share of the frames that was missed altogether with a chance of 5 %."""
+        return float(1 - 0.05 ** (1 / self.labels))
 
 
 def draw_order(count: int, seed: int) -> Sums:
@@ -77,7 +89,9 @@ def estimate(
     of all frames are drawn, the less even are their gaps; so the variance of a simple random sample
     is added, times the share that is drawn. With fewer than `REGRESSION_FROM` labels the estimate
     is the plain mean. The interval is Student's of the logarithm: error rates are skewed to the
-    right.
+    right. Where errors come in rare bursts, none may be among the drawn frames, which then say
+    nothing of them: if the scores tell of such frames (`FAR`), the interval is widened by all that
+    their rate can be, 0 to 1.
 
     Parameters
     ----------
@@ -118,8 +132,17 @@ def estimate(
         return Estimate(mean, None, None, confidence, labels, frames, None)
     reach = _student(confidence, labels - fitted) * error / mean if mean else 0.0
     low, high = mean * math.exp(-reach), min(mean * math.exp(min(reach, 700.0)), 1.0)
-    more = _to_halve(labels, frames, fitted, confidence)
-    return Estimate(mean, low, high, confidence, labels, frames, more)
+    more, unseen = _to_halve(labels, frames, fitted, confidence), _unseen(scores, every_score)
+    seen = 1 - unseen / frames
+    low, high = low * seen, high * seen + 1 - seen
+    return Estimate(mean, low, high, confidence, labels, frames, more, unseen)
+
+
+def _unseen(scores: Floats, every_score: Floats) -> int:
+    """Return how many frames are far more in doubt than the rest, if none of them was drawn."""
+    lower, upper = np.quantile(every_score, (0.25, 0.75))
+    far = upper + FAR * (upper - lower)
+    return 0 if (scores > far).any() else int(np.count_nonzero(every_score > far))
 
 
 def _student(confidence: float, freedom: int) -> float:
