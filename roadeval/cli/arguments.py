@@ -76,6 +76,7 @@ def configuration(given: Given) -> RunConfig:
         configure,
         in_file,
         network_variant,
+        read_camera,
         read_tables,
     )
 
@@ -101,7 +102,7 @@ def configuration(given: Given) -> RunConfig:
         if "only" in given:
             config = config.override({"only": given["only"]})
     if path := given.get("ground"):
-        ground = read_tables(path)
+        ground = read_camera(path, config.topics.image)
         with in_file(str(path)):
             config = config.override({"ground": ground})
     chosen = {"training.frames", "training.placement", "training.gap"}
@@ -115,13 +116,13 @@ def configuration(given: Given) -> RunConfig:
 
 def of_a_log(given: Given) -> LogConfig:
     """Return what options ask of a log; wrong usage as in `configuration`."""
-    from roadeval.config import in_file, log_config, read_tables
+    from roadeval.config import in_file, log_config, read_camera
 
     with usage():
         _check_names(given, "topics.masks")
         found = log_config({**_tables(given), **_cameras(given)})
     if path := given.get("ground"):
-        ground = read_tables(path)
+        ground = read_camera(path, found.topics.image)
         with in_file(str(path)):
             return replace(found, ground=log_config({"ground": ground}).ground)
     return found

@@ -66,9 +66,10 @@ class MethodSettings:
     cameras: Annotated[tuple[str, ...], Flag("--image-topic", "T", "Input")] = ()
     """The camera's topic, where the log has several. Given again, each camera is replayed, scored
     apart, and recorded beside the others."""
-    ground: Annotated[Path | None, Flag("--camera", "FILE.toml", "Input")] = None
+    ground: Annotated[Path | None, Flag("--camera", "FILE", "Input")] = None
     """Where the camera is over the ground, as its height and pitch, where the log does not say so:
-    with it errors are counted in metres, too."""
+    with it errors are counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration
+    or of Kalibr."""
 
 
 GROUPS: Final = ("Output", "Methods", "Training", "Truth", "Range", "Input", "Execution", "Fleet")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
+    from roadeval.config.camera_file import read_camera
     from roadeval.config.run import (
         OF_A_LOG,
         RunConfig,

@@ -50,29 +50,25 @@ class Calibration:
     @property
     def problem(self) -> str:
         """What no camera can have, as "focal length is 0": the setting first; empty if nothing."""
-        k = self.matrix if len(self.matrix) == 9 else (math.nan,) * 9
-        across, down, less, more = k[0], k[4], min(k[0], k[4]), max(k[0], k[4])
+        fx, skew, x, zero, fy, y, *last = (*self.matrix, *(math.nan,) * 9)[:9]
         short, long = sorted((self.width, self.height))
         pixels = f"{self.width}x{self.height} pixels"
-        aside = abs(k[2] - self.width / 2), abs(k[5] - self.height / 2)
-        checks = {
+        aside = abs(x - self.width / 2), abs(y - self.height / 2)
+        possible = {
             f"size is {pixels}": 1 <= short <= long <= 65_536,
-            "focal length is not known: its matrix is not nine numbers": len(self.matrix) == 9,
-            "focal length is 0: the camera was never calibrated": across or down,
-            f"focal length is {across:.6g} and {down:.6g} for {pixels}": (
-                0.02 * short <= less <= more <= min(200 * long, 5 * less)
+            "focal length is 0: the camera was never calibrated": fx or fy,
+            f"focal length is {fx:.6g} and {fy:.6g} for {pixels}": (
+                0.02 * short <= min(fx, fy) <= max(fx, fy) <= min(200 * long, 5 * fx, 5 * fy)
             ),
             "focal length is not clear: its matrix is not fx 0 cx, 0 fy cy, 0 0 1": (
-                abs(k[1]) <= across and (k[3], *k[6:]) == (0, 0, 0, 1)
+                abs(skew) <= fx and (zero, *last) == (0, 0, 0, 1)
             ),
-            f"centre is {k[2]:.6g}, {k[5]:.6g} in {pixels}": all(
-                length <= 10 * long for length in aside
-            ),
+            f"centre is {x:.6g}, {y:.6g} in {pixels}": all(n <= 10 * long for n in aside),
             "distortion has a number that is not finite, or beyond a million": all(
                 abs(number) <= 1e6 for number in self.distortion
             ),
         }
-        return next((text for text, holds in checks.items() if not holds), "")
+        return next((text for text, holds in possible.items() if not holds), "")
 
     @property
     def doubt(self) -> str:
@@ -96,20 +92,19 @@ class Calibration:
     def part(
         self, corner: tuple[int, int], size: tuple[int, int], bins: Sequence[int]
     ) -> Calibration:
-        """Return the calibration of a part of the sensor whose pixels are binned.
+        """Return the calibration of a part of the sensor of which so many pixels become one.
 
-        ``corner`` is its first pixel, ``size`` what is left, ``bins`` how many pixels, across and
-        down, become one. As ROS does, the corner comes off first, and then all is divided; a centre
-        in the very middle of the pixels' centres stays there.
+        As in ROS the corner comes off first, and then all is divided; but a centre in the very
+        middle, by the centres of pixels, stays there.
         """
-        k, centre = self.matrix, []
-        for at, begin, pixels, length in zip(
-            (k[2], k[5]), corner, bins, (self.width, self.height), strict=True
-        ):
-            half = 0.5 * (at == (length - 1) / 2)
-            centre.append((at - begin + half) / pixels - half)
-        across, down = bins
-        matrix = (k[0] / across, k[1] / across, centre[0], k[3], k[4] / down, centre[1], *k[6:])
+        k, (across, down) = self.matrix, bins
+        sides = (self.width, self.height)
+        halves = [0.5 * (2 * at == side - 1) for at, side in zip(k[2:6:3], sides, strict=True)]
+        x, y = (
+            (at - begin + half) / pixels - half
+            for at, begin, pixels, half in zip(k[2:6:3], corner, bins, halves, strict=True)
+        )
+        matrix = (k[0] / across, k[1] / across, x, k[3], k[4] / down, y, *k[6:])
         return replace(self, width=size[0], height=size[1], matrix=matrix)
 
     def scaled(self, width: int, height: int) -> Calibration:

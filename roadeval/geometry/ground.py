@@ -12,7 +12,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -26,7 +25,7 @@ from roadeval.geometry.settings import GroundSettings
 GROUND_FRAMES: Final = ("base_footprint",)
 """Frames of a vehicle that lie on the ground (REP 120)."""
 COEFFICIENTS: Final = {
-    **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (4, 5, 8, 12, 14)),
+    **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (0, 4, 5, 8, 12)),
     **dict.fromkeys(FISHEYE, (4,)),
     **dict.fromkeys(("", "none", "pinhole", "no_distortion"), (0,)),
 }
@@ -60,6 +59,7 @@ class Ground:
     """Nine numbers: from metres ahead, metres to the left, and 1 to the direction of the ray."""
     model: str = ""
     distortion: tuple[float, ...] = ()
+    """As many numbers as the model has; a fisheye without any has four zeros."""
     is_posed: bool = True
     """Whether `plane` is a place and angles, and not only a homography."""
 
@@ -76,7 +76,7 @@ class Ground:
         Pixels may lie outside the image.
         """
         rays = _mapped(self.plane, places)
-        if self.bends:
+        if self.distortion:
             # A polynomial that folds bends rays from far outside the picture back into it.
             rays[~(np.hypot(*rays.T) <= self._curve[0][-1])] = np.nan
             rays = _bent(rays, self.model, self.distortion)
@@ -116,11 +116,6 @@ class Ground:
         first, second, third = np.reshape(self.plane, (3, 3)).T
         return np.stack([first, second, np.cross(first, second)], axis=1), third
 
-    @property
-    def bends(self) -> bool:
-        """Whether the lens has a distortion; a fisheye's is one without coefficients, too."""
-        return self.model in FISHEYE or any(self.distortion)
-
     @cached_property
     def _curve(self) -> tuple[Floats, Floats]:
         """Slopes of rays, and the distances from the centre at which they are seen.
@@ -139,7 +134,7 @@ class Ground:
         NaN where there is none, or one at more than a right angle to the camera's own.
         """
         wanted = _mapped(_inverse(self.matrix), pixels)
-        if not self.bends:
+        if not self.distortion:
             return wanted
         slopes, seen = self._curve
         aim, rays, missed = wanted.copy(), wanted.copy(), np.full(len(wanted), np.inf)
@@ -160,7 +155,7 @@ def _growth(slope: Floats, model: str, distortion: Sequence[float]) -> Floats:
     """Return by how much a lens moves what is seen along rays from the centre, by their slopes."""
     if model in FISHEYE:
         angle = np.arctan(slope)
-        k1, k2, k3, k4 = distortion
+        k1, k2, k3, k4 = (*distortion, *(0.0,) * 4)[:4]
         square = angle**2
         seen = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
         return np.divide(seen, slope, out=np.ones_like(slope), where=slope > 0)
@@ -181,17 +176,12 @@ def _bent(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
     if model in FISHEYE:
         return bent
     _, _, p1, p2, *rest = distortion
-    s1, s2, s3, s4, tilt, turn = (*rest[4:], *(0.0,) * 10)[:6]
+    s1, s2, s3, s4 = (*rest[4:], *(0.0,) * 4)[:4]
     x, y = rays.T
     square = slope**2
     bent[:, 0] += 2 * p1 * x * y + p2 * (square + 2 * x * x) + square * (s1 + square * s2)
     bent[:, 1] += 2 * p2 * x * y + p1 * (square + 2 * y * y) + square * (s3 + square * s4)
-    if not (tilt or turn):
-        return bent
-    turned = _rotation(LEFT, -math.degrees(turn)) @ _rotation(AHEAD, -math.degrees(tilt))
-    back = turned[2, 2] * np.eye(3) - np.outer(turned[:, 2], (0, 0, 1))
-    back[2, 2] = 1
-    return _mapped(back @ turned, bent)
+    return bent
 
 
 def ground_of(
@@ -230,8 +220,9 @@ def ground_of(
     covers = (
         f"a pixel covers {near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
     )
-    told = [covers] * math.isfinite(near + far), [lens.doubt] * bool(given.focal and lens.doubt)
-    return made, "; ".join((f"metres: flat ground, {text}", *chain(*told)))
+    doubt = lens.doubt if given.focal else ""
+    told = f"metres: flat ground, {text}", covers if math.isfinite(near + far) else "", doubt
+    return made, "; ".join(filter(None, told))
 
 
 def _lens(

@@ -22,7 +22,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
 from roadeval.logs.messages.pixels import deep_samples, to_rgb
 from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
-from roadeval.logs.topics.calibration import calibration_of
+from roadeval.logs.topics.calibration import calibration_of, is_rectified
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.labels import (
@@ -191,9 +191,11 @@ def settle(
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     no_truth = "" if truth.topic else truth.why
     known = calibration_of(image, topics, readers)
-    ground = ground_of(known[0], config.ground, image.size)
+    ground, how = ground_of(known[0], config.ground, image.size)
+    if any(config.ground.distortion) and is_rectified(image.name):
+        how += "; `ground.distortion` is applied although the topic's name says rectified"
     white = _white_of(readers[image.name], config.frames.white)
-    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, *ground, white)
+    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, ground, how, white)
 
 
 BITS: Final = (8, 10, 12, 14, 16)

@@ -1,4 +1,4 @@
-"""JSON, TOML and Protocol Buffers from elsewhere, read within limits.
+"""JSON, TOML, YAML and Protocol Buffers from elsewhere, read within limits.
 
 A few kilobytes can nest deeper than any program unpacks, name a table by twenty thousand words, or
 hold a word that takes minutes to typeset.
@@ -28,6 +28,7 @@ DEPTH: Final = 32
 _TOO_DEEP: Final = f"it nests more than {DEPTH} tables and lists inside one another"
 BYTES: Final = 64 << 20
 TOML_BYTES: Final = 1 << 20
+YAML_BYTES: Final = 1 << 17
 DOTS: Final = 2_000
 """Parts of a name in TOML; the time to read one grows with the square of their number."""
 
@@ -74,6 +75,21 @@ def read_toml(text: str) -> dict[str, Any]:
         if re.search("limit .* for integer string", str(error)):
             raise ValueError("a number in it has thousands of digits") from error
         raise
+    _check(found, VALUES)
+    return found
+
+
+def read_yaml(path: Path) -> Any:
+    """Read a YAML document; a ValueError if it is damaged or beyond a limit, or has aliases."""
+    import yaml
+
+    try:
+        text = read_bounded(path, YAML_BYTES).decode()
+        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
+            raise ValueError("it has aliases, as *name: write them out")
+        found = yaml.safe_load(text)
+    except (RecursionError, yaml.YAMLError) as error:
+        raise ValueError("it is damaged") from error
     _check(found, VALUES)
     return found
 

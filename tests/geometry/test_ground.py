@@ -23,8 +23,7 @@ LENSES = {
     "equidistant": (-0.02, 0.003, -0.001, 0.0002),
     "fisheye": (0.0, 0.0, 0.0, 0.0),
 }
-TILTED = (-0.2, 0.05, 0.001, 0.002, 0.01, 0.1, 0.0, 0.0, 0.01, -0.02, 0.01, 0.003, 0.05, -0.03)
-"""All of OpenCV's fourteen numbers."""
+PRISM = (-0.2, 0.05, 0.001, 0.002, 0.01, 0.1, 0.0, 0.0, 0.01, -0.02, 0.01, 0.003)
 
 
 def made(**settings: object) -> Ground:
@@ -50,7 +49,7 @@ def test_places_are_seen_where_the_synthetic_world_draws_them():
     assert np.abs(made().places(seen) - PLACES).max() < 1e-6
 
 
-@pytest.mark.parametrize(("model", "numbers"), [*LENSES.items(), ("plumb_bob", TILTED)])
+@pytest.mark.parametrize(("model", "numbers"), [*LENSES.items(), ("plumb_bob", PRISM)])
 def test_a_lens_bends_as_opencv_says_and_back(model: str, numbers: tuple[float, ...]):
     ground = made(model=model, distortion=numbers)
     seen = ground.pixels(PLACES)
@@ -232,6 +231,17 @@ def test_intrinsics_may_be_for_images_of_another_size():
             None,
             {"height": 1.0, "pitch": 1.0, "fov": 60.0, "model": "mei", "distortion": (1.0,)},
             "the distortion is not known: mei of 1 numbers",
+        ),
+        (
+            None,
+            {
+                "height": 1.0,
+                "pitch": 1.0,
+                "fov": 60.0,
+                "model": "radtan",
+                "distortion": (0.1,) * 14,
+            },
+            "the distortion is not known: radtan of 14 numbers",
         ),
         (
             None,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -33,7 +33,8 @@ DEEPEST: Final = 50
 _UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError, OverflowError
 Transform = tuple[str, Vector, Vector]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
-
+Known = tuple[Calibration | None, str]
+"""A calibration for the images and what is to be said of it, or None and why there is none."""
 
 RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undistorted"})
 """Words of topics of images without distortion."""
@@ -49,38 +50,28 @@ def is_rectified(name: str) -> bool:
     return any(part & RECTIFIED and "raw" not in part for part in parts)
 
 
-class Lens(NamedTuple):
-    """What a topic says of the lens of a camera."""
-
-    topic: str
-    frame_id: str
-    calibration: Calibration | None
-    """For images of the camera's size; None if there is none that could be used."""
-    why: str
-    """What is to be said of it, or why there is none."""
-
-
 def calibration_of(
     image: TopicInfo, topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]
-) -> tuple[Calibration | None, str]:
+) -> Known:
     """Return the calibration of a camera and what is to be said of it, or None and why.
 
     The topic is that whose ``frame_id`` is the images' own; of several, that whose path shares most
     with theirs. The text is empty, too, where the log has no calibration at all.
     """
-    lenses = [
-        _lens_of(topic, readers[topic.name], image)
+    lenses = {
+        topic.name: _lens_of(topic, readers[topic.name], image)
         for topic in topics
         if topic.kind is TopicKind.CALIBRATION and topic.count
-    ]
-    own = [lens for lens in lenses if lens.frame_id in ("", image.frame_id)]
-    near = max((_shared(lens.topic, image.name) for lens in own), default=0)
-    best = [lens for lens in own if _shared(lens.topic, image.name) == near]
-    best = [lens for lens in best if lens.calibration] or best
-    if len(best) != 1 or not (near or best[0].frame_id or best[0].calibration is None):
-        names = ", ".join(lens.topic for lens in lenses)
-        return None, f"none of {names} is clearly of {image.name}" if lenses else ""
-    topic, frame, made, why = best[0]
+    }
+    own = {name: lens for name, lens in lenses.items() if lens[0] in ("", image.frame_id)}
+    near = max((_shared(name, image.name) for name in own), default=0)
+    best = [name for name in own if _shared(name, image.name) == near]
+    best = [name for name in best if own[name][1]] or best
+    if len(best) != 1 or not (near or own[best[0]][0] or own[best[0]][1] is None):
+        why = f"none of {', '.join(lenses)} is clearly of {image.name}"
+        return None, why if lenses else ""
+    (topic,) = best
+    frame, made, why = own[topic]
     if made is None:
         return None, f"{topic}: {why}"
     reader = readers[topic]
@@ -108,8 +99,13 @@ def _shared(one: str, other: str) -> int:
     return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)
 
 
-def _lens_of(topic: TopicInfo, reader: TopicReader, image: TopicInfo) -> Lens:
-    """Read the first message that can be used: some drivers send zeros until they are ready."""
+def _lens_of(
+    topic: TopicInfo, reader: TopicReader, image: TopicInfo
+) -> tuple[str, Calibration | None, str]:
+    """Return a topic's ``frame_id`` and what its first message says that can be used.
+
+    Some drivers send zeros until they are ready.
+    """
     frame, why = "", "no message can be read"
     for position in range(min(len(reader), LOOKED_AT)):
         try:
@@ -120,15 +116,12 @@ def _lens_of(topic: TopicInfo, reader: TopicReader, image: TopicInfo) -> Lens:
             why = f"its {topic.encoding} messages of {topic.schema} cannot be read: {_ADVICE}"
             continue
         if made is not None:
-            return Lens(topic.name, frame, made, why)
-    return Lens(topic.name, frame, None, why)
+            return frame, made, why
+    return frame, None, why
 
 
-def _read(topic: str, message: Any, image: TopicInfo) -> tuple[Calibration | None, str]:
-    """Return a message's calibration and what is to be said of it, or None and why.
-
-    Of rectified images it is the projection that holds, without distortion.
-    """
+def _read(topic: str, message: Any, image: TopicInfo) -> Known:
+    """Read a message. Of rectified images it is the projection that holds, without distortion."""
 
     def numbers(name: str) -> tuple[float, ...]:
         value = getattr(message, name, None)
@@ -152,7 +145,7 @@ def _read(topic: str, message: Any, image: TopicInfo) -> tuple[Calibration | Non
     return fitted, "; ".join(filter(None, (note, said)))
 
 
-def _fitted(made: Calibration, message: Any, size: Size) -> tuple[Calibration | None, str]:
+def _fitted(made: Calibration, message: Any, size: Size) -> Known:
     """Return a calibration for images of a size: of a part of the sensor, binned, or scaled."""
     region = getattr(message, "roi", None)
     left, top, across, down = (
