@@ -153,15 +153,22 @@ class RunConfig(LogConfig):
         """Return the configuration of each camera by its name; of one camera alone by ``""``."""
         if not self.cameras:
             return {"": self}
-        fields = ("image", "truth", "shadow", "masks")
-        return {
-            visible(each.name or each.image): replace(
-                self,
-                cameras=(),
-                ground=each.ground,
-                topics=replace(self.topics, **{name: getattr(each, name) for name in fields}),
+        topics = (
+            # An empty name under [topics] takes no topic, of any camera.
+            replace(
+                self.topics,
+                image=each.image,
+                truth=self.topics.truth if each.truth is None else each.truth,
+                shadow=self.topics.shadow if each.shadow is None else each.shadow,
+                masks=each.masks,
             )
             for each in self.cameras
+        )
+        return {
+            visible(each.name or each.image): replace(
+                self, cameras=(), ground=each.ground, topics=own
+            )
+            for each, own in zip(self.cameras, topics, strict=True)
         }
 
     def pipelines(self) -> dict[str, Pipeline]:

@@ -31,7 +31,8 @@ class OutputSettings:
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
     """The recording. Default: ``recordings/<drive>.rrd``."""
     reports: Annotated[str | None, Flag("-o --reports", "DIR")] = None
-    """The folder of tables and figures. Default: ``reports/<drive>/``."""
+    """The folder of tables and figures. Default: ``reports/<drive>/``, or, of a
+    recording ``--save new.rrd``, ``reports/new/``."""
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
     """Masks, error maps and rates as a log, to open beside the drive. Default: none."""
     record: Annotated[str, Flag("--record", "WHAT")] = "all"

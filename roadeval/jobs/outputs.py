@@ -40,11 +40,15 @@ class Outputs:
 
     @classmethod
     def of(cls, settings: OutputSettings, drive: str) -> Outputs:
-        """Return the places of a drive's results: from the settings, or by its name."""
+        """Return the places of a drive's results: from the settings, or by its name.
+
+        The folder is named as the recording, where that is named: no other run's is replaced.
+        """
         saved = Path(settings.save or Path("recordings", f"{drive}.rrd"))
+        name = (saved.stem if settings.save else drive).strip(".") or drive
         return cls(
             saved if RecordRule.parse(settings.record).recorded else None,
-            Path(settings.reports or Path("reports", drive)),
+            Path(settings.reports or Path("reports", name)),
             Path(settings.mcap) if settings.mcap else None,
         )
 

@@ -158,3 +158,12 @@ def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text,
     with pytest.raises(ConfigError, match=said) as caught:
         network_variant("mine", str(write(tmp_path, text)))
     assert str(tmp_path / "c.toml") in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["truth", "shadow"])
+@pytest.mark.parametrize("taken", ["", "/labels"])
+def test_an_empty_topic_is_that_of_every_camera_but_of_those_that_name_one(name, taken):
+    named = {name: taken} if taken else {}
+    cameras = [{"image": f"/{side}", **named} for side in ("left", "right")]
+    config = configure({"topics": {name: ""}, "cameras": cameras})
+    assert {getattr(each.topics, name) for each in config.by_camera().values()} == {taken}

@@ -57,6 +57,7 @@ OTHER = {
     "frames.white": 4095.0,
     "ground": {"height": 1.4, "pitch": 1.2, "focal": [485.0]},
     "run.jobs": 1,
+    "run.patience_s": 5.0,
     "fleet.folds": 5,
     "fleet.keep": "worst:3",
     "fleet.scheduler": "tcp://host:8786",

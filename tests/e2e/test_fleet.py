@@ -16,6 +16,7 @@ import roadeval
 from roadeval import logs
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
+from roadeval.jobs.results.compare import compare
 from roadeval.jobs.run.fleet_work import train_fold
 from roadeval.logs import LogWriter
 from roadeval.results.fleet import record_path
@@ -122,6 +123,15 @@ def test_dasks_workers_replay_every_drive_and_the_broken_one_is_named(drives, ra
     ]
     assert tables(tmp_path / "f") == tables(ran.folder)
     assert not list(tmp_path.rglob("*.lock"))
+
+
+@pytest.mark.parametrize(("limit", "code"), [(None, 3), ("> 99%", 3), ("< 100%", 4)])
+def test_a_comparison_of_a_fleet_names_the_drives_that_failed(ran, limit, code):
+    condition = ["--fail-if", f"post.filtered.ERR {limit}"] if limit else []
+    done = here("compare", ran.folder, *condition)
+    assert done.returncode == code, done.stderr
+    assert "lost: f: 1 of 3 drives failed, no number counts b" in done.stderr
+    assert "1 of 3 drives failed" in compare(ran.folder).content["warnings"][0]
 
 
 def test_the_numbers_are_those_of_single_replays(drives, ran, tmp_path):

@@ -84,7 +84,7 @@ def test_of_a_drive_that_was_not_kept_the_command_that_makes_its_recording_is_sa
     [
         (["--frame", 3], 2, "--frame does not go with a fleet"),
         (["--variant", "filtered"], 2, "--variant does not go with a fleet"),
-        (["--worst", 99], 1, "only the worst "),
+        (["--worst", 99], 1, "there is no worst frame number 99: "),
     ],
 )
 def test_what_cannot_be_done_is_one_line(words, code, said, made):

@@ -39,6 +39,14 @@ def test_they_land_under_the_drive_s_name_or_where_the_settings_say(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("save", "folder"),
+    [("new.rrd", "reports/new"), ("to/a.b.rrd", "reports/a.b"), ("..rrd", "reports/drive")],
+)
+def test_a_recording_of_another_name_has_a_results_folder_of_that_name(save, folder):
+    assert Outputs.of(OutputSettings(save), "drive").reports == Path(folder)
+
+
+@pytest.mark.parametrize(
     ("sign", "own"), [("summary.json", "frames.csv"), ("fleet.json", "drives.parquet")]
 )
 def test_the_files_of_an_input_folder_are_inputs_and_others_may_lie_beside_them(

@@ -64,7 +64,7 @@ def compare(
     out. One drive is judged over its frames, several over drives. Results of different drives are
     not compared. Exit code 4 if a --fail-if condition holds; 1 if one
     cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
-    of the smaller one.
+    of the smaller one; 3 if drives of a fleet failed, so that no number counts them.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
@@ -82,5 +82,7 @@ def compare(
         judged = [each for each in compared.judgements if each.holds is not None]
         screen.show(compared.comparison, judged, console.results())
     for warning in compared.comparison.warnings:
-        messages.warning(warning)
-    return messages.conditions(compared.held, compared.unjudged)
+        if warning not in compared.lost:
+            messages.warning(warning)
+    lost = messages.losses(compared.lost)
+    return messages.conditions(compared.held, compared.unjudged) or lost

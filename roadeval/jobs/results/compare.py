@@ -11,6 +11,7 @@ import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, Rows
 from roadeval.data.result import joined
+from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import comparison, score
 from roadeval.evaluation.comparison import (
@@ -35,6 +36,7 @@ from roadeval.report.sections.frames import FrameBrowser, browser, strip
 from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import window_table
+from roadeval.results.schema import FAILED
 from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
@@ -52,6 +54,8 @@ class Compared:
     """The results with the one drive that is compared; none where several are."""
     recordings: Mapping[str, DriveResult]
     """By the results' labels; a folder has none."""
+    lost: tuple[str, ...] = ()
+    """Which drives of a fleet failed, so that no number counts them; among the warnings, too."""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -105,13 +109,24 @@ def compare(
         each.name if across else side.label for side, each in labelled if not each.complete
     )
     partial = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
-    found = replace(found, warnings=(*partial, *found.warnings))
+    lost = dict.fromkeys(filter(None, map(_failed_drives, opened)))
+    found = replace(found, warnings=(*lost, *partial, *found.warnings))
     alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: each.drive for side, each in labelled if each.drive and each.drive.recording
     }
     judgements = tuple(judge(found, conditions, settings))
-    return Compared(found, judgements, tuple(alone or ()), recordings)
+    return Compared(found, judgements, tuple(alone or ()), recordings, tuple(lost))
+
+
+def _failed_drives(result: Result) -> str:
+    """Return a sentence on the drives of a fleet that failed; empty without any."""
+    rows = result.fleet.drives if result.fleet else {}
+    failed = [row["name"] for row in rows.values() if row["status"] == FAILED]
+    if not failed:
+        return ""
+    named = first_of(failed, NAMED)
+    return f"{result.name}: {len(failed)} of {len(rows)} drives failed, no number counts {named}"
 
 
 def _sides(
@@ -203,6 +218,8 @@ def as_json(compared: Compared) -> str:
     return json_text(plain(compared.content))
 
 
+NAMED: Final = 5
+"""Drives that failed, which are named."""
 ROWS: Final = 60
 """Points of the figure over the drive, at most."""
 

@@ -159,11 +159,15 @@ def _scored(drive: DriveResult) -> list[str]:
 def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame:
     """Return the frame of a rank among the worst.
 
-    A `RoadevalError` if fewer are known of a fleet, or as of `worst_frames`.
+    A `RoadevalError` if there are fewer, or as of `worst_frames`.
     """
     found = worst_frames(result, rank, variant)
-    if result.fleet and rank > len(found):
-        raise RoadevalError(f"{result.fleet.path}: only the worst {len(found)} frames are known")
+    if rank > len(found):
+        (path,) = result.paths
+        raise RoadevalError(
+            f"{path}: there is no worst frame number {rank}: {len(found)} are ranked, of "
+            "neighbouring frames the worst alone"
+        )
     return found[-1]
 
 
