@@ -195,7 +195,7 @@ def _bare(hint: Any) -> Any:
 
 def value_or_name(text: str) -> int | str:
     """Read a label's value, or the name of its class."""
-    return int(text) if re.fullmatch(r"-?[0-9]+", text) else text
+    return int(text) if re.fullmatch(r"-?[0-9]{1,18}", text) else text
 
 
 def color(text: str) -> tuple[int, ...]:

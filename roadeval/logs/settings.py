@@ -14,6 +14,7 @@ from roadeval.geometry.settings import GroundSettings
 from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.runtime.settings import Checked, Flag
+from roadeval.runtime.text import elided
 
 NS: Final = 1_000_000_000
 _EPOCH: Final = datetime.fromisoformat("1970-01-01T00:00:00+00:00")
@@ -40,15 +41,15 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         since = at - _EPOCH
         seconds = since.days * 86400 + since.seconds
         return seconds * NS + int((fraction or "").ljust(9, "0"))
-    if match := re.fullmatch(r"(\d+)(ns)?", text):
+    if match := re.fullmatch(r"(\d{1,19})(ns)?", text):
         number = int(match[1])
         return number if match[2] or number >= NS else start_ns + number * NS
-    if match := re.fullmatch(r"(\d*)\.?(\d*)s?", text):
-        whole, fraction = match.groups()
+    if match := re.fullmatch(r"(\d{0,19})(?:\.(\d*))?s?", text):
+        whole, fraction = match.groups("")
         if whole or fraction:
             return start_ns + int(whole or 0) * NS + int(fraction[:9].ljust(9, "0"))
     raise LogError(
-        f"{text!r} is no time: give seconds from the start (2.5), nanoseconds, or "
+        f"{elided(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
         "2013-05-01T12:00:00Z"
     )
 

@@ -7,7 +7,6 @@ hold a word that takes minutes to typeset.
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -56,10 +55,24 @@ def read_json(
         raise ValueError(f"it holds more than {values:,} values")
     try:
         found = json.loads(content)
-    except RecursionError as error:
-        raise ValueError(_TOO_DEEP) from error
+    except (RecursionError, ValueError) as error:
+        raise ValueError(_damage(error)) from error
     _check(found, values, shown=shown)
     return found
+
+
+def _damage(error: Exception) -> str:
+    """Return in words what a parser found."""
+    match error:
+        case RecursionError():
+            return _TOO_DEEP
+        case json.JSONDecodeError(lineno=line, colno=column):
+            return f"it is no JSON, or ends early (line {line}, column {column})"
+        case UnicodeDecodeError():
+            return "it is not in UTF-8"
+        case _ if "integer string conversion" in str(error):
+            return "a number in it has thousands of digits"
+    return str(error)
 
 
 def read_toml(text: str) -> dict[str, Any]:
@@ -69,12 +82,8 @@ def read_toml(text: str) -> dict[str, Any]:
         raise ValueError(f"a name in it has more than {DOTS:,} parts, or several have so many")
     try:
         found = tomllib.loads(text)
-    except RecursionError as error:
-        raise ValueError(_TOO_DEEP) from error
-    except ValueError as error:
-        if re.search("limit .* for integer string", str(error)):
-            raise ValueError("a number in it has thousands of digits") from error
-        raise
+    except (RecursionError, ValueError) as error:
+        raise ValueError(_damage(error)) from error
     _check(found, VALUES)
     return found
 

@@ -88,6 +88,7 @@ def test_a_model_and_training_frames_do_not_go_together(capsys):
     ("words", "said"),
     [
         ("--road-label 3 --road-label 70000", "--road-label, item 2: must be at most 65535"),
+        (f"--road-label {'9' * 5000}", "--road-label, item 1: must be a whole number"),
         ("--every 0", "--every: must be at least 1 (given: 0)"),
     ],
 )

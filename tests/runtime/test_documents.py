@@ -67,6 +67,19 @@ def test_toml_that_holds_too_much_is_refused_at_once(text, reason):
     assert time.process_time() - begun < 2
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("9" * 5_000, "a number in it has thousands of digits"),
+        ('{"a": [1,', r"it is no JSON, or ends early \(line 1, column 10\)"),
+        (b'"\xff"', "it is not in UTF-8"),
+    ],
+)
+def test_json_that_is_damaged_is_told_in_plain_words(text, reason):
+    with pytest.raises(ValueError, match=f"^{reason}$"):
+        read_json(text)
+
+
 def test_a_document_is_a_file_that_ends(tmp_path):
     (tmp_path / "large").write_bytes(bytes(65 << 20))
     with pytest.raises(ValueError, match="at most 67,108,864 are read"):
