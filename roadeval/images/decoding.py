@@ -29,6 +29,8 @@ File = bytes | memoryview
 _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
 _SCAN: Final = b"\xff\xda"
+OPAQUE: Final = 128
+"""Opacity from which a pixel of a mask counts as painted."""
 MOST_SCANS: Final = 100
 """Most scans of a JPEG; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
 can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
@@ -62,7 +64,9 @@ def to_labels(data: File, limits: Limits) -> Array:
     """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
     Of a file with a palette these are the palette's indices, or its greys if it has only greys.
-    An image of three equal channels is a label image of one. Errors as of `to_rgb`.
+    An image of three equal channels is a label image of one. One of a single colour that is
+    transparent in parts is a mask of its opacity. Errors as of `to_rgb`, and where the opacity of
+    one of several colours would say more than the colour.
     """
     image = _decoded(data, limits)
     if isinstance(image, np.ndarray):
@@ -76,7 +80,19 @@ def to_labels(data: File, limits: Limits) -> Array:
     if image.mode in _SAMPLES:
         samples = _samples(image)
         return samples if samples.dtype.kind != "f" else eight_bits(samples)
-    return without_colours(np.array(image.convert("RGB")))
+    colours = np.array(image.convert("RGB"))
+    opacity = np.array(image.getchannel("A")) if image.mode in {"RGBA", "LA"} else np.full(1, 255)
+    clear = opacity < OPAQUE
+    if clear.any() and not clear.all():
+        wide = colours.astype(np.uint32) @ np.array([65536, 256, 1], np.uint32)
+        if wide.min() == wide.max():
+            return opacity
+        if np.intersect1d(wide[clear], wide[~clear]).size:
+            raise ImageError(
+                "a label image of which one colour is transparent in parts: save it without "
+                "transparency"
+            )
+    return without_colours(colours)
 
 
 def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:

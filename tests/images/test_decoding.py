@@ -1,5 +1,6 @@
 """Image files to arrays; damage and size are told before anything else."""
 
+import io
 from contextlib import suppress
 
 import numpy as np
@@ -158,3 +159,25 @@ def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded() -> None:
     for read in (images.to_rgb, images.to_labels):
         with pytest.raises(ImageError, match="a JPEG of more than 100 scans"):
             read(memoryview(progressive[:-2] + 100 * scan + progressive[-2:]), LIMITS)
+
+
+def rgba(rows: list[list[tuple[int, int, int, int]]]) -> bytes:
+    file = io.BytesIO()
+    Image.fromarray(np.array(rows, np.uint8), "RGBA").save(file, "png")
+    return file.getvalue()
+
+
+def test_a_label_image_of_one_colour_is_the_mask_of_its_opacity() -> None:
+    data = rgba([[(255, 255, 255, 0), (255, 255, 255, 255)]])
+    assert images.to_labels(data, Limits()).tolist() == [[0, 255]]
+
+
+def test_colours_of_a_label_image_count_where_opacity_says_the_same() -> None:
+    data = rgba([[(0, 0, 0, 0), (255, 255, 255, 255)]])
+    assert images.to_labels(data, Limits()).tolist() == [[0, 255]]
+
+
+def test_a_label_image_whose_opacity_says_more_than_its_colours_is_refused() -> None:
+    data = rgba([[(0, 0, 0, 0), (255, 255, 255, 255), (255, 255, 255, 0)]])
+    with pytest.raises(ImageError, match="one colour is transparent in parts: save it without"):
+        images.to_labels(data, Limits())
