@@ -6,7 +6,6 @@ import io
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import cache, partial
 from itertools import chain, islice
 from pathlib import Path
@@ -153,8 +152,7 @@ def _drawn(
                 continue
             for drawing in format_.read(file, content, size):
                 try:
-                    shapes = tuple(drawing.shapes)
-                    drawn.append(replace(drawing, size=drawing.size or size, shapes=shapes))
+                    drawn.append(drawing.whole(size))
                 except _WRONG as error:
                     broken[drawing.image] = _in_words(error, format_)
         except _WRONG as error:

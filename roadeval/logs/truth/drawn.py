@@ -45,8 +45,6 @@ class Outline(NamedTuple):
         """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if it is no outline."""
         points = self.points()
         filled = np.zeros(size[::-1], np.bool_)
-        if not len(points):
-            return filled
         # Its window of the image: pixels from the first to before the last.
         left, top = np.clip(np.ceil(points.min(axis=0)), 0, size).astype(int).tolist()
         right, bottom = np.clip(np.floor(points.max(axis=0)) + 1, 0, size).astype(int).tolist()
@@ -70,7 +68,7 @@ class Outline(NamedTuple):
             flat = np.asarray(self.ring, np.float64)
         except (TypeError, ValueError, OverflowError):
             flat = np.array(np.nan)
-        if flat.ndim != 1 or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
+        if flat.ndim != 1 or not flat.size or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
             raise BadMessage(f"an outline of {self.label} whose points are no pixels")
         return flat.reshape(-1, 2) - 0.5
 
@@ -106,7 +104,7 @@ def hull(label: str, ring: Sequence[float]) -> Outline:
 
 def flat(points: Iterable[Iterable[float]]) -> list[float]:
     """Return ``x, y, x, y, ...`` of points."""
-    return [number for x, y in points for number in (x, y)]
+    return [float(number) for x, y in points for number in (x, y)]
 
 
 def size_in(stated: Mapping[str, Any], width: str = "width", height: str = "height") -> Size | None:
@@ -178,6 +176,16 @@ class Drawing:
     """Of the image; None where the format does not say: then that of the log's images counts."""
     shapes: Iterable[Shape]
     """They are run through once. An error while they are costs this image, and no other."""
+
+    def whole(self, size: Size | None) -> Drawing:
+        """Return it with all its shapes, of the log's size where it has none.
+
+        Raises what the format does, and a `BadMessage` if a shape has no class.
+        """
+        shapes = tuple(self.shapes)
+        if any(not shape.label or not isinstance(shape.label, str) for shape in shapes):
+            raise BadMessage("a shape without the name of a class")
+        return replace(self, size=self.size or size, shapes=shapes)
 
     @property
     def classes(self) -> set[str]:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
@@ -137,7 +137,7 @@ def as_read(format_: str, proposal: Proposal) -> npt.NDArray[np.bool_]:
         return proposal.road
     (content,) = proposal_files(format_, [proposal]).values()
     (drawn,) = WRITTEN[format_].read(Path(proposal.image), json.loads(content), None)
-    drawn = replace(drawn, shapes=[*drawn.shapes])
+    drawn = drawn.whole(None)
     values = {name: int(name == PROPOSED) for name in drawn.classes}
     return np.equal(drawn.pixels(values, Limits()), 1)
 

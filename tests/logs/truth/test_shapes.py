@@ -14,9 +14,13 @@ SQUARE = [[10, 10], [20, 10], [20, 20], [10, 20]]
 
 
 def read(folder, name, content, *, ignore=(), road=("road",), **asked):
-    """The truth of each label by its name, and the warnings; lost labels by their reason."""
+    """The truth of each label of a file by its name, and the warnings."""
     path = written(folder / "truth", name, content)
-    settings = MaskSettings(str(path), labels=LabelSettings(road, ignore), **asked)
+    return labels_of(path, MaskSettings(str(path), labels=LabelSettings(road, ignore), **asked))
+
+
+def labels_of(path, settings):
+    """The truth of each label by its name, and the warnings; lost labels by their reason."""
     origin = labels_in(path, SIZE, settings)
     found = {}
     for label in origin.labels:

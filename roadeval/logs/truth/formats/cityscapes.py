@@ -17,7 +17,7 @@ def _cityscapes(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
 ) -> Iterator[drawn.Drawing]:
     shapes = (
-        drawn.Outline(str(thing["label"]), drawn.flat(thing["polygon"]))
+        drawn.Outline(thing["label"], drawn.flat(thing["polygon"]))
         for thing in content["objects"]
         if not thing.get("deleted")
     )

@@ -23,6 +23,7 @@ _UPLOADED: Final = re.compile(r"^[0-9a-f]{8}-(?=.)")
 """What an upload puts before an image's name."""
 _AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL")
 """What says which pixels a region has: a key point has none of these, and is left out."""
+_TOOLS: Final = [f"{t}labels" for t in ("polygon", "rectangle", "ellipse", "brush", "bitmask")]
 _UNREADABLE: Final = {"points": ()}
 OPAQUE: Final = 127
 """A pixel of a brush's edge belongs to it if it is opaque by more than a half."""
@@ -54,12 +55,16 @@ def _label_studio(
 
 def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the regions of an annotation: its results, or, in JSON-MIN, all lists of a task."""
-    lists = [values for values in annotation.values() if isinstance(values, list)]
-    listed = annotation["result"] if "result" in annotation else chain.from_iterable(lists)
+    if "result" not in annotation:
+        lists = [values for values in annotation.values() if isinstance(values, list)]
+        return [region for region in chain.from_iterable(lists) if isinstance(region, dict)]
     regions: list[Mapping[str, Any]] = []
-    for region in listed:
-        is_whole = isinstance(region, dict) and isinstance(region.get("value", {}), dict)
-        regions.append({**region, **region.get("value", {})} if is_whole else _UNREADABLE)
+    for region in annotation["result"]:
+        is_whole = isinstance(region, dict) and isinstance(region.get("value"), dict)
+        if is_whole and region["value"]:
+            regions.append({**region, **region["value"]})
+        elif not isinstance(region, dict) or region.get("type") != "relation":
+            regions.append(_UNREADABLE)
     return regions
 
 
@@ -99,15 +104,17 @@ def _shapes(
         place = json.dumps([region.get(name) for name in ("x", *_AREAS)])
         merged.setdefault(region.get("id", place), {}).update(region)
     for region in merged.values():
-        if any(region.get(name) is not None for name in _AREAS):
+        if any(region.get(name) is not None for name in _AREAS) or {*_TOOLS} & region.keys():
             yield _shape(region, size)
 
 
 def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
     named = [v for k, v in region.items() if k.endswith("labels") and isinstance(v, list)]
-    labels = [str(label) for values in named for label in values]
+    labels = [label for values in named for label in values]
     if len(labels) != 1:
-        raise BadMessage(f"a region of {' and '.join(labels) or 'no class'}: give it one class")
+        raise BadMessage(
+            f"a region of {' and '.join(map(str, labels)) or 'no class'}: give it one class"
+        )
     (label,) = labels
     if size is None or region.get("image_rotation"):
         raise BadMessage(f"a region of {label} on an image that was turned, or of unknown size")

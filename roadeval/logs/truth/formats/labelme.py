@@ -34,7 +34,7 @@ def _labelme(
 
 
 def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
-    label, points = str(shape["label"]), [float(n) for point in shape["points"] for n in point]
+    label, points = shape["label"], drawn.flat(shape["points"])
     match shape.get("shape_type") or "polygon", points:
         case "rectangle", [left, top, right, bottom]:
             return drawn.rectangle(label, left, top, right, bottom)

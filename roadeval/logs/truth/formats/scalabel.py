@@ -39,7 +39,7 @@ def _scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn
 
 def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn.Shape]:
     for part in frame.get("labels") or frame.get("objects") or ():
-        label = str(part["category"])
+        label = part["category"]
         if (runs := part.get("rle")) is not None:
             yield run_lengths(label, runs["counts"], runs.get("size"), size)
         elif polygons := part.get("poly2d"):
@@ -53,6 +53,8 @@ def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn
         elif box := part.get("box2d"):
             corners = (box[name] for name in ("x1", "y1", "x2", "y2"))
             yield drawn.Undrawn(label, "box without an outline", drawn.rectangle(label, *corners))
+        elif not {"box3d", "graph"} & part.keys():
+            yield drawn.Undrawn(label, "label without an outline")
 
 
 def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> Sequence[float]:
