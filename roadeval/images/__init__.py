@@ -11,13 +11,16 @@ from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.images.decoding import (
+        ORIENTATIONS,
         deep_samples,
         eight_bits,
+        orientation_of,
         palette_indices,
         png_of,
         size_of,
         to_labels,
         to_rgb,
+        upright,
         without_colours,
     )
     from roadeval.images.formats import (

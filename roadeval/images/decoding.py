@@ -4,8 +4,7 @@
 pixels are those of OpenCV, bit for bit. All other formats are read by Pillow, after the checksums
 of a PNG were verified. Damage that leaves a valid file cannot be known.
 
-A rotation that EXIF data asks for is not applied: labels and calibrations belong to the sensor's
-own rows and columns.
+An image that is to be turned, by its EXIF orientation, is turned where `Limits` say so.
 """
 
 from __future__ import annotations
@@ -44,10 +43,12 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
     """
     image = _decoded(data, limits)
     if isinstance(image, np.ndarray):
-        return image
-    if image.mode in _SAMPLES:
-        return np.repeat(eight_bits(_samples(image), white)[..., None], 3, axis=2)
-    return np.array(image.convert("RGB"))
+        pixels = image
+    elif image.mode in _SAMPLES:
+        pixels = np.repeat(eight_bits(_samples(image), white)[..., None], 3, axis=2)
+    else:
+        pixels = np.array(image.convert("RGB"))
+    return upright(pixels, _left_to_turn(data, limits))
 
 
 def deep_samples(data: File, limits: Limits) -> Array | None:
@@ -68,7 +69,10 @@ def to_labels(data: File, limits: Limits) -> Array:
     transparent in parts is a mask of its opacity. Errors as of `to_rgb`, and where the opacity of
     one of several colours would say more than the colour.
     """
-    image = _decoded(data, limits)
+    return upright(_values(_decoded(data, limits)), _left_to_turn(data, limits))
+
+
+def _values(image: Any) -> Array:
     if isinstance(image, np.ndarray):
         return without_colours(image)
     if image.mode == "P":
@@ -134,13 +138,58 @@ def _known_format(data: File) -> ImageFormat:
     return format_
 
 
-def size_of(data: File) -> tuple[int, int]:
+def size_of(data: File, limits: Limits) -> tuple[int, int]:
     """Return width and height of an image file, by its head alone; errors as of `to_rgb`."""
     format_ = _known_format(data)
     if format_.plugin is None:
-        return _jpeg_size(data)
-    with _damage_in(format_), _opened(data, format_) as image:
-        return image.width, image.height
+        width, height = _jpeg_size(data)
+    else:
+        with _damage_in(format_), _opened(data, format_) as image:
+            width, height = image.size
+    return (height, width) if ORIENTATIONS[_left_to_turn(data, limits)][0] else (width, height)
+
+
+ORIENTATIONS: Final = {
+    1: (0, 0, 0),
+    2: (0, 0, 1),
+    3: (0, 1, 1),
+    4: (0, 1, 0),
+    5: (1, 0, 0),
+    6: (1, 0, 1),
+    7: (1, 1, 1),
+    8: (1, 1, 0),
+}
+"""What turns an image, by the number that EXIF has for it: whether rows and columns are exchanged,
+then whether the rows, and the columns, run the other way."""
+_MARKS: Final = (b"Exif\0\0", b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
+"""One of these stands in each file that has an orientation."""
+
+
+def upright(pixels: Array, orientation: int) -> Array:
+    """Turn an image, or values, as an orientation asks: an array of its own, or the same."""
+    exchanged, rows, columns = ORIENTATIONS[orientation]
+    turned = pixels.swapaxes(0, 1) if exchanged else pixels
+    return np.ascontiguousarray(turned[:: 1 - 2 * rows, :: 1 - 2 * columns])
+
+
+def orientation_of(data: File) -> int:
+    """Return the EXIF orientation of an image file, 1 to 8: 1 where it has none."""
+    content, format_ = bytes(data), format_of(data)
+    if format_ and any(mark in content for mark in _MARKS):
+        plugin = format_.plugin or "Jpeg"
+        with suppress(Exception), _opened(data, format_._replace(plugin=plugin)) as image:
+            orientation = image.getexif().get(0x0112)
+            return orientation if orientation in ORIENTATIONS else 1
+    return 1
+
+
+def _left_to_turn(data: File, limits: Limits) -> int:
+    """Return how an image is to be turned after it is decoded: Pillow itself turns a TIFF."""
+    format_ = format_of(data)
+    if (format_ is not None and format_.plugin == "Tiff") is limits.turn:
+        return 1
+    orientation = orientation_of(data)
+    return orientation if limits.turn else {6: 8, 8: 6}.get(orientation, orientation)
 
 
 def _jpeg(data: File, limits: Limits) -> Rgb:

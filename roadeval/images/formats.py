@@ -18,10 +18,12 @@ class ImageError(ValueError):
 
 @dataclass(frozen=True)
 class Limits:
-    """How large an image may be."""
+    """How large an image may be, and how it is taken."""
 
     max_pixels: int = MAX_PIXELS
     """Most pixels. An image's own head says how many it has, so none is decoded that has more."""
+    turn: bool = False
+    """Whether an image whose EXIF orientation says so is turned, as viewers do."""
 
     def check(self, width: int, height: int) -> None:
         """Refuse a size; an `ImageError` if it is empty or too large."""

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
-from roadeval.images import format_of
+from roadeval.images import format_of, orientation_of
 from roadeval.logs.errors import BadMessage, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
@@ -34,6 +34,7 @@ from roadeval.logs.truth.labels import (
     nothing_of,
     read_or_error,
     samples,
+    size_problem,
 )
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -116,9 +117,16 @@ class Selection:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the camera's images, a sentence each."""
-        if self.white in (None, 1, WHITE):
-            return ()
-        return (f"a sample of {self.white:g} is white; `frames.white` sets another",)
+        notes = []
+        if self.white not in (None, 1, WHITE):
+            notes.append(f"a sample of {self.white:g} is white; `frames.white` sets another")
+        if self.image.turned != 1:
+            how = "turned, as their EXIF orientation or display matrix asks"
+            what = f"{how}; `frames.unturned` leaves them as stored"
+            if not self.camera.images.limits.turn:
+                what = f"as stored, and would be {how}, by viewers and annotation tools"
+            notes.append(f"its images are {what}")
+        return tuple(notes)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -191,6 +199,8 @@ def settle(
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     no_truth = "" if truth.topic else truth.why
     known = calibration_of(image, topics, readers)
+    if any(known) and image.turned != 1 and camera.images.limits.turn:
+        known = None, "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
     ground, how = ground_of(known[0], config.ground, image.size)
     if any(config.ground.distortion) and is_rectified(image.name):
         how += "; `ground.distortion` is applied although the topic's name says rectified"
@@ -360,6 +370,7 @@ class LoggedFrame:
         labels = {name: self._label(label, logged, size) for name, label in self.labels.items()}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
         is_file = isinstance(picture, CompressedPicture) and self.selection.scale == 1
+        is_file = is_file and orientation_of(picture.data) == 1  # viewers of recordings turn none
         format_ = format_of(picture.data) if is_file else None
         return Frame(
             self.number,
@@ -385,12 +396,9 @@ class LoggedFrame:
             found = label.read(self.selection.camera.images.limits)
         except BadMessage as error:
             raise FrameError(f"{label.place}: {error}") from error
-        theirs, ours = found.truth.shape[1::-1], sizes[0]
-        if theirs != ours and not self.selection.camera.resize_labels:
-            raise FrameError(
-                f"{label.place} is {theirs[0]}x{theirs[1]}, its image {ours[0]}x{ours[1]}: "
-                "scale the labels with `topics.resize_truth`"
-            )
+        told = label.place, found.truth.shape[1::-1], "its image", sizes[0]
+        if problem := size_problem(*told, resize=self.selection.camera.resize_labels):
+            raise FrameError(problem)
         for size in sizes:
             if found.truth.shape[1::-1] != size:
                 probability = found.probability

@@ -88,7 +88,7 @@ class Log:
         is_file = path.is_file() or opened is not None
         self.name = visible(path.stem if is_file else path.resolve().name)
         self.config = config
-        self._limits = Limits(config.frames.max_pixels)
+        self._limits = Limits(config.frames.max_pixels, turn=not config.frames.unturned)
         self._lost_files = damage
         self._beside: list[Log] = []
         self._of_rig = False

@@ -229,6 +229,9 @@ class FrameSettings:
         MAX_PIXELS
     )
     """Leave out images of more pixels. They are not decoded: a damaged head may claim any size."""
+    unturned: Annotated[bool, Flag("--unturned", group="Input")] = False
+    """Leave images as they are stored, where their EXIF orientation, or a video's display matrix,
+    asks to turn them. Viewers and annotation tools turn them; calibrations are of the sensor."""
     white: Annotated[float | None, Interval(gt=0), Flag("--white", "V", "Input")] = None
     """The sample that is white in images of more than 8 bits. Default: the greatest of 8, 10, 12,
     14 or 16 bits, whichever hold the samples of some of the camera's images; of fractions 1."""

@@ -54,6 +54,7 @@ OTHER = {
     "frames.max_frames": 50,
     "frames.scale": 0.5,
     "frames.max_pixels": 1_000_000,
+    "frames.unturned": True,
     "frames.white": 4095.0,
     "ground": {"height": 1.4, "pitch": 1.2, "focal": [485.0]},
     "run.jobs": 1,

@@ -52,7 +52,7 @@ def test_the_format_is_told_by_the_first_bytes_and_the_size_by_the_head(name: st
     format_ = images.format_of(data)
     assert format_ is not None
     assert (format_.name, format_.exact) == (name, name in EXACT)
-    assert images.size_of(data) == (WIDTH, HEIGHT)
+    assert images.size_of(data, LIMITS) == (WIDTH, HEIGHT)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ need the frames before them.
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from typing import Any, Final, Protocol
 from mcap.records import Channel, Schema
 
 from roadeval.data import Rgb
-from roadeval.images import ImageError, Limits
+from roadeval.images import ORIENTATIONS, ImageError, Limits, upright
 from roadeval.logs.container.records import Buffer, Message
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages import encodings
@@ -58,6 +59,8 @@ class DecodedPicture:
     stamp_ns: int
     data: Buffer
     pixels: Rgb
+    turned: int = 1
+    """How it is to be turned, as EXIF counts it; it is turned already where limits say so."""
 
 
 BUFFERS: Final = (bytes, bytearray, memoryview)
@@ -353,8 +356,10 @@ class Video:
                 what = "its video" if frame.is_corrupt else "a frame that it builds upon"
                 self._ready[frame.pts] = FrameError(f"{what} is damaged")
             elif packet is not None:
-                pixels = frame.to_ndarray(format="rgb24")
-                self._ready[frame.pts] = DecodedPicture(packet.stamp_ns, packet.data, pixels)
+                pixels, turned = frame.to_ndarray(format="rgb24"), turn_of(frame)
+                pixels = upright(pixels, turned if self._limits.turn else 1)
+                found = DecodedPicture(packet.stamp_ns, packet.data, pixels, turned)
+                self._ready[frame.pts] = found
 
     def _reason(self, decoder: Any, error: Any) -> str:
         """Return why a packet cannot be decoded: its size, where the decoder tells it."""
@@ -367,6 +372,17 @@ class Video:
         except ImageError as too_large:
             return str(too_large)
         return reason
+
+
+def turn_of(frame: Any) -> int:
+    """Return how a frame of PyAV's is to be turned by its display matrix, as EXIF counts it."""
+    for side in frame.side_data:
+        if side.type.name == "DISPLAYMATRIX":
+            a, b, _, c, d = struct.unpack("=5i", bytes(side)[:20])
+            exchanged = abs(b) > abs(a)
+            signs = (b < 0, c < 0) if exchanged else (d < 0, a < 0)
+            return next(n for n, each in ORIENTATIONS.items() if each == (exchanged, *signs))
+    return 1
 
 
 def is_keyframe(packet: Picture) -> bool:

@@ -198,7 +198,7 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
     return without_colours(to_rgb(picture, limits))
 
 
-def size_of(picture: Picture) -> tuple[int, int] | None:
+def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
     """Return width and height by what a picture's head says; None of video, which has none.
 
     A `BadMessage` if the head cannot be read.
@@ -208,7 +208,7 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return None
     with _bad_message():
-        return images.size_of(file_of(picture))
+        return images.size_of(file_of(picture), limits)
 
 
 def lossy_format(picture: Picture) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
-from roadeval.images import Limits
+from roadeval.images import Limits, orientation_of
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError
@@ -74,6 +74,8 @@ class TopicInfo:
     else empty."""
     frame_id: str = ""
     """For images: the camera's name in the header of the first readable message, or empty."""
+    turned: int = 1
+    """For images: how the first readable one is to be turned, as EXIF counts it; 1 for not."""
     problem: str = ""
     """Why no message could be decoded, or empty."""
 
@@ -140,16 +142,16 @@ def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
 def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
     """Return the fields of a `TopicInfo` that a message shows."""
     picture = reader.picture(position)
-    kind, size, channels = TopicKind.VIDEO, None, 3
+    kind, size, channels, turned = TopicKind.VIDEO, None, 3, 1
     if isinstance(picture, RawPicture):
         kind, name, size = TopicKind.IMAGE, picture.encoding, (picture.width, picture.height)
         channels = 1 if raw_format(picture, reader.limits).is_grey else 3
     elif name := codec_of(picture) or "":
         with suppress(FrameError, LogError):  # the first frame may not be decodable
-            pixels = Video(reader, reader.limits).picture(0).pixels
-            size = pixels.shape[1], pixels.shape[0]
+            first = Video(reader, reader.limits).picture(0)
+            size, turned = first.pixels.shape[1::-1], first.turned
     else:
-        pixels = to_labels(picture, reader.limits)
+        pixels, turned = to_labels(picture, reader.limits), orientation_of(picture.data)
         kind, name, size = TopicKind.COMPRESSED, picture.format, pixels.shape[1::-1]
         channels = 1 if pixels.ndim == 2 else 3
     return {
@@ -159,6 +161,7 @@ def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
         "channels": channels,
         "lossy": lossy_format(picture),
         "frame_id": picture.frame_id,
+        "turned": turned,
     }
 
 

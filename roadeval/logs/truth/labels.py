@@ -462,23 +462,40 @@ def label_files(settings: LabelPlace) -> list[Path]:
     return [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
 
 
+Size = tuple[int, int]
+
+
+def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bool) -> str:
+    """Return what is wrong with a label of another size than its image; empty where it is scaled.
+
+    Where width and height are exchanged one of both is turned, and scaling would hide that.
+    """
+    is_turned = theirs[0] * ours[0] == theirs[1] * ours[1] and theirs[0] != theirs[1]
+    if theirs == ours or (resize and not is_turned):
+        return ""
+    sizes = f"{label} is {theirs[0]}x{theirs[1]}, {image} {ours[0]}x{ours[1]}"
+    if is_turned:
+        return (
+            f"{sizes}: one of them is turned by a quarter: turn the labels as the images are "
+            "shown, or leave these as they are stored with `frames.unturned`"
+        )
+    return f"{sizes}: scale the labels with `topics.resize_truth`"
+
+
 def check_size(
-    size: tuple[int, int] | None, labels: LabelPictures, position: int, camera: Camera, own: Pairing
+    size: Size | None, labels: LabelPictures, position: int, camera: Camera, own: Pairing
 ) -> None:
     """Refuse a label of another size than its own image, unless they are resized; a `LogError`."""
     wanted = camera.topic.size
-    if camera.resize_labels or size is None or wanted is None or size == wanted:
+    if size is None or wanted is None or size == wanted:
         return
     image = Partners(replace(own, images=own.labels, labels=own.images)).of(position)
     if image is not None:
         with suppress(BadMessage, FrameError):
-            wanted = size_of(camera.images.picture(image)) or wanted
-    if size != wanted:
-        theirs, ours = ("x".join(map(str, each)) for each in (size, wanted))
-        raise LogError(
-            f"{labels.place(position)} is {theirs}, but {camera.topic.name} is {ours}: scale the "
-            "labels with `topics.resize_truth`"
-        )
+            wanted = size_of(camera.images.picture(image), camera.images.limits) or wanted
+    told = labels.place(position), size, f"but {camera.topic.name} is", wanted
+    if problem := size_problem(*told, resize=camera.resize_labels):
+        raise LogError(problem)
 
 
 def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
@@ -508,7 +525,7 @@ def meaning_of(
         file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
         try:
             if camera and pairing:
-                check_size(size_of(picture), labels, position, camera, pairing)
+                check_size(size_of(picture, labels.limits), labels, position, camera, pairing)
             if confidence is None:
                 seen.append(seen_in(picture, wanted, labels.name, labels.limits, file))
             else:

@@ -22,9 +22,18 @@ from mcap.writer import Writer
 
 from roadeval.data import Frame, FrameResult, Layer, Tally
 from roadeval.data.arrays import Image
-from roadeval.images import ImageError, format_of, png_of, size_of
+from roadeval.images import (
+    ImageError,
+    Limits,
+    format_of,
+    orientation_of,
+    png_of,
+    size_of,
+    upright,
+)
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
+from roadeval.logs.messages.pictures import turn_of
 from roadeval.logs.settings import NS
 from roadeval.runtime.files import NewFile, check_input, writing
 from roadeval.version import VERSION
@@ -289,15 +298,16 @@ def pack(
         raise LogError(f"{images}: neither a folder of images nor a video")
     if masks is not None:
         raise LogError(f"{images}: masks go with a folder of images, not with a video")
-    number = 0
+    number, turned = 0, set[int]()
     with LogWriter(output) as log:
-        for number, (time_ns, jpeg) in enumerate(_frames_of(images), start=1):
+        for number, (time_ns, jpeg) in enumerate(_frames_of(images, turned), start=1):
             regular = 0 if rate_hz is None else round((number - 1) * NS / rate_hz)
             log.image(CAMERA, time_ns if rate_hz is None else regular, jpeg, "jpeg")
         if not number:
             raise LogError(f"{images}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
-    return PackResult(output, number, 0, words)
+    matrix = "frames are turned as the video's display matrix asks; calibrations are of the sensor"
+    return PackResult(output, number, 0, words, (matrix,) if turned - {1} else ())
 
 
 def _pack_folder(
@@ -318,15 +328,19 @@ def _pack_folder(
         rate = rate_hz or DEFAULT_RATE_HZ
         words = f"{rate:g} images a second"
         times = [round(i * NS / rate) for i in range(len(files))]
+    turned: list[Path] = []
     with LogWriter(output) as log:
         for file, stamp in zip(files, times, strict=True):
-            log.image(CAMERA, stamp, *_image(file))
+            data, name = _image(file)
+            turned += [file] * (orientation_of(data) != 1)
+            log.image(CAMERA, stamp, data, name)
             if file in by_image:
                 label_file = _image(by_image[file], is_label=True)
                 log.image(TRUTH, stamp, *label_file, log_time_ns=stamp + LABEL_DELAY_NS)
     unpaired = {
         "images without a mask": [file for file in files if labels and file not in by_image],
         "masks without an image": [label for label in labels if label not in belong],
+        "images that their EXIF orientation turns, in replay as in viewers": turned,
     }
     return PackResult(
         output,
@@ -351,8 +365,10 @@ def _label_images(masks: Path, images: Path) -> Sequence[Path]:
         ) from error
 
 
-def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
+def _frames_of(video: Path, turned: set[int]) -> Iterator[tuple[int, bytes]]:
     """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
+
+    ``turned`` receives the orientations by which frames are turned.
 
     A `LogError` if it cannot be read, or holds no video.
     """
@@ -369,7 +385,8 @@ def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
                 pts = index if frame.pts is None else frame.pts
                 first = pts if first is None else first
                 unit = stream.time_base or Fraction(1, 25)
-                bgr = frame.to_ndarray(format="bgr24")
+                turned.add(turn := turn_of(frame))
+                bgr = upright(frame.to_ndarray(format="bgr24"), turn)
                 _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
                 yield round((pts - first) * unit * NS), jpeg.tobytes()
     except (av.FFmpegError, OSError) as error:
@@ -381,7 +398,7 @@ def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
     try:
         check_input(file)
         data = file.read_bytes()
-        size_of(data)
+        size_of(data, Limits())
         format_ = format_of(data)
         assert format_ is not None
         if is_label and not format_.exact:
