@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import ast
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Self
+from functools import lru_cache, reduce
+from typing import Any, Final, Literal, Self
 
 import cv2
 import numpy as np
 
 from roadeval.data import CERTAIN, Mask, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
-from roadeval.networks.onnx_file import Array, OnnxFile, load, tried
+from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.text import visible
+from roadeval.runtime.threads import ordered
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,29 +52,27 @@ class Network:
         """
         file = load(settings)
         settings = completed(settings, file)
-        return cls(settings, file, tuple(array.shape for array in _tried(settings, file)))
+        return cls(settings, file, tuple(sample.shape for sample in samples_of(settings, file)))
 
     def road(self, image: Rgb) -> Road:
         """Find the road in an ``(H, W, 3)`` uint8 RGB image.
 
-        The probability of road is computed on the network's own grid and interpolated linearly to
-        the frame's size; classes are brought there by the nearest pixel. With several outputs it is
-        the greatest of theirs. A `NetworkError` if the network fails on it, or gives NaN or another
-        shape than for other images.
+        What the network gives of a class, a logit or a probability, is interpolated linearly to the
+        frame's size; classes alone are brought there by the nearest pixel. With several outputs the
+        probability of road is the greatest of theirs. A `NetworkError` if the network fails on it,
+        or gives NaN or another shape than for other images.
         """
         settings = self.settings
         frame = image.shape[1], image.shape[0]
         values = input_values(placed(image, settings), settings, self.file.inputs[0].dtype)
         outputs = self.file.run(values, settings.outputs or (), settings.seconds)
-        if (shapes := tuple(output.shape for output in outputs)) != self.shapes:
-            raise self.file.error(
-                f"its output's shape depends on the image: {shapes} instead of {self.shapes}; "
-                "export it with a fixed one"
-            )
+        for name, output, shape in zip(settings.outputs or (), outputs, self.shapes, strict=True):
+            if output.shape != shape:
+                raise self.file.error(_VARIES.format(name, output.shape, shape))
         codes = np.maximum.reduce([self._codes(output, frame, settings) for output in outputs])
         limit = round((0.5 if settings.threshold is None else settings.threshold) * CERTAIN)
         mask = (codes > limit).astype(np.uint8)
-        graded = not any(map(is_labels, outputs))
+        graded = settings.activation != "classes"
         alone = [replace(settings, road=(each,)) for each in settings.road or ()]
         if not graded or len(alone) * len(outputs) == 1:
             return Road(mask, codes, graded)
@@ -90,43 +91,62 @@ class Network:
             "licence": visible(" ".join(named.split())) or None,
             "inputs": [str(each) for each in self.file.inputs],
             "outputs": [str(each) for each in self.file.outputs],
+            "taken_for": TAKEN_FOR.get(self.settings.activation or "", "logits"),
             "road": [*map(str, self.settings.road or ())],
         }
 
     def _codes(self, output: Array, frame: Size, settings: NetSettings) -> Probability:
         scores = as_scores(output, settings.layout)
         assert scores is not None
-        if is_labels(output):
+        if not np.isfinite(scores).all():
+            if np.isnan(scores).any():
+                raise self.file.error("gives NaN")
+            scores = np.clip(scores, -HUGE, HUGE)  # infinity times nothing would be NaN
+        if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
-            return brought_back(CERTAIN * road, frame, settings, cv2.INTER_NEAREST_EXACT)
-        shares = road_probability(scores.astype(np.float32, copy=False), settings)
-        if np.isnan(scores).any() or not np.isfinite(shares).all():
-            raise self.file.error("gives NaN")
-        framed = brought_back(shares, frame, settings, cv2.INTER_LINEAR)
-        return np.rint(np.clip(framed, 0, 1) * CERTAIN).astype(np.uint16)
+            nearest = cv2.INTER_NEAREST if is_ultralytics(self.file) else cv2.INTER_NEAREST_EXACT
+            return brought_back(CERTAIN * road, frame, settings, nearest)
+
+        def plane(number: int) -> Values:
+            own = scores[number].astype(np.float32)
+            return brought_back(own, frame, settings, cv2.INTER_LINEAR)
+
+        shares = road_probability(plane, len(scores), settings)
+        return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
 
 
-def road_probability(scores: Values, settings: NetSettings) -> Values:
-    """Compute how probable road is, ``(h, w)`` float32 in 0..1, from ``(C, h, w)`` float32 scores.
+HUGE: Final = 3e4
+"""What stands for infinity; float16 has it, and nothing is left of its exponential."""
+TAKEN_FOR: Final = {"none": "probabilities", "classes": "classes"}
+"""What an output is taken for, by `NetSettings.activation`; by others for logits."""
+
+
+def road_probability(plane: Callable[[int], Values], count: int, settings: NetSettings) -> Values:
+    """Compute how probable road is, float32 in 0..1, from a ``plane`` of each class by its number.
 
     For ``argmax`` it is road against the rest: the best class of road against the best other one,
     so that the mask is where it is above one half. For ``threshold`` it is the sum over the classes
     of road, and of a ``sigmoid`` the greatest of them.
     """
-    chosen = np.isin(np.arange(len(scores)), settings.road or ())
-    best: Values = scores[chosen].max(axis=0)
-    if settings.decide == "argmax":
-        other = scores[~chosen].max(axis=0)
-        if settings.activation != "none":
-            return sigmoid(best - other)
+    road = settings.road or ()
+    others = [number for number in range(count) if number not in road]
+    if settings.activation == "none" and settings.decide != "argmax":
+        return reduce(np.add, map(plane, road))
+    best = reduce(np.maximum, map(plane, road))
+    if settings.activation == "sigmoid" and settings.decide != "argmax":
+        return sigmoid(best)
+    other = reduce(np.maximum, map(plane, others), np.full_like(best, -HUGE))
+    if settings.activation == "none":
         total = best + other
         return np.divide(best, total, out=np.zeros_like(best), where=total > 0)
-    if settings.activation == "sigmoid":
-        return sigmoid(best)
-    if settings.activation == "softmax":
-        powers = np.exp(scores - scores.max(axis=0))
-        return powers[chosen].sum(axis=0) / powers.sum(axis=0)
-    return np.clip(scores[chosen].sum(axis=0), 0, 1)
+    if settings.decide == "argmax":
+        return sigmoid(best - other)
+    most = np.maximum(best, other)
+    sums = [
+        reduce(np.add, (np.exp(plane(number) - most) for number in numbers), np.zeros_like(best))
+        for numbers in (road, others)
+    ]
+    return sums[0] / (sums[0] + sums[1])
 
 
 GREY: Final = 114
@@ -154,8 +174,22 @@ def placed(image: Rgb, settings: NetSettings) -> Rgb:
     assert settings.size is not None
     whole = np.full((*settings.size[::-1], 3), GREY, np.uint8)
     there = whole[inside((image.shape[1], image.shape[0]), settings)]
-    there[...] = cv2.resize(image, there.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    if not settings.antialias:
+        there[...] = cv2.resize(image, there.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+        return whole
+    down, right = (_means(*sides) for sides in zip(image.shape[:2], there.shape[:2], strict=True))
+    across = np.rint(np.matmul(right, image.astype(np.float32)))
+    there[...] = np.rint(np.tensordot(down, across, 1))
     return whole
+
+
+def _means(length: int, to: int) -> Values:
+    """Return the ``(to, length)`` weights of Pillow's bilinear filter, a triangle."""
+    ratio = length / to
+    middle = (np.arange(to)[:, None] + 0.5) * ratio
+    weights = np.maximum(1 - np.abs(np.arange(length) + 0.5 - middle) / max(ratio, 1), 0)
+    shares: Values = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
+    return shares
 
 
 def brought_back(plane: Array, frame: Size, settings: NetSettings, how: int) -> Array:
@@ -194,7 +228,14 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     A `NetworkError` if the network cannot be used, or a value cannot be read from its file: one
     line that asks for it and lists the network's inputs and outputs.
     """
-    settings = _input(replace(settings, sha256=file.sha256), file)
+    if settings.outputs is None and _has_instances(file):
+        raise file.question(
+            "finds instances, as boxes or queries with masks, and gives no map of classes: export "
+            "a network for semantic segmentation (of Ultralytics one called -sem)"
+        )
+    usual: Literal["stretch", "letterbox"] = "letterbox" if is_ultralytics(file) else "stretch"
+    settings = replace(settings, sha256=file.sha256, resize=settings.resize or usual)
+    settings = _input(settings, file)
     known = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(known) > 1:
         raise file.question("gives several outputs: name those that show road by `net.outputs`")
@@ -202,22 +243,114 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     if unknown := [name for name in outputs if name not in known]:
         raise file.question(f"has no output {unknown[0]!r}: see `net.outputs`")
     settings = replace(settings, outputs=outputs)
-    arrays = _tried(settings, file)
-    if len({is_labels(array) for array in arrays}) > 1:
-        raise file.question("gives scores and classes: name outputs of one kind by `net.outputs`")
-    for name, array in zip(outputs, arrays, strict=True):
-        settings = _meaning(settings, file, name, array)
-    return settings
+    made = [
+        _meaning(settings, file, name, sample)
+        for name, sample in zip(outputs, samples_of(settings, file), strict=True)
+    ]
+    if len({each.activation for each in made}) > 1:
+        raise file.question("its outputs differ in kind: name some of one kind by `net.outputs`")
+    return made[-1]
 
 
-def _tried(settings: NetSettings, file: OnnxFile) -> list[Array]:
-    limits = settings.seconds, settings.megabytes * MIB
-    return tried(file, settings.input_shape, settings.outputs or (), *limits)
+@dataclass(frozen=True)
+class Sample:
+    """What an output was on images for testing."""
+
+    shape: tuple[int, ...]
+    kind: str
+    """As NumPy's ``dtype.kind``."""
+    low: float
+    high: float
+    """Its least and greatest number."""
+    whole: bool
+    """Whether all its numbers are whole."""
+    several: bool
+    """Whether it had more numbers than `MOST_CLASSES`."""
+
+    @classmethod
+    def of(cls, arrays: Sequence[Array]) -> Sample:
+        """Sum up an output on several images."""
+        kind = arrays[0].dtype.kind
+        several = kind in "iu" and len(np.unique(arrays)) > MOST_CLASSES
+        whole = all((array == np.rint(array)).all() for array in arrays)
+        filled = [array for array in arrays if array.size]
+        low = min((float(np.fmin.reduce(array, None)) for array in filled), default=0.0)
+        high = max((float(np.fmax.reduce(array, None)) for array in filled), default=0.0)
+        return cls(arrays[0].shape, kind, low, high, whole, several)
 
 
-def is_labels(output: Array) -> bool:
-    """Return whether an output holds classes themselves, and not scores of each."""
-    return bool(output.dtype.kind in "iub")
+MOST_CLASSES: Final = 64
+"""Classes that images for testing may show; whole numbers that are more are quantised ones."""
+SLACK: Final = 1 / 64
+"""How far a quantised probability may lie outside 0 to 1."""
+
+
+def samples_of(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
+    """Return what the outputs are on images for testing; a `NetworkError` if the network fails."""
+    alike = replace(settings, road=None, activation=None, decide=None, threshold=None)
+    return _samples(alike, file)
+
+
+@lru_cache(maxsize=8)
+def _samples(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
+    limit, outputs = settings.megabytes * MIB, settings.outputs or ()
+    named = {tensor.name: tensor for tensor in file.outputs}
+    shaped = replace(file.inputs[0], shape=settings.input_shape)
+    for tensor in (shaped, *(named[name] for name in outputs)):
+        file.check_size(tensor, limit)
+
+    def run(image: Rgb) -> list[Array]:
+        values = input_values(image, settings, file.inputs[0].dtype)
+        found = file.run(values, outputs, settings.seconds, WORKING * limit)
+        for name, array in zip(outputs, found, strict=True):
+            file.check_size(Tensor(name, str(array.dtype), array.shape), limit)
+        return found
+
+    # In a thread, so that a signal is heard meanwhile.
+    arrays = [*zip(*ordered(run, _test_images(settings), 1), strict=True)]
+    for name, own in zip(outputs, arrays, strict=True):
+        if len({array.shape for array in own}) > 1:
+            raise file.error(_VARIES.format(name, own[1].shape, own[0].shape))
+    return tuple(map(Sample.of, arrays))
+
+
+WORKING: Final = 8
+"""Times the memory of an output that a network may take while it computes."""
+_VARIES: Final = (
+    "the shape of its output {!r} depends on the image ({} and {}): export it with a fixed one"
+)
+
+
+def _test_images(settings: NetSettings) -> Iterator[Rgb]:
+    """Yield a black image, and two with saturated colours in large and in small spots."""
+    assert settings.size is not None
+    yield np.zeros((*settings.size[::-1], 3), np.uint8)
+    rng = np.random.default_rng(0)
+    for spots in (4, 32):
+        colours = 255 * rng.integers(0, 2, (spots, spots, 3), np.uint8)
+        yield cv2.resize(colours, settings.size, interpolation=cv2.INTER_LINEAR)
+
+
+def is_ultralytics(file: OnnxFile) -> bool:
+    """Return whether Ultralytics has made a file, as its metadata say."""
+    return file.metadata.get("author") == "Ultralytics"
+
+
+def _has_instances(file: OnnxFile) -> bool:
+    """Return whether a file finds objects one by one, by its metadata or its outputs."""
+    names = " ".join(tensor.name.lower() for tensor in file.outputs)
+    if file.metadata.get("task") in ("detect", "segment", "pose", "obb"):
+        return True
+    return any(word in names for word in ("queries", "boxes", "dets", "pred_masks"))
+
+
+def _named_road(file: OnnxFile) -> tuple[int, ...]:
+    """Return the classes that a file's metadata call road."""
+    try:
+        names = dict(ast.literal_eval(file.metadata.get("names", "{}")))
+        return tuple(int(number) for number, name in names.items() if str(name).lower() == "road")
+    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+        return ()
 
 
 def as_scores(output: Array, layout: str | None) -> Array | None:
@@ -269,38 +402,59 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     return settings
 
 
-def _meaning(settings: NetSettings, file: OnnxFile, name: str, output: Array) -> NetSettings:
-    """Complete what an output means."""
+def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -> NetSettings:
+    """Complete what an output means, by what it is on images for testing."""
     assert settings.size is not None
     width, height = settings.size
-    scores = as_scores(output, settings.layout)
+    scores = as_scores(np.broadcast_to(np.int8(), sample.shape), settings.layout)
     count, rows, columns = (0, 0, 0) if scores is None else scores.shape
     # It has about the proportions of the input, and no more than one class of whole numbers.
     is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
-    if not is_map or (is_labels(output) and count != 1):
-        raise file.question(f"its output {name!r} is no map of the image, but {output.shape}")
-    made: dict[str, Any] = {"activation": "none", "decide": "argmax"}
-    if is_labels(output) and settings.threshold is not None:
-        raise file.question(f"its output {name!r} is of classes alone: leave `net.threshold` out")
-    if not is_labels(output):
-        is_probability = file.makers.get(name, "").lower() in ("softmax", "sigmoid")
-        usual = "none" if is_probability else "sigmoid" if count == 1 else "softmax"
-        above = settings.threshold is not None or count == 1
-        made = {
-            "activation": settings.activation or usual,
-            "decide": settings.decide or ("threshold" if above else "argmax"),
-            "threshold": 0.5 if settings.threshold is None else settings.threshold,
-        }
-    road = settings.road or ((count - 1,) if count <= 2 and not is_labels(output) else ())
+    is_whole = sample.kind in "iub"
+    if not is_map or (is_whole and count != 1):
+        raise file.question(f"its output {name!r} is no map of the image, but {sample.shape}")
+    if is_whole and (sample.low < 0 or sample.several):
+        raise file.question(
+            f"its output {name!r} holds whole numbers that look like quantised scores, and not "
+            "like classes: end the network with DequantizeLinear"
+        )
+    # Class maps are often cast to float.
+    guessed = sample.whole and 0 <= sample.low <= sample.high > 0 and count == 1
+    if is_whole or (settings.activation or ("classes" * guessed)) == "classes":
+        return _of_classes(settings, file, name)
+    is_probability = sample.low >= -SLACK and sample.high <= 1 + SLACK
+    usual: Literal["none", "sigmoid", "softmax"] = "sigmoid" if count == 1 else "softmax"
+    above = settings.threshold is not None or count == 1
+    decide = settings.decide or ("threshold" if above else "argmax")
+    named = tuple(number for number in _named_road(file) if number < count)
+    road = settings.road or named or ((count - 1,) if count <= 2 else ())
     if not road:
-        of = "" if is_labels(output) else f" of its {count}"
-        raise file.question(f"give the numbers of the classes{of} that are road by `net.road`")
-    if not is_labels(output):
-        if max(road) >= count:
-            raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
-        if made["decide"] == "argmax" and len(road) == count:
-            raise file.question(
-                f"all classes of its output {name!r} are road, which then beat no other: see "
-                "`net.road` and `net.decide`"
-            )
-    return replace(settings, road=road, **made)
+        raise file.question(
+            f"give the numbers of the classes of its {count} that are road by `net.road`"
+        )
+    if max(road) >= count:
+        raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
+    if decide == "argmax" and len(road) == count:
+        raise file.question(
+            f"all classes of its output {name!r} are road, which then beat no other: see "
+            "`net.road` and `net.decide`"
+        )
+    return replace(
+        settings,
+        road=road,
+        activation=settings.activation or ("none" if is_probability else usual),
+        decide=decide,
+        threshold=0.5 if settings.threshold is None else settings.threshold,
+    )
+
+
+def _of_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings:
+    """Complete settings of a network whose output holds numbers of classes."""
+    if settings.threshold is not None:
+        raise file.question(f"its output {name!r} is of classes alone: leave `net.threshold` out")
+    road = settings.road or _named_road(file)
+    if is_ultralytics(file) and file.metadata.get("names", "").count(":") == 1:
+        road = (1,)  # of a single class it writes 1, whatever number the class has
+    if not road:
+        raise file.question("give the numbers of the classes that are road by `net.road`")
+    return replace(settings, road=road, activation="classes", decide="argmax")

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
@@ -22,14 +22,12 @@ from roadeval.networks.settings import MIB, NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
-from roadeval.runtime.threads import ended, ordered
+from roadeval.runtime.threads import ended
 
 Array = npt.NDArray[Any]
 
 LEAST_OPENING_S: Final = 30.0
 """Seconds that a file may take to open, however few an image may take."""
-WORKING: Final = 8
-"""Times the memory of an output that a network may take while it computes."""
 QUOTED: Final = 240
 """Letters of onnxruntime's complaint that a message quotes."""
 LARGEST: Final = (1 << 31) - 1
@@ -85,8 +83,6 @@ class OnnxFile:
     """What it takes, without its weights."""
     outputs: tuple[Tensor, ...]
     metadata: Mapping[str, str]
-    makers: Mapping[str, str]
-    """By output: the operator that makes its numbers, see `maker`."""
 
     def run(
         self,
@@ -118,6 +114,16 @@ class OnnxFile:
                 raise self.question(f"its output {name!r} is no array of numbers")
         return list(arrays)
 
+    def check_size(self, tensor: Tensor, limit: int) -> None:
+        """Raise a `NetworkError` if an input or an output takes more bytes than the limit."""
+        with suppress(TypeError):  # of a type that NumPy lacks, which is refused once it is there
+            size = math.prod(n or 1 for n in tensor.shape) * np.dtype(tensor.dtype).itemsize
+            if size > limit:
+                raise self.error(
+                    f"{tensor} takes {size / MIB:,.0f} MiB, more than the {limit / MIB:g} of "
+                    "`net.megabytes`: export it smaller, or allow more"
+                )
+
     def error(self, problem: str) -> NetworkError:
         """Return an error about the file."""
         return NetworkError(f"{self.path}: {problem}")
@@ -126,37 +132,6 @@ class OnnxFile:
         """Return an error that asks for what the file leaves open, and lists what it has."""
         inputs, outputs = (first_of([*map(str, e)], _SHOWN) for e in (self.inputs, self.outputs))
         return self.error(f"{what} (inputs: {inputs}; outputs: {outputs})")
-
-
-@lru_cache(maxsize=8)
-def tried(
-    file: OnnxFile, shape: tuple[int, ...], outputs: tuple[str, ...], seconds: float, limit: int
-) -> list[Array]:
-    """Return arrays of the shapes and types of some outputs, found by an input of zeros.
-
-    A `NetworkError` if one takes more than ``limit`` bytes: before it runs, where the file says so.
-    All that is computed may take `WORKING` times that.
-    """
-    named = {tensor.name: tensor for tensor in file.outputs}
-    declared = [replace(file.inputs[0], shape=shape), *(named[name] for name in outputs)]
-    for tensor in declared:
-        _check_size(file, tensor, limit)
-    # In a thread, so that a signal is heard meanwhile.
-    values = np.zeros(shape, file.inputs[0].dtype)
-    (arrays,) = ordered(lambda _: file.run(values, outputs, seconds, WORKING * limit), [None], 1)
-    for name, array in zip(outputs, arrays, strict=True):
-        _check_size(file, Tensor(name, str(array.dtype), array.shape), limit)
-    return [np.broadcast_to(array.dtype.type(), array.shape) for array in arrays]
-
-
-def _check_size(file: OnnxFile, tensor: Tensor, limit: int) -> None:
-    with suppress(TypeError):  # a type that NumPy lacks; such an output is refused once it is there
-        size = math.prod(n or 1 for n in tensor.shape) * np.dtype(tensor.dtype).itemsize
-        if size > limit:
-            raise file.error(
-                f"{tensor} takes {size / MIB:,.0f} MiB, more than the {limit / MIB:g} of "
-                "`net.megabytes`: export it smaller, or allow more"
-            )
 
 
 def load(settings: NetSettings) -> OnnxFile:
@@ -190,7 +165,7 @@ def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
         content = path.read_bytes()
     try:
         model = memoryview(content)
-        beside, made_by = sorted(set(weight_files(model))), makers(model)
+        beside = sorted(set(weight_files(model)))
     except ValueError as error:
         raise NetworkError(f"{path}: {_DAMAGED}") from error
     digest = hashlib.sha256(content)
@@ -225,8 +200,7 @@ def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
             tuple(map(Tensor.of, each)) for each in (session.get_inputs(), session.get_outputs())
         )
         metadata = session.get_modelmeta().custom_metadata_map
-    found = {each.name: maker(made_by, each.name) for each in outputs}
-    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata, found)
+    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata)
 
 
 @contextmanager
@@ -260,11 +234,6 @@ def _explained(path: Path) -> Iterator[None]:
 # An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. What is no such
 # message is a ValueError.
 
-PASSING: Final = frozenset(
-    {"Cast", "Identity", "Reshape", "Resize", "Slice", "Squeeze", "Transpose", "Unsqueeze"}
-)
-"""Operators whose output holds the numbers of their input."""
-NODES: Final = (7, 1)
 HOLDING: Final[Mapping[str, Mapping[int, str]]] = {
     "model": {7: "graph", 20: "training", 25: "function"},
     "graph": {1: "node", 5: "tensor", 15: "sparse"},
@@ -294,28 +263,6 @@ def weight_files(model: memoryview) -> Iterator[str]:
         for number, value in protobuf_fields(message):
             if (inner := HOLDING[kind].get(number)) and isinstance(value, memoryview):
                 waiting.append((inner, value))
-
-
-def makers(model: memoryview) -> dict[str, tuple[str, list[str]]]:
-    """Return the operator that makes each tensor, and its inputs."""
-    made_by: dict[str, tuple[str, list[str]]] = {}
-    for node in _all(model, *NODES):
-        inputs, outputs, names = (list(map(_text, _all(node, n))) for n in (1, 2, 4))
-        made_by |= dict.fromkeys(outputs, ("".join(names), inputs))
-    return made_by
-
-
-def maker(made_by: Mapping[str, tuple[str, list[str]]], output: str) -> str:
-    """Return the operator that makes the numbers of an output; empty where no node makes it.
-
-    Operators that only move or convert numbers are passed over.
-    """
-    for _ in made_by:
-        operator, inputs = made_by.get(output, ("", []))
-        if operator not in PASSING or not inputs:
-            return operator
-        output = inputs[0]
-    return ""
 
 
 def _all(message: memoryview, number: int, *inner: int) -> Iterator[memoryview]:

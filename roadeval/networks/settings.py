@@ -32,9 +32,13 @@ class NetSettings:
     beside it, of all of them, one after the other."""
     size: tuple[Side, Side] | None = None
     """Width and height of its input, in pixels; by default those that the file names."""
-    resize: Literal["stretch", "letterbox"] = "stretch"
-    """How an image gets that size, interpolated linearly. ``stretch``: each side by itself.
-    ``letterbox``: reduced as a whole until it fits, in the middle of a grey area."""
+    resize: Literal["stretch", "letterbox"] | None = None
+    """How an image gets that size, interpolated linearly. ``stretch``, the default: each side by
+    itself. ``letterbox``, that of Ultralytics' networks: reduced as a whole until it fits, in the
+    middle of a grey area."""
+    antialias: bool = False
+    """Whether a pixel of a reduced image is a mean of all that it covers, as Pillow's bilinear
+    filter has it."""
     layout: Literal["NCHW", "NHWC"] | None = None
     """The order of its input's dimensions: N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None
@@ -53,9 +57,10 @@ class NetSettings:
     road."""
     road: Annotated[tuple[Class, ...], Field(max_length=64)] | None = None
     """The numbers of the classes that are road, from 0."""
-    activation: Literal["softmax", "sigmoid", "none"] | None = None
+    activation: Literal["softmax", "sigmoid", "none", "classes"] | None = None
     """How probabilities are made of an output: ``softmax`` over its classes, ``sigmoid`` of each,
-    or ``none`` where the network has applied one."""
+    or ``none`` where it holds probabilities: by default where it never leaves 0 to 1 on images for
+    testing. ``classes``: it holds numbers of classes, as whole numbers do."""
     decide: Literal["argmax", "threshold"] | None = None
     """Road is where a class of ``road`` beats all others (``argmax``), or where the probability of
     road is above ``threshold``."""

@@ -77,14 +77,15 @@ def network(
 def written(path: Path, nodes: list, values: dict | None = None, **opened) -> Path:
     """Write the network of some nodes, which make ``road`` of the image, a float of 0 to 1.
 
-    ``opened`` are the ``shape`` and the type ``kind`` of ``road`` as the file states them, and
-    ``functions`` of the model.
+    ``opened`` are the ``shape`` and the type ``kind`` of ``road`` as the file states them, the
+    ``size`` of the image, and ``functions`` of the model.
     """
     kind, shape = opened.get("kind", TensorProto.FLOAT), opened.get("shape")
+    width, height = opened.get("size", SIZE)
     graph = helper.make_graph(
         nodes,
         "written",
-        [helper.make_tensor_value_info(IMAGE, TensorProto.FLOAT, (1, 3, SIZE[1], SIZE[0]))],
+        [helper.make_tensor_value_info(IMAGE, TensorProto.FLOAT, (1, 3, height, width))],
         [helper.make_tensor_value_info(ROAD, kind, shape)],
         [numpy_helper.from_array(np.array(value), name) for name, value in (values or {}).items()],
     )

@@ -33,12 +33,6 @@ def with_weights_beside(folder):
     return path
 
 
-@pytest.mark.parametrize("last", ["Softmax", "Sigmoid", None])
-def test_the_operator_that_makes_an_output_is_found_behind_those_that_move_it(last, tmp_path):
-    path = network(tmp_path / "n.onnx", last=last, input_shape=(1, 12, 16, 3))
-    assert read(path).makers == {"road": last or "Conv"}
-
-
 def test_weights_beside_the_file_are_part_of_the_digest(tmp_path):
     path = with_weights_beside(tmp_path)
     both = path.read_bytes() + (tmp_path / "n.data").read_bytes()

@@ -302,6 +302,7 @@ def warnings(run: Run) -> tuple[str, ...]:
         *(f"{run.selection.image.name}: {note}" for note in run.selection.notes),
         *run.frames.accounting.notes,
         *tuple(warned),
+        *_taken(run),
         *_tuned(run),
         *_missing(run),
         *_near_training(run),
@@ -346,6 +347,17 @@ def _of_picks(run: Run) -> Iterator[str]:
     known = {each.frame for each in picks.picked}
     if others := len(run.board.apart.keys() - known):
         yield f"{others} labels are of frames that were not picked: they are in no number"
+
+
+def _taken(run: Run) -> Iterator[str]:
+    """Yield which networks' outputs are taken for probabilities."""
+    for name, stages in run.methods.items():
+        probable = stages.get("net", {}).get("taken_for") == "probabilities"
+        if probable and not name.endswith(TUNED):
+            yield (
+                f"{name}: the network's output is taken for probabilities, for it stays within 0 "
+                "and 1; if it holds logits, write `activation` in its file"
+            )
 
 
 def _tuned(run: Run) -> Iterator[str]:
