@@ -102,6 +102,8 @@ class Network:
             if np.isnan(scores).any():
                 raise self.file.error("gives NaN")
             scores = np.clip(scores, -HUGE, HUGE)  # infinity times nothing would be NaN
+        if settings.activation == "none" and not _within_one(scores.min(), scores.max()):
+            raise self.file.error("leaves 0 to 1: it gives no probabilities, see `net.activation`")
         if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
             nearest = cv2.INTER_NEAREST if is_ultralytics(self.file) else cv2.INTER_NEAREST_EXACT
@@ -285,6 +287,10 @@ SLACK: Final = 1 / 64
 """How far a quantised probability may lie outside 0 to 1."""
 
 
+def _within_one(low: float, high: float) -> bool:
+    return -SLACK <= low and high <= 1 + SLACK
+
+
 def samples_of(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
     """Return what the outputs are on images for testing; a `NetworkError` if the network fails."""
     alike = replace(settings, road=None, activation=None, decide=None, threshold=None)
@@ -422,7 +428,7 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -
     guessed = sample.whole and 0 <= sample.low <= sample.high > 0 and count == 1
     if is_whole or (settings.activation or ("classes" * guessed)) == "classes":
         return _of_classes(settings, file, name)
-    is_probability = sample.low >= -SLACK and sample.high <= 1 + SLACK
+    is_probability = _within_one(sample.low, sample.high)
     usual: Literal["none", "sigmoid", "softmax"] = "sigmoid" if count == 1 else "softmax"
     above = settings.threshold is not None or count == 1
     decide = settings.decide or ("threshold" if above else "argmax")

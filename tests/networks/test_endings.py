@@ -141,6 +141,11 @@ def test_logits_are_interpolated_and_not_probabilities(tmp_path):
         assert np.array_equal(mask, expected)
 
 
+def test_logits_that_are_called_probabilities_are_refused(tmp_path):
+    with pytest.raises(NetworkError, match=r"no probabilities, see `net\.activation`"):
+        road_of(tmp_path / "n.onnx", ONE, activation="none")
+
+
 def test_whole_numbers_that_are_quantised_probabilities_are_no_classes(tmp_path):
     ending = f"{ONE}; Mul half; Sigmoid; QuantizeLinear fine bottom; Cast to={TensorProto.UINT8}"
     path = ended(tmp_path / "n.onnx", ending, (160, 120))
