@@ -233,7 +233,8 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     if settings.outputs is None and _has_instances(file):
         raise file.question(
             "finds instances, as boxes or queries with masks, and gives no map of classes: export "
-            "a network for semantic segmentation (of Ultralytics one called -sem)"
+            "a network for semantic segmentation (of Ultralytics one called -sem), or name an "
+            "output that is a map by `net.outputs`"
         )
     usual: Literal["stretch", "letterbox"] = "letterbox" if is_ultralytics(file) else "stretch"
     settings = replace(settings, sha256=file.sha256, resize=settings.resize or usual)
@@ -249,7 +250,7 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
         _meaning(settings, file, name, sample)
         for name, sample in zip(outputs, samples_of(settings, file), strict=True)
     ]
-    if len({each.activation for each in made}) > 1:
+    if any(settings != made[0] for settings in made):
         raise file.question("its outputs differ in kind: name some of one kind by `net.outputs`")
     return made[-1]
 
@@ -288,7 +289,7 @@ SLACK: Final = 1 / 64
 
 
 def _within_one(low: float, high: float) -> bool:
-    return -SLACK <= low and high <= 1 + SLACK
+    return low >= -SLACK and high <= 1 + SLACK
 
 
 def samples_of(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
@@ -343,20 +344,27 @@ def is_ultralytics(file: OnnxFile) -> bool:
 
 
 def _has_instances(file: OnnxFile) -> bool:
-    """Return whether a file finds objects one by one, by its metadata or its outputs."""
+    """Return whether a file finds objects one by one, by its metadata or its outputs.
+
+    Then it has a list of objects beside masks: an output of three lengths that is no map.
+    """
     names = " ".join(tensor.name.lower() for tensor in file.outputs)
-    if file.metadata.get("task") in ("detect", "segment", "pose", "obb"):
-        return True
-    return any(word in names for word in ("queries", "boxes", "dets", "pred_masks"))
+    shapes = [tensor.shape for tensor in file.outputs]
+    maps = {sides for shape in shapes if len(shape) == 4 for sides in (shape[1:3], shape[2:])}
+    return (
+        file.metadata.get("task") in ("detect", "segment", "pose", "obb")
+        or any(word in names for word in ("queries", "boxes", "dets", "pred_masks"))
+        or (bool(maps) and any(len(shape) == 3 and shape[1:] not in maps for shape in shapes))
+    )
 
 
-def _named_road(file: OnnxFile) -> tuple[int, ...]:
-    """Return the classes that a file's metadata call road."""
+def _class_names(file: OnnxFile) -> dict[int, str]:
+    """Return the names of classes by number, as a file's metadata give them."""
     try:
         names = dict(ast.literal_eval(file.metadata.get("names", "{}")))
-        return tuple(int(number) for number, name in names.items() if str(name).lower() == "road")
+        return {int(number): str(name).lower() for number, name in names.items()}
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
-        return ()
+        return {}
 
 
 def as_scores(output: Array, layout: str | None) -> Array | None:
@@ -432,7 +440,7 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -
     usual: Literal["none", "sigmoid", "softmax"] = "sigmoid" if count == 1 else "softmax"
     above = settings.threshold is not None or count == 1
     decide = settings.decide or ("threshold" if above else "argmax")
-    named = tuple(number for number in _named_road(file) if number < count)
+    named = tuple(n for n, name in _class_names(file).items() if name == "road" and n < count)
     road = settings.road or named or ((count - 1,) if count <= 2 else ())
     if not road:
         raise file.question(
@@ -458,8 +466,9 @@ def _of_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings
     """Complete settings of a network whose output holds numbers of classes."""
     if settings.threshold is not None:
         raise file.question(f"its output {name!r} is of classes alone: leave `net.threshold` out")
-    road = settings.road or _named_road(file)
-    if is_ultralytics(file) and file.metadata.get("names", "").count(":") == 1:
+    names = _class_names(file)
+    road = settings.road or tuple(n for n, name in names.items() if name == "road")
+    if is_ultralytics(file) and len(names) == 1:
         road = (1,)  # of a single class it writes 1, whatever number the class has
     if not road:
         raise file.question("give the numbers of the classes that are road by `net.road`")

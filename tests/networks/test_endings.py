@@ -193,11 +193,18 @@ def test_an_antialiased_image_is_pillows(size):
     assert np.abs(placed(image, settings).astype(int) - expected).max() <= 1
 
 
-@pytest.mark.parametrize("told", ["task", "boxes", "queries"])
+@pytest.mark.parametrize("told", ["task", "boxes", "queries", "their lengths"])
 def test_a_network_that_finds_instances_is_called_so(told, tmp_path):
     path = network(tmp_path / "n.onnx", spare=True)
     if told == "task":
         by_ultralytics(path, {0: "road"}, task="segment")
+    elif told == "their lengths":
+        model = onnx.load(path)
+        found = helper.make_tensor_value_info("found", TensorProto.FLOAT, (1, 2, 48))
+        length = helper.make_node("Constant", [], ["lengths"], value_ints=[1, 2, 48])
+        model.graph.node.extend([length, helper.make_node("Reshape", [ROAD, "lengths"], ["found"])])
+        model.graph.output.append(found)
+        onnx.save(model, path)
     else:
         model = onnx.load(path)
         model.graph.node[-1].output[0] = model.graph.output[0].name = f"pred_{told}"
