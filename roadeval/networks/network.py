@@ -6,6 +6,7 @@ import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
+from itertools import chain
 from typing import Any, Final, Literal, Self
 
 import cv2
@@ -69,15 +70,13 @@ class Network:
         for name, output, shape in zip(settings.outputs or (), outputs, self.shapes, strict=True):
             if output.shape != shape:
                 raise self.file.error(_VARIES.format(name, output.shape, shape))
-        codes = np.maximum.reduce([self._codes(output, frame, settings) for output in outputs])
+        probable = [self._codes(output, frame) for output in outputs]
+        codes = np.maximum.reduce([total for total, _ in probable])
         limit = round((0.5 if settings.threshold is None else settings.threshold) * CERTAIN)
-        mask = (codes > limit).astype(np.uint8)
+        by_class = tuple(chain(*zip(*(alone for _, alone in probable), strict=True)))
         graded = settings.activation != "classes"
-        alone = [replace(settings, road=(each,)) for each in settings.road or ()]
-        if not graded or len(alone) * len(outputs) == 1:
-            return Road(mask, codes, graded)
-        planes = (self._codes(output, frame, each) for each in alone for output in outputs)
-        return Road(mask, codes, graded, tuple(planes))
+        mask = (codes > limit).astype(np.uint8)
+        return Road(mask, codes, graded, by_class if len(by_class) > 1 else ())
 
     def facts(self) -> Mapping[str, Any]:
         """Return facts about the network for results, beside its settings."""
@@ -95,7 +94,9 @@ class Network:
             "road": [*map(str, self.settings.road or ())],
         }
 
-    def _codes(self, output: Array, frame: Size, settings: NetSettings) -> Probability:
+    def _codes(self, output: Array, frame: Size) -> tuple[Probability, list[Probability]]:
+        """Return the codes of road, and those of each of its classes, where they are graded."""
+        settings = self.settings
         scores = as_scores(output, settings.layout)
         assert scores is not None
         if not np.isfinite(scores).all():
@@ -107,14 +108,17 @@ class Network:
         if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
             nearest = cv2.INTER_NEAREST if is_ultralytics(self.file) else cv2.INTER_NEAREST_EXACT
-            return brought_back(CERTAIN * road, frame, settings, nearest)
+            return brought_back(CERTAIN * road, frame, settings, nearest), []
 
         def plane(number: int) -> Values:
             own = scores[number].astype(np.float32)
             return brought_back(own, frame, settings, cv2.INTER_LINEAR)
 
-        shares = road_probability(plane, len(scores), settings)
-        return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
+        def coded(shares: Values) -> Probability:
+            return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
+
+        total, alone = road_probability(plane, len(scores), settings)
+        return coded(total), [coded(shares) for shares in alone]
 
 
 HUGE: Final = 3e4
@@ -123,32 +127,46 @@ TAKEN_FOR: Final = {"none": "probabilities", "classes": "classes"}
 """What an output is taken for, by `NetSettings.activation`; by others for logits."""
 
 
-def road_probability(plane: Callable[[int], Values], count: int, settings: NetSettings) -> Values:
-    """Compute how probable road is, float32 in 0..1, from a ``plane`` of each class by its number.
+def road_probability(
+    plane: Callable[[int], Values], count: int, settings: NetSettings
+) -> tuple[Values, list[Values]]:
+    """Compute how probable road and each of its classes are, float32 in 0..1.
 
-    For ``argmax`` it is road against the rest: the best class of road against the best other one,
-    so that the mask is where it is above one half. For ``threshold`` it is the sum over the classes
-    of road, and of a ``sigmoid`` the greatest of them.
+    ``plane`` returns the scores of a class by its number. For ``argmax`` it is road against the
+    rest: the best class of road against the best other one, so that the mask is where it is above
+    one half. For ``threshold`` it is the sum over the classes of road, and of a ``sigmoid`` the
+    greatest of them.
     """
-    road = settings.road or ()
-    others = [number for number in range(count) if number not in road]
-    if settings.activation == "none" and settings.decide != "argmax":
-        return reduce(np.add, map(plane, road))
-    best = reduce(np.maximum, map(plane, road))
-    if settings.activation == "sigmoid" and settings.decide != "argmax":
-        return sigmoid(best)
-    other = reduce(np.maximum, map(plane, others), np.full_like(best, -HUGE))
-    if settings.activation == "none":
-        total = best + other
-        return np.divide(best, total, out=np.zeros_like(best), where=total > 0)
+    numbers = settings.road or ()
+    road = [plane(number) for number in numbers]
+    others = [number for number in range(count) if number not in numbers]
+    best = reduce(np.maximum, road)
+    if settings.decide != "argmax" and settings.activation != "softmax":
+        if settings.activation == "sigmoid":
+            return sigmoid(best), [sigmoid(own) for own in road]
+        return reduce(np.add, road), road
+    rest = reduce(np.maximum, map(plane, others), np.full_like(best, -HUGE))
     if settings.decide == "argmax":
-        return sigmoid(best - other)
-    most = np.maximum(best, other)
-    sums = [
-        reduce(np.add, (np.exp(plane(number) - most) for number in numbers), np.zeros_like(best))
-        for numbers in (road, others)
-    ]
-    return sums[0] / (sums[0] + sums[1])
+        against = _share if settings.activation == "none" else _odds
+        rivals = [
+            reduce(np.maximum, [*road[:place], *road[place + 1 :]], rest)
+            for place in range(len(road))
+        ]
+        return against(best, rest), [*map(against, road, rivals)]
+    most = np.maximum(best, rest)
+    powers: list[Values] = [np.exp(own - most) for own in road]
+    whole = reduce(np.add, chain(powers, (np.exp(plane(number) - most) for number in others)))
+    shares: list[Values] = [power / whole for power in powers]
+    return reduce(np.add, shares), shares
+
+
+def _odds(one: Values, other: Values) -> Values:
+    return sigmoid(one - other)
+
+
+def _share(one: Values, other: Values) -> Values:
+    total = one + other
+    return np.divide(one, total, out=np.zeros_like(one), where=total > 0)
 
 
 GREY: Final = 114
