@@ -179,12 +179,11 @@ def settle(
     else:
         truth = choose_truth(topics, image, asked.truth, config.labels, of_rig=of_rig)
     choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow)}
-    for name, topic in asked.masks.items():
-        choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
     # What would be scored against itself is refused.
     if truth.topic == image:
         raise LogError(f"`topics.truth` {image.name}: it is the image's own topic")
     for name, topic in asked.masks.items():
+        choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         if choices[name].topic == truth.topic:
             raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
     camera = Camera.of(readers[image.name], image, asked)
