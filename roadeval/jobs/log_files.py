@@ -46,7 +46,13 @@ def info(
     def step(done: int, total: int) -> None:
         on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
 
-    return logs.describe(readable(drive), config, verify=verify, on_bytes=step)
+    described = logs.describe(readable(drive), config, verify=verify, on_bytes=step)
+    if config is None or not config.truth.path or described.problem:
+        return described
+    from roadeval.jobs.run.summary import misfits_of_truth
+
+    with logs.open_log(readable(drive), config) as log:
+        return replace(described, misfits=(*misfits_of_truth(log),))
 
 
 def pack(

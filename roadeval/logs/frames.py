@@ -41,6 +41,7 @@ from roadeval.logs.truth.pairing import (
     REACH,
     Camera,
     Clock,
+    NamedLabels,
     Partners,
     by_time,
     frames_of,
@@ -127,6 +128,17 @@ class Selection:
                 what = f"as stored, and would be {how}, by viewers and annotation tools"
             notes.append(f"its images are {what}")
         return tuple(notes)
+
+    def among_truth(self, numbers: Sequence[int]) -> Sequence[int]:
+        """Return those of some frames that lie where truth does, as far as no label is read."""
+        if self.truth is None:
+            return numbers
+        labels, times = self.truth.pictures, self.camera.images.log_times
+        if isinstance(labels, NamedLabels) and labels.by != "stamp":
+            keys = frozenset(labels.log_times.tolist())
+            return [number for number in numbers if number in keys] or numbers
+        first, last = np.searchsorted(times, labels.log_times[[0, -1]])
+        return [number for number in numbers if first <= number <= last] or numbers
 
     @property
     def reasons(self) -> tuple[str, ...]:

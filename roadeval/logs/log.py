@@ -324,6 +324,8 @@ class LogDescription:
     """Whether the log was read whole: of one that was not, damage inside chunks is not known."""
     sha256: str | None
     """Of a log that was read whole."""
+    misfits: tuple[str, ...] = ()
+    """How truth that lies beside the log does not fit its images, a sentence each."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON has it: text, numbers, lists, objects."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from roadeval.cli import console
+from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
 from roadeval.report.blocks import Heading
@@ -36,7 +37,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     elif not outcome.replayed:
         out.print("All of it was done before.")
     out.print()
-    out.print(facts.verdict)
+    out.print(with_flags(facts.verdict))
     out.print()
     if facts.totals:
         blocks = [rates_table(facts), *([differences_table(facts)] if facts.effects else [])]

@@ -36,6 +36,8 @@ def show(found: Mapping[str, Any], out: Console) -> None:
     if found["problem"]:
         out.print(f"replay would stop: {with_flags(found['problem'])}", soft_wrap=True)
     else:
+        for misfit in found["misfits"]:
+            out.print(console.wrapped(with_flags(misfit), out.width, 0), soft_wrap=True)
         out.print("replay would pick")
         for pick in found["picks"]:
             out.print(

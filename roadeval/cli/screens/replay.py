@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
+from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
 from roadeval.data.words import counted
 from roadeval.recording.viewer import has_screen
@@ -36,8 +37,10 @@ def show(outcome: Outcome, out: Console) -> None:
     out.print(f"{facts.drive.name}: {of}{account(facts.frames, facts.windows)}")
     out.print()
     if facts.totals:
-        tables.show([Text(facts.verdict), *_scores(facts, outcome.metres)], out)
+        tables.show([Text(with_flags(facts.verdict)), *_scores(facts, outcome.metres)], out)
     else:
+        for sentence in facts.misfits:
+            out.print(with_flags(sentence))
         why = "every frame with road truth was trained on or left out"
         if not facts.frames.labelled:
             why = "no frame that was read has road truth"

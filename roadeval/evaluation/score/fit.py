@@ -23,11 +23,11 @@ from roadeval.data.arrays import Floats, Plane
 
 TRUTH: Final = "truth"
 """The subject that is no mask of a method."""
-SPOTS: Final = 24
+SPOTS: Final = 20
 """Frames of a drive that are looked at, spread evenly."""
 LAST_LAG: Final = 5
 """Frames before and after each of them."""
-_FAR: Final = 14
+_FAR: Final = 13
 """Pixels that a mask may have been moved by."""
 _WIDEST: Final = 640
 """Columns of the images that are looked at: larger ones are reduced."""
@@ -37,7 +37,7 @@ _GROWN: Final = 8
 """Pixels that its edge may lie farther out or in all around."""
 _NEAR: Final = 2.5
 """Pixels of a move that is named, at least: masks of many a method lie a little off."""
-_FEWER: Final = 2
+_FEWER: Final = 3
 """Every so many points of the edge are held against the moves."""
 _POINTS: Final = 400
 """Points of a mask's edge that are looked at."""
@@ -45,7 +45,7 @@ _LEAST: Final = 6
 """Spots without which nothing is found."""
 _SURE: Final = 3.5
 """Least mean gain of what fits better over the spots, in standard errors."""
-_RATHER: Final = 1.0
+_RATHER: Final = 1.5
 """The same of a move over an edge that lies farther out, or in, all around."""
 _MUCH: Final = 0.05
 """Least mean gain, as a share of how well the plain pairing fits."""
@@ -116,8 +116,7 @@ class _Slopes:
 def _slopes(picture: Plane) -> _Slopes:
     import cv2
 
-    smooth = cv2.GaussianBlur(picture, (5, 5), 1.2)
-    across, down = (cv2.Sobel(smooth, cv2.CV_16S, *way) for way in ((1, 0), (0, 1)))
+    across, down = cv2.spatialGradient(cv2.GaussianBlur(picture, (5, 5), 1.2))
     usual = (cv2.norm(across, cv2.NORM_L1) + cv2.norm(down, cv2.NORM_L1)) / picture.size
     return _Slopes(across, down, usual)
 
@@ -185,19 +184,21 @@ _MOVES: Final = np.mgrid[-_FAR : _FAR + 1, -_FAR : _FAR + 1].reshape(2, -1)
 class FitCheck:
     """Collects, frame by frame in the drive's order, how well truth and masks fit.
 
-    About `SPOTS` frames among the ``numbers``, of which each ``stride``-th is read, are looked at,
+    So many ``spots`` among the ``numbers``, of which each ``stride``-th is read, are looked at,
     and their neighbours. Time and memory do not grow with the drive.
     """
 
-    def __init__(self, numbers: Sequence[int], stride: int = 1) -> None:
+    def __init__(self, numbers: Sequence[int], stride: int = 1, spots: int = SPOTS) -> None:
         self._due = float(numbers[0])
-        self._apart = (numbers[-1] - numbers[0]) / SPOTS
+        self._apart = (numbers[-1] - numbers[0]) / spots
         self._stride = stride
         self._recent: deque[_Seen] = deque(maxlen=LAST_LAG)
         self._open: list[tuple[int, int, dict[str, _Edges]]] = []
         self._spots = 0
         self._fits = defaultdict[str, dict[Hypothesis, dict[int, tuple[float, float]]]](dict)
         """By subject, hypothesis and spot: agreement with the image, and with the truth."""
+        self._moved = defaultdict[str, dict[int, Floats]](dict)
+        """By subject and spot: the same of each of `_MOVES`, ``(2, K)``."""
         self._upside = defaultdict[str, list[float]](list)
 
     def add(self, frame: Frame, computed: Sequence[Packed] = ()) -> None:
@@ -247,9 +248,7 @@ class FitCheck:
                 down, right = _MOVES
                 few = own.every(_FEWER)
                 moved = [_agreement(few, s, right, down) for s in (seen.image, seen.truth)]
-                for place, both in enumerate(zip(*moved, strict=True)):
-                    key = (Misfit.MOVED, 0, int(right[place]), int(down[place]))
-                    self._fits[name].setdefault(key, {})[self._spots] = both
+                self._moved[name][self._spots] = np.array(moved)
                 for pixels in filter(None, range(-_GROWN, _GROWN + 1)):
                     x, y = (
                         place - np.rint(pixels * way).astype(np.intp)
@@ -290,12 +289,17 @@ class FitCheck:
         fits = self._fits.get(name, {})
         if len(fits.get(_PLAIN, ())) < _LEAST:
             return None
+        moved = self._moved[name]
+        if len(moved) >= _LEAST and not alone:
+            place = int(sum(moved.values(), np.zeros((2, 1))).sum(0).argmax())
+            down, right = _MOVES[:, place].tolist()
+            fits[Misfit.MOVED, 0, right, down] = {n: (*v[:, place],) for n, v in moved.items()}
         gains: dict[Hypothesis, _Gain] = {}
         for each in fits:
             # Masks that were computed here may have learnt that the truth is mirrored, but not
             # that it is late.
             images_only = alone or (name == TRUTH and each[0] is not Misfit.LAG)
-            if each != _PLAIN and not (alone and each[0] is Misfit.MOVED):
+            if each != _PLAIN:
                 gain = self._gain(name, each, images_only=images_only)
                 gains |= {each: gain} if gain else {}
         key = max(

@@ -241,7 +241,7 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
-        FitCheck(again().numbers, config.frames.every),
+        FitCheck(selection.among_truth(again().numbers), config.frames.every),
         camera,
     )
 

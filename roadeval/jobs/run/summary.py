@@ -5,18 +5,22 @@ from __future__ import annotations
 import platform
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib.metadata import version
 from typing import Any, Final
 
 import numpy as np
 
+from roadeval import logs
 from roadeval.config import AS_IT_IS
 from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import (
+    LAST_LAG,
     TRUTH,
     Finding,
+    FitCheck,
     Misfit,
     Scoreboard,
     Unlabelled,
@@ -44,6 +48,8 @@ from roadeval.results.sentences import misfit, verdict
 from roadeval.results.tables import TableFacts
 from roadeval.version import VERSION
 
+FEW: Final = 12
+"""Frames of a log that are looked at, with their neighbours, where nothing is replayed."""
 LOOKED_AT: Final = 10
 """Frames without truth that are named as worth a look."""
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
@@ -164,6 +170,24 @@ def _misfits(run: Run) -> Iterator[str]:
         yield misfit_in_words(finding, run.selection, run.config)
 
 
+def misfits_of_truth(log: logs.Log) -> Iterator[str]:
+    """Yield how the truth of a log does not fit its images, by a few frames and neighbours."""
+    selection = log.select()
+    numbers = selection.among_truth(log.frames(selection).numbers)
+    places = np.linspace(0, len(numbers) - 1, FEW, dtype=int).tolist()
+    near = {each for place in places for each in _around(numbers[place], log.config.frames.every)}
+    fit = FitCheck(numbers, log.config.frames.every, FEW)
+    for logged in log.frames(selection, near):
+        with suppress(logs.FrameError):
+            fit.add(logged.decode())
+    for finding in fit.findings():
+        yield misfit_in_words(finding, selection, log.config)
+
+
+def _around(number: int, stride: int) -> range:
+    return range(number - LAST_LAG * stride, number + LAST_LAG * stride + 1, stride)
+
+
 def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -> str:
     """Return what of truth or masks does not fit the images, and what to do about it."""
     rate, is_truth = selection.image.rate_hz, finding.subject == TRUTH
@@ -174,10 +198,10 @@ def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -
     is_late = finding.misfit is Misfit.LAG
     if is_late and isinstance(pictures, NamedLabels) and pictures.by == "number":
         setting = "truth" if is_truth else f"masks.{finding.subject}"
-        remedy = f"`{setting}.first` {pictures.first + finding.frames} pairs them anew."
+        remedy = f"Set `{setting}.first` to {pictures.first + finding.frames}."
     elif is_late and is_truth and period_ms:
         offset = config.topics.sync_offset_ms - finding.frames * period_ms
-        remedy = f"`topics.sync_offset_ms` {offset:.0f} pairs them anew."
+        remedy = f"Set `topics.sync_offset_ms` to {offset:.0f}."
     return misfit(finding, period_ms, remedy)
 
 
