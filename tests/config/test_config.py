@@ -152,6 +152,7 @@ def test_no_stage_is_called_like_a_table_of_the_run():
     [
         ("size = [8, 8]\n", "file must name the network"),
         ('file = "n.onnx"\nsise = [8, 8]\n', r"net\.sise: there is no such setting"),
+        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold says nothing"),
     ],
 )
 def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, said):
