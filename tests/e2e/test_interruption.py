@@ -10,6 +10,7 @@ import pytest
 
 from roadeval import Recording
 from tests.e2e.commands import DEMO, ROADEVAL, here
+from tests.networks.making import without_end, written
 
 ENOUGH = 1_000_000
 """Bytes of a recording that hold some frames, and far from all."""
@@ -73,3 +74,15 @@ def test_a_second_run_on_its_recording_is_refused_at_once_and_told_who_writes_it
         second.stderr,
     )
     assert not (folder / "other").exists()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_network_without_end(number, code, tmp_path):
+    written(tmp_path / "n.onnx", [without_end("yes")], {"yes": True})
+    (tmp_path / "n.toml").write_text('file = "n.onnx"\nseconds = 600\n')
+    words = ["replay", DEMO, "--net", f"endless={tmp_path / 'n.toml'}", "--reports", tmp_path / "r"]
+    with subprocess.Popen([ROADEVAL, *words], stderr=subprocess.DEVNULL) as run:
+        with pytest.raises(subprocess.TimeoutExpired):
+            run.wait(8)
+        run.send_signal(number)
+        assert run.wait(20) == code
