@@ -85,13 +85,12 @@ def ended(
                 end()
                 return
 
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
+    watcher = in_thread(watch)
     try:
         yield late
     finally:
         done.set()
-        watcher.join()
+        watcher.result()
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+from onnx import helper
 
 import roadeval
 from roadeval.config import ConfigError, configure, network_variant
@@ -14,7 +15,7 @@ from roadeval.jobs.run.prepared import prepare
 from roadeval.logs import LogWriter, open_log
 from roadeval.networks import network as networks
 from roadeval.training.model import arrays_of
-from tests.networks.making import red_network
+from tests.networks.making import IMAGE, ROAD, red_network, written
 
 SIZE = (48, 64)
 NS = 100_000_000
@@ -163,15 +164,29 @@ def test_the_headline_says_what_the_training_frames_threshold_would_bring(at_tra
     assert told in outcome.summary["verdict"]
 
 
-@pytest.mark.parametrize("brought", ["masks", "network"])
+def in_two_classes(path):
+    """A network that decides by argmax, and calls too much road."""
+    values = {
+        "w": np.float32([[0, 0, 0], [20, 0, 0]]).reshape(2, 3, 1, 1),
+        "b": np.float32([0, -3]),
+    }
+    return written(
+        path, [helper.make_node("Conv", [IMAGE, "w", "b"], [ROAD])], values, size=(64, 48)
+    )
+
+
+@pytest.mark.parametrize("brought", ["masks", "network", "two classes"])
 def test_the_lines_of_the_verdict_keep_their_promise(brought, folder, tmp_path):
     given, own = confidences(tmp_path / "a"), tmp_path / "own.toml"
+    network = folder / "red.onnx"
+    if brought == "two classes":
+        network = in_two_classes(tmp_path / "two.onnx")
 
     def replayed(lines):
         masks = {"mine": {**given, **tomllib.loads(lines)}} if brought == "masks" else {}
         config = configure({**SMALL, "masks": masks, "output": {"record": "none"}})
         if not masks:
-            own.write_text(f'file = "{folder / "red.onnx"}"\n{lines}')
+            own.write_text(f'file = "{network}"\n{lines}')
             config = config.with_variants([network_variant("mine", str(own))])
         outcome, _ = replay(folder / "drive.mcap", config, tmp_path / "r")
         *_, final = outcome.summary["totals"]["mine"].values()
