@@ -440,19 +440,21 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -
     width, height = settings.size
     scores = as_scores(np.broadcast_to(np.int8(), sample.shape), settings.layout)
     count, rows, columns = (0, 0, 0) if scores is None else scores.shape
-    # It has about the proportions of the input, and no more than one class of whole numbers.
-    is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
     is_whole = sample.kind in "iub"
-    if not is_map or (is_whole and count != 1):
+    # Class maps are often cast to float.
+    guessed = sample.whole and 0 <= sample.low <= sample.high > 0 and count == 1
+    is_classes = is_whole or (settings.activation or ("classes" * guessed)) == "classes"
+    # It has about the proportions of the input, and numbers of classes in one channel.
+    is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
+    if not is_map or (is_classes and count != 1):
         raise file.question(f"its output {name!r} is no map of the image, but {sample.shape}")
-    if is_whole and (sample.low < 0 or sample.several):
+    is_scored = sample.low < 0 or sample.several or settings.activation in ("sigmoid", "softmax")
+    if is_whole and is_scored:
         raise file.question(
             f"its output {name!r} holds whole numbers that look like quantised scores, and not "
             "like classes: end the network with DequantizeLinear"
         )
-    # Class maps are often cast to float.
-    guessed = sample.whole and 0 <= sample.low <= sample.high > 0 and count == 1
-    if is_whole or (settings.activation or ("classes" * guessed)) == "classes":
+    if is_classes:
         return _of_classes(settings, file, name)
     is_probability = _within_one(sample.low, sample.high)
     usual: Literal["none", "sigmoid", "softmax"] = "sigmoid" if count == 1 else "softmax"

@@ -146,6 +146,11 @@ def test_logits_that_are_called_probabilities_are_refused(tmp_path):
         road_of(tmp_path / "n.onnx", ONE, activation="none")
 
 
+def test_scores_of_several_classes_are_no_map_of_classes(tmp_path):
+    with pytest.raises(NetworkError, match="no map of the image"):
+        road_of(tmp_path / "n.onnx", TWO, activation="classes", road=(1,))
+
+
 def test_whole_numbers_that_are_quantised_probabilities_are_no_classes(tmp_path):
     ending = f"{ONE}; Mul half; Sigmoid; QuantizeLinear fine bottom; Cast to={TensorProto.UINT8}"
     path = ended(tmp_path / "n.onnx", ending, (160, 120))
