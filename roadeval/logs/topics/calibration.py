@@ -79,9 +79,11 @@ def calibration_of(
         last, _ = _read(topic, reader.fields(len(reader) - 1), image)
         if last not in (None, made):
             return None, f"{topic}: it changes within the log"
-    static = [each for each in topics if each.kind is TopicKind.TRANSFORMS]
-    transforms = dict(_transforms(readers[each.name] for each in static))
+    static = [each.name for each in topics if each.kind is TopicKind.TRANSFORMS and each.count]
+    transforms = dict(_transforms(readers[name] for name in static))
     notes = [why] * bool(why)
+    if static and not transforms:
+        notes.append(f"its place is not known: {', '.join(static)} cannot be read")
     try:
         mounting = _mounting(frame, transforms)
     except ValueError as error:

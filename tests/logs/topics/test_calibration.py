@@ -429,6 +429,13 @@ def test_a_camera_frame_with_the_axes_of_a_vehicle_is_read_so(tmp_path: Path):
     assert (of_body.frame_id, of_optical.frame_id) == ("cam_optical", "cam")
 
 
+def test_transforms_that_cannot_be_read_are_said(tmp_path: Path):
+    messages = [lens(), ("/tf_static", "foxglove.FrameTransform", {"x": 1}), picture()]
+    known, why = found(foxglove(tmp_path / "a.mcap", messages))
+    assert known is not None
+    assert why == "its place is not known: /tf_static cannot be read"
+
+
 def test_a_calibration_that_cannot_be_read_is_said(tmp_path: Path):
     topic, name, content = lens()
     path = foxglove(tmp_path / "a.mcap", [(topic, name, {**content, "K": None}), picture()])
