@@ -76,8 +76,8 @@ class Calibration:
         x, y = self.matrix[2], self.matrix[5]
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""
-        pixels = f"{self.width}x{self.height} pixels"
-        return f"its centre, {x:.4g}, {y:.4g}, is far from the middle of {pixels}: is it of others?"
+        middle = f"the middle of {self.width}x{self.height} pixels"
+        return f"its centre, {x:.4g}, {y:.4g}, is far from {middle}: correct it with `ground`"
 
     @property
     def bends(self) -> bool:

@@ -27,7 +27,8 @@ GROUND_FRAMES: Final = ("base_footprint",)
 COEFFICIENTS: Final = {
     **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (0, 4, 5, 8, 12)),
     **dict.fromkeys(FISHEYE, (4,)),
-    **dict.fromkeys(("", "none", "pinhole", "no_distortion"), (0,)),
+    **dict.fromkeys(("", "none", "pinhole", "perspective", "undistorted"), (0,)),
+    **dict.fromkeys(("brown_conrady", "inverse_brown_conrady", "modified_brown_conrady"), (0,)),
 }
 """How many numbers the models have, by their names; zeros may follow, or be missing."""
 STATED: Final = (10, 40)
@@ -138,15 +139,15 @@ class Ground:
             return wanted
         slopes, seen = self._curve
         aim, rays, missed = wanted.copy(), wanted.copy(), np.full(len(wanted), np.inf)
-        left = np.arange(len(wanted))
+        unsure = np.arange(len(wanted))
         for _ in range(STEPS):
-            length = np.hypot(*aim[left].T)
+            length = np.hypot(*aim[unsure].T)
             slope = np.interp(length, seen, slopes, right=np.nan)
-            rays[left] = aim[left] * (slope / np.where(length > 0, length, 1))[:, None]
-            off = wanted[left] - _bent(rays[left], self.model, self.distortion)
-            missed[left] = np.hypot(*off.T)
-            aim[left] += off
-            left = left[missed[left] > TOLERANCE / 1e6]
+            rays[unsure] = aim[unsure] * (slope / np.where(length > 0, length, 1))[:, None]
+            off = wanted[unsure] - _bent(rays[unsure], self.model, self.distortion)
+            missed[unsure] = np.hypot(*off.T)
+            aim[unsure] += off
+            unsure = unsure[missed[unsure] > TOLERANCE / 1e6]
         rays[~(missed < TOLERANCE)] = np.nan
         return rays
 
@@ -251,7 +252,7 @@ def _lens(
     length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
     if length is None:
         model = f"{known.model or 'without a name'} of {len(known.distortion)} numbers"
-        names = ", ".join(filter(None, COEFFICIENTS))
+        names = ", ".join(name for name, counts in COEFFICIENTS.items() if any(counts))
         return None, f"the distortion is not known: {model}; known are {names}"
     numbers = (*known.distortion[:last], *(0.0,) * (length - last))
     return replace(known, model=model, distortion=numbers), ""

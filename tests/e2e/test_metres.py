@@ -92,7 +92,7 @@ def test_a_fleet_counts_by_distance_with_the_camera_of_each_drive(metres: Path):
 @pytest.mark.parametrize(
     ("text", "said", "code"),
     [
-        ("height = -1", "bad.toml: ground.height: must be above 0", 1),
+        ("height = -1", "bad.toml: ground.height: must be at least 0.01", 1),
         ("hight = 1", "there is no such setting; choose centre, distortion, focal", 1),
         ("height = 1", "drive.mcap", 0),
         ("homography = [0, 0, 0, 0, 0, 0, 0, 0, 0]", "cannot be inverted", 1),

@@ -122,6 +122,7 @@ def test_a_pixel_that_no_ray_reaches_lies_nowhere(model: str, numbers: tuple[flo
         ("radtan", (-0.3, 0.1, 0.0, 0.01), ("plumb_bob", (-0.3, 0.1, 0.0, 0.01))),
         ("plumb_bob", (-0.3, 0.1, 0.0, 0.0, 0.0, 0.0), ("plumb_bob", (-0.3, 0.1, 0.0, 0.0))),
         ("none", (0.0,) * 5, ("", ())),
+        ("inverse_brown_conrady", (0.0,) * 5, ("", ())),
     ],
 )
 def test_zeros_may_follow_the_numbers_of_a_model_or_be_missing(

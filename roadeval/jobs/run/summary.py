@@ -317,8 +317,8 @@ def warnings(run: Run) -> tuple[str, ...]:
                 f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
-    if selection.calibration and selection.ground and selection.calibration_why:
-        warned.append(f"metres rest on a calibration of which is said: {selection.calibration_why}")
+    if selection.ground and (lens := selection.calibration) and selection.calibration_why:
+        warned.append(f"metres rest on {lens.topic}: {selection.calibration_why}")
     return (
         *((unlabelled, *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
