@@ -22,7 +22,7 @@ from roadeval.logs.topics.choose import words
 from roadeval.logs.topics.reader import Size, TopicInfo, TopicReader
 
 LOOKED_AT: Final = 100
-"""Messages that are read, at most, of each topic."""
+"""Messages of static transforms that are read, at most, of each topic."""
 FARTHEST, NOT_UNIT = 1e9, 0.01
 """Metres between two frames, and how far a quaternion's length may be from 1, at most."""
 OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
@@ -104,12 +104,13 @@ def _shared(one: str, other: str) -> int:
 def _lens_of(
     topic: TopicInfo, reader: TopicReader, image: TopicInfo
 ) -> tuple[str, Calibration | None, str]:
-    """Return a topic's ``frame_id`` and what its first message says that can be used.
+    """Return a topic's ``frame_id`` and what a message says that can be used.
 
-    Some drivers send zeros until they are ready.
+    Some drivers send zeros until they are ready: few are read, ever farther from the first one.
     """
     frame, why = "", "no message can be read"
-    for position in range(min(len(reader), LOOKED_AT)):
+    positions = {0, *(1 << power for power in range(7)), len(reader) - 1}
+    for position in sorted(positions & {*range(len(reader))}):
         try:
             message = reader.fields(position)
             frame = str(getattr(message, "header", message).frame_id)

@@ -402,9 +402,13 @@ def test_rectified_images_without_a_projection_have_no_lens(tmp_path: Path):
     )
 
 
-def test_the_first_message_that_can_be_used_counts(tmp_path: Path):
+@pytest.mark.parametrize(
+    ("before", "right", "after"), [(1, 1, 0), (2, 1, 1), (40, 60, 0), (300, 1, 0)]
+)
+def test_messages_of_zeros_are_passed_over(tmp_path: Path, before: int, right: int, after: int):
     zero = info(k=[0.0] * 9, size=(0, 0))
-    known, why = found(ros2(tmp_path / "a.mcap", {"/front/info": [zero, zero, info(), zero]}))
+    messages = [*[zero] * before, *[info()] * right, *[zero] * after]
+    known, why = found(ros2(tmp_path / "a.mcap", {"/front/info": messages}))
     assert known is not None
     assert (known.matrix, why) == (tuple(K), "")
 
