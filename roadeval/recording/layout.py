@@ -40,9 +40,12 @@ FORMAT: Final = 3
 FRAME: Final = "frame"
 STAMP: Final = "stamp"
 """Names of the timelines: the frame's number, and its header stamp in nanoseconds."""
-LOADER: Final = ("ros2_timestamp", "message_log_time")
-"""The names of two timelines in recordings that Rerun itself makes of MCAP files: the header stamp
-and the log time. With them both recordings are in step in one viewer."""
+LOG_TIME: Final = "message_log_time"
+HEADER_TIME: Final = "ros2_timestamp"
+FOXGLOVE_TIME: Final = "timestamp"
+"""The names of timelines in recordings that Rerun itself makes of MCAP files: the log time, and the
+header stamp of ROS's and of Foxglove's messages. With them both recordings are in step in one
+viewer."""
 
 CAMERA: Final = "/camera"
 TRUTH_PATH: Final = "/truth"
@@ -126,6 +129,8 @@ class Layout:
     clouds: tuple[str, ...] = ()
     """Topics of the log's point clouds. They are not recorded, but seen where Rerun's own loader of
     the log puts them beside."""
+    header_time: str = HEADER_TIME
+    """The name of the header stamp's timeline in Rerun's own recording of the log."""
     tables: Mapping[str, str] = field(default_factory=dict)
     """Header line of each table that grows with the frames, by the table's name."""
     properties: Mapping[str, str | int | float] = field(default_factory=dict)

@@ -233,7 +233,10 @@ class Recorder:
             for each in self._cameras.values()
             for path, codec in each.codecs.items()
         }
-        self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
+        header_time = next(iter(self._layouts.values())).header_time
+        self._rows, self._numbers = (
+            Batcher(limits, header_time) for limits in (IMAGES_AND_TEXT, NUMBERS)
+        )
         self._finished = self._failed = self._foretold = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}

@@ -20,6 +20,7 @@ from roadeval.recording.rrd_file import TEXT, RrdFile, whole
 from roadeval.results.facts import Facts, another_format
 from roadeval.results.tables import TableFacts, read_rows, read_table
 from roadeval.runtime.documents import check_texts, read_json
+from roadeval.version import VERSION
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,18 +70,22 @@ class Recording:
         self.path = Path(path)
         self._file = RrdFile(self.path)
         with whole(self.path, at.PROPERTIES):
-            form = int(self._file.static(at.PROPERTIES, "format") or 0)
+            form = self._file.static(at.PROPERTIES, "format")
         cameras = _cameras(self._file)
         if cameras and camera not in cameras:
             raise SeveralCamerasError(self.path, [*cameras])
         self._file.below = cameras.get(camera, "")
         text = self._file.document(at.LAYOUT)
         if text is None:
-            raise RecordingError(f"{self.path}: the recording ends before its first frame")
+            lacking = f"holds no run, or its {self._file.below + at.LAYOUT} was dropped"
+            ended = "the recording ends before its first frame"
+            raise RecordingError(f"{self.path}: {lacking if self._file.indexed else ended}")
         with whole(self.path, at.LAYOUT):
+            version = read_json(text).get("properties", {}).get("version")
+            if form is None and version == VERSION:  # a filter of Rerun's dropped the properties
+                form = at.FORMAT
             if form != at.FORMAT:
-                version = read_json(text).get("properties", {}).get("version")
-                sentence = another_format(version, later=form > at.FORMAT)
+                sentence = another_format(version, later=(form or 0) > at.FORMAT)
                 raise RecordingError(f"{self.path}: {sentence}")
             self.layout = Layout.from_json(text)
 
@@ -104,7 +109,13 @@ class Recording:
         """The header stamps of the frames that have images, in nanoseconds."""
         if (listed := self._file.document(at.SHOWN)) is not None:
             with whole(self.path, at.SHOWN):
-                return {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
+                shown = {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
+            if not self._file.span(at.CAMERA).holds_all(shown):
+                raise RecordingError(
+                    f"{self.path}: lacks images of frames that it lists: it is a part, as `rerun "
+                    "rrd split` makes it; give the whole recording"
+                )
+            return shown
         stamps: dict[int, int] = {}
         for batch in self._file.batches(at.CAMERA, _CAMERA, static=False):
             frames, own = (batch.column(n).cast("int64").to_pylist() for n in (at.FRAME, at.STAMP))

@@ -18,7 +18,7 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
 
-from roadeval.recording.layout import FRAME, LOADER, MOST_WAITING, STAMP
+from roadeval.recording.layout import FRAME, HEADER_TIME, LOG_TIME, MOST_WAITING, STAMP
 
 When = tuple[int, int, int]
 """A frame's number, header stamp and log time, the times in nanoseconds."""
@@ -65,8 +65,8 @@ NUMBERS: Final = WaitLimits(64, 1024)
 class PendingRows:
     """The rows of one entity that wait."""
 
-    def __init__(self, path: str, columns: Columns) -> None:
-        self._path, self._columns = path, columns
+    def __init__(self, path: str, columns: Columns, header_time: str = HEADER_TIME) -> None:
+        self._path, self._columns, self._header_time = path, columns, header_time
         self._rows: list[tuple[When, Any]] = []
         self.size = 0
 
@@ -79,7 +79,7 @@ class PendingRows:
         """Return all rows as one chunk."""
         whens, values = zip(*self._rows, strict=True)
         frames, stamps, logged = np.array(whens).T
-        named = zip((STAMP, *LOADER), (stamps, stamps, logged), strict=True)
+        named = zip((STAMP, self._header_time, LOG_TIME), (stamps, stamps, logged), strict=True)
         times = [
             rr.TimeColumn(FRAME, sequence=frames),
             *(rr.TimeColumn(n, timestamp=own.astype("datetime64[ns]")) for n, own in named),
@@ -93,13 +93,13 @@ class PendingRows:
 class Batcher(dict[Key, PendingRows]):
     """The rows of entities with the same `WaitLimits`: due together, or one entity's when full."""
 
-    def __init__(self, limits: WaitLimits) -> None:
+    def __init__(self, limits: WaitLimits, header_time: str = HEADER_TIME) -> None:
         super().__init__()
-        self._limits = limits
+        self._limits, self._header_time = limits, header_time
         self._frames = self._due = 0
 
     def __missing__(self, key: Key) -> PendingRows:
-        self[key] = PendingRows(*key)
+        self[key] = PendingRows(*key, self._header_time)
         return self[key]
 
     @property

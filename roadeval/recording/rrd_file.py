@@ -12,8 +12,8 @@ it meets what it never expects.
 from __future__ import annotations
 
 import struct
-from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf
 from pathlib import Path
@@ -23,7 +23,7 @@ import numpy as np
 import pyarrow as pa
 
 from roadeval.errors import RoadevalError
-from roadeval.recording.layout import APPLICATION, FRAME, DamagedError, RecordingError
+from roadeval.recording.layout import APPLICATION, FRAME, LAYOUT, DamagedError, RecordingError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 
@@ -61,6 +61,10 @@ class Span(NamedTuple):
         """Whether a frame is one of them."""
         return self.first <= frame <= self.last
 
+    def holds_all(self, frames: Collection[int]) -> bool:
+        """Whether all frames are some of them."""
+        return not frames or (self.holds(min(frames)) and self.holds(max(frames)))
+
 
 ALWAYS: Final = Span()
 """That of what was logged once, for every frame."""
@@ -73,7 +77,8 @@ class Place(NamedTuple):
     """Of its entity."""
     offset: int
     size: int
-    span: Span = ALWAYS
+    span: Span | None = ALWAYS
+    """None of rows without frames, which are not this program's: a log's, or a user's."""
 
 
 class RrdFile:
@@ -90,8 +95,20 @@ class RrdFile:
         self._kept: dict[str, tuple[Span, dict[int, pa.ListScalar]]] = {}
         """Of each entity the images of the message that was read last, by frame."""
         places, self.indexed = _read_places(path)
-        for place in sorted(places, key=lambda each: (each.span.first, each.offset)):
+        spans = [(place.span.first, place.offset, place) for place in places if place.span]
+        if len(spans) < len(places) and all(first == -inf for first, *_ in spans):
+            raise RecordingError(
+                f"{path}: its timeline {FRAME} was dropped; give the recording as it was made"
+            )
+        for _, _, place in sorted(spans, key=lambda span: span[:2]):
             self._places[place.path].append(place)
+
+    def span(self, path: str) -> Span:
+        """Return from which frame to which an entity has rows."""
+        spans = [place.span for place in self._places.get(self.below + path, ()) if place.span]
+        return Span(
+            min((s.first for s in spans), default=inf), max((s.last for s in spans), default=-inf)
+        )
 
     def batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
         """Yield the rows of an entity that have a value, a batch a message.
@@ -109,10 +126,11 @@ class RrdFile:
         kept = self._kept.get(path)
         if kept is None or not kept[0].holds(frame):
             places = self._places.get(self.below + path, ())
-            here = [each for each in places if each.span != ALWAYS and each.span.holds(frame)]
+            spans = [(p.span, p) for p in places if p.span and p.span != ALWAYS]
+            here = [place for span, place in spans if span.holds(frame)]
             if not here:
                 return None
-            firsts, lasts = zip(*(each.span for each in here), strict=True)
+            firsts, lasts = zip(*(span for span, _ in spans if span.holds(frame)), strict=True)
             images: dict[int, pa.ListScalar] = {}
             for batch in self._at(component, here):
                 frames = batch.column(FRAME).to_pylist()
@@ -222,20 +240,31 @@ def _read_places(path: Path) -> tuple[list[Place], bool]:
             stores = _indexed(file)
             indexed = stores is not None
             found = _written(file) if stores is None else stores
-            places, made_by = list[Place](), "an unknown program"
+            recordings, made_by = defaultdict[bytes, list[Place]](list), "an unknown program"
             for store, own in found:
                 kind, application = _about(store)
                 if kind == _RECORDING and application == APPLICATION:
-                    places += own
+                    recordings[bytes(store)] += own
                 elif kind == _RECORDING:
                     made_by = application
     except FileNotFoundError as error:
         raise RecordingError(f"{path}: no such recording") from error
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from error
-    if not places:
+    if not recordings:
         raise RecordingError(f"{path}: a recording by {made_by}, not by {APPLICATION}")
-    return places, indexed
+    layouts = {
+        store: Counter(place.path for place in places if place.path.endswith(LAYOUT))
+        for store, places in recordings.items()
+    }
+    runs = [store for store, paths in layouts.items() if paths]
+    held = sum(max(layouts[store].values()) for store in runs)
+    if held > 1:
+        raise RecordingError(
+            f"{path}: holds {held} recordings, or parts of one, as `rerun rrd merge` joins them; "
+            "give them one by one"
+        )
+    return recordings[(runs or [*recordings])[0]], indexed
 
 
 def _about(store: memoryview) -> tuple[int, str]:
@@ -269,9 +298,15 @@ def _listed(index: memoryview) -> list[Place]:
     names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
     columns = (batch.column(name).to_pylist() for name in names)
     return [
-        Place(path, offset, size, ALWAYS if static or not frames else Span(*frames))
+        Place(path, offset, size, ALWAYS if static else _span(frames))
         for path, offset, size, static, *frames in zip(*columns, strict=True)
     ]
+
+
+def _span(frames: Sequence[int | None]) -> Span | None:
+    """Return the frames between two; None without any."""
+    numbers = [frame for frame in frames if frame is not None]
+    return Span(min(numbers), max(numbers)) if numbers else None
 
 
 def _written(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Place]]]:
@@ -285,10 +320,11 @@ def _written(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Place]]]:
         if kind == _ROWS:
             message = file.read(size)
             path, batch = rows_of(message)
-            span = ALWAYS
-            if FRAME in batch.schema.names:
-                frames = batch.column(FRAME).to_pylist()
-                span = Span(min(frames), max(frames))
+            timed = any(
+                (each.metadata or {}).get(b"rerun:kind") == b"index" for each in batch.schema
+            )
+            frames = batch.column(FRAME).to_pylist() if FRAME in batch.schema.names else ()
+            span = _span(frames) if timed else ALWAYS
             store = dict(protobuf_fields(memoryview(message)))[_STORE]
             yield store, [Place(path, offset, size, span)]
         offset += size + _HEADER.size

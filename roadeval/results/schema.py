@@ -55,6 +55,10 @@ class Column(NamedTuple):
         return self.kind in (Kind.NAME, Kind.TEXT)
 
 
+LATER: Final = ("truth",)
+"""Columns that the first results of this format lack: they hold 0 then, for unknown."""
+
+
 class TableSchema(NamedTuple):
     """A table: ``<name>.csv`` in the results of a drive, ``<name>.parquet`` in those of a fleet."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from roadeval.data import Rows, is_plain
 from roadeval.data.result import Cells
 from roadeval.errors import RoadevalError
-from roadeval.results.schema import KEY, TABLES, TAG, TYPES, Column, Kind, TableSchema
+from roadeval.results.schema import KEY, LATER, TABLES, TAG, TYPES, Column, Kind, TableSchema
 from roadeval.runtime.documents import BYTES, LONG, check_texts
 from roadeval.runtime.files import NewFile, check_input
 
@@ -140,6 +140,11 @@ def _check(where: Path | str, content: bytes, stated: TableFacts | None) -> None
     if found == stated or (stated is None and not rows):
         return
     wanted = stated.rows if stated else 0
+    if rows != wanted and isinstance(where, str):
+        raise ResultsError(
+            f"{where}: it is a part, or several runs in one, as `rerun rrd` splits and merges them "
+            f"({rows} of {wanted} rows); give the recording as it was made"
+        )
     difference = "its content differs" if rows == wanted else f"{rows} of {wanted} rows"
     raise ResultsError(f"{where}: does not agree with its summary ({difference}); {_ANEW}")
 
@@ -155,6 +160,7 @@ def _coded(table: TableSchema) -> pa.Schema:
 
 def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     """Parse CSV; a ValueError says what is wrong with it."""
+    import pyarrow as pa
     from pyarrow import csv
 
     options = csv.ConvertOptions(column_types=_coded(table))
@@ -163,6 +169,8 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
         raise ValueError("its last line is cut off")
     if len({*parsed.column_names}) < len(parsed.column_names):
         raise ValueError("a column is there twice")
+    for name in sorted({*table.names} & {*LATER} - {*parsed.column_names}):
+        parsed = parsed.append_column(name, pa.array(np.zeros(len(parsed), np.int64)))
     if missing := [name for name in table.names if name not in parsed.column_names]:
         raise ValueError(f"no column {', '.join(missing)}")
     for column in table.columns:

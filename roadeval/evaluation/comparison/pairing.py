@@ -197,7 +197,8 @@ def truth_differs(base: Rows, new: Rows) -> int:
         rows.take(np.unique(rows["frame"], return_index=True)[1]) for rows in (base, new)
     )
     there, here = matched(mine["stamp_ns"], theirs["stamp_ns"])
-    return int(np.count_nonzero(mine["truth"][there] != theirs["truth"][here]))
+    one, other = mine["truth"][there], theirs["truth"][here]
+    return int(np.count_nonzero((one != other) & (one != 0) & (other != 0)))  # 0 is unknown
 
 
 def _labels_differ(base: FourCounts, new: FourCounts) -> Flags:

@@ -28,6 +28,7 @@ from roadeval.jobs.run.frame import bind, external_layout, external_variant, run
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
 from roadeval.recording import Layout
+from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME
 from roadeval.results.rows import Key, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
@@ -158,6 +159,7 @@ class Run:
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""
         width, height = self.selection.size or (0, 0)
+        of_foxglove = self.selection.image.schema.startswith("foxglove.")
         return Layout(
             self.log.name,
             width,
@@ -173,6 +175,7 @@ class Run:
             ground=self.selection.ground_as_read,
             extent=(*self.config.evaluation.plan, self.config.evaluation.plan_width),
             clouds=tuple(each.name for each in self.log.topics if each.is_cloud),
+            header_time=FOXGLOVE_TIME if of_foxglove else HEADER_TIME,
             tables={name: TABLES[name].header for name in STREAMED},
             properties={
                 "version": VERSION,
