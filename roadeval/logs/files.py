@@ -31,7 +31,14 @@ _NOTE: Final = 16 << 20
 _LIST: Final = re.compile(r"^ *relative_file_paths:[ \r]*\n((?: *- .*\n?)+)", re.MULTILINE)
 _ITEM: Final = re.compile(r"^ *-(.*)$", re.MULTILINE)
 
-_NUMBERED: Final = re.compile(r"(.*_)(\d{1,9})\.mcap")
+_NUMBERED: Final = (
+    (re.compile(r"(?P<name>.*)_(?P<number>\d{1,9})\.mcap"), "{name}_{number}.mcap"),
+    (
+        re.compile(r"(?P<number>\d{1,9})_(?P<name>.+)_\d{4}_\d\d_\d\d-\d\d_\d\d_\d\d\.mcap"),
+        "{number}_{name}_*.mcap",
+    ),
+)
+"""Names that rosbag2 gives the files of a log, of late with the time at which each begins."""
 
 _OTHERS: Final = (
     (0, b"#ROSBAG V", "a ROS 1 bag: mcap convert {path} {stem}.mcap"),
@@ -94,12 +101,14 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
 
 def _missing(files: Sequence[Path]) -> Iterator[Path]:
     """Yield the files that lack among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
-    found = [match for file in files if (match := _NUMBERED.fullmatch(file.name))]
-    numbers = {int(match[2]) for match in found}
-    one_name = len({match[1] for match in found}) == 1
-    if one_name and len(found) == len(files) and 0 in numbers and max(numbers) < 2 * len(files):
-        lacking = sorted({*range(max(numbers))} - numbers)
-        yield from (files[0].with_name(f"{found[0][1]}{number}.mcap") for number in lacking)
+    for names, name_of in _NUMBERED:
+        found = [match for file in files if (match := names.fullmatch(file.name))]
+        numbers = {int(match["number"]) for match in found}
+        one_name = len({match["name"] for match in found}) == 1
+        if one_name and len(found) == len(files) and 0 in numbers and max(numbers) < 2 * len(files):
+            for number in sorted({*range(max(numbers))} - numbers):
+                name = name_of.format(name=found[0]["name"], number=number)
+                yield files[0].with_name(name)
 
 
 def _listed(folder: Path, there: Set[Path]) -> set[Path]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -15,6 +17,7 @@ import numpy as np
 
 from roadeval.images import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
+from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import check_content, files_of
 from roadeval.logs.frames import TRUTH, FrameStream, Selection, looked_at, settle, with_label
@@ -58,6 +61,18 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
         raise LogError(f"{path}: {error}") from error
 
 
+def _states(files: Sequence[Path]) -> dict[Path, tuple[int, ...]]:
+    """Return what tells that a file was written anew, of those that no recorder still writes."""
+    states: dict[Path, tuple[int, ...]] = {}
+    for file in files:
+        with suppress(OSError), file.open("rb") as content:
+            content.seek(-len(MAGIC), os.SEEK_END)
+            if content.read() == MAGIC:
+                facts = os.fstat(content.fileno())
+                states[file] = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
+    return states
+
+
 class Log:
     """An open log; close it, or use it in a ``with`` statement.
 
@@ -88,6 +103,7 @@ class Log:
         is_file = path.is_file() or opened is not None
         self.name = visible(path.stem if is_file else path.resolve().name)
         self.config = config
+        self._as_opened = {} if opened else _states(files)
         self._limits = Limits(config.frames.max_pixels, turn=not config.frames.unturned)
         self._lost_files = damage
         self._beside: list[Log] = []
@@ -124,8 +140,15 @@ class Log:
         """The losses of the log, a sentence each; empty if nothing is lost.
 
         Damage inside chunks is found when they are read, or by `verify`. The checksum of all data
-        is looked at where chunks have none of their own, and in a log of at most `SMALL` bytes.
+        is looked at where chunks have none of their own, and in a log of at most `SMALL` bytes. A
+        `LogError` if one of its files was written anew since it was opened.
         """
+        for file, before in self._as_opened.items():
+            with suppress(OSError):
+                facts = file.stat()
+                now = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
+                if now != before and now[0] == before[0]:  # one of another inode is not read
+                    raise LogError(f"{file}: it changed while it was read; run again")
         for container in self._containers:
             if self.size <= SMALL or not container.is_covered:
                 container.verify_data()

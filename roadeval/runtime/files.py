@@ -36,6 +36,9 @@ _REPLACED: Final = ".replaced"
 _PATIENCE_S: Final = 0.2
 """Time between two attempts to claim an output."""
 
+LFS_HEAD: Final = b"version https://git-lfs"
+LFS: Final = "is a pointer to a file in Git LFS: git lfs pull"
+
 _KINDS: Final = {
     stat.S_IFDIR: "a folder",
     stat.S_IFREG: "a file",
@@ -62,9 +65,13 @@ def writing(place: object, kind: type[Exception], advice: str = "") -> Iterator[
 def check_input(path: str | Path) -> None:
     """Raise an OSError if a path does not lead to a file that can be read from begin to end.
 
-    A pipe may never give anything, and a device may never end.
+    A pipe may never give anything, and a device may never end. A pointer of Git LFS stands for a
+    file that is elsewhere.
     """
     _check_kind(Path(path), "a file", "")
+    with Path(path).open("rb") as file:
+        if file.read(len(LFS_HEAD)) == LFS_HEAD:
+            raise OSError(errno.EINVAL, LFS, str(path))
 
 
 def check_output(path: Path, *, folder: bool = False) -> None:

@@ -105,3 +105,10 @@ def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
     with files.claimed_file(tmp_path / "new" / "deep" / "file"):
         (tmp_path / "new" / "other").touch()
     assert names(tmp_path / "new") == ["other"]
+
+
+def test_a_pointer_of_git_lfs_is_no_input(tmp_path):
+    pointer = tmp_path / "net.onnx"
+    pointer.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+    with pytest.raises(OSError, match="is a pointer to a file in Git LFS: git lfs pull"):
+        files.check_input(pointer)

@@ -1,5 +1,6 @@
 """What is saved of damaged and odd logs, and what is said about the rest."""
 
+import os
 import re
 import subprocess
 import sys
@@ -222,6 +223,64 @@ def test_a_file_that_lacks_between_the_others_is_told(tmp_path: Path) -> None:
     middle.unlink()
     with open_log(folder) as log:
         assert log.losses[0] == f"{middle.name}: the file is missing (byte 0)"
+
+
+@pytest.mark.parametrize(
+    ("there", "told"),
+    [
+        ([0, 1, 3], [2]),
+        ([0, 3], [1, 2]),
+        ([0, *range(2, 12)], [1]),
+        ([0, 1, 2], []),
+        ([1, 3], []),  # a part that somebody took out: where it begins is not known
+    ],
+)
+@pytest.mark.parametrize(
+    ("name", "lacking"),
+    [("run_{}.mcap", "run_{}.mcap"), ("{0}_run_2026_03_01-10_00_{0:02}.mcap", "{}_run_*.mcap")],
+)
+def test_a_file_that_lacks_is_told_by_old_names_of_rosbag2_and_by_new(
+    tmp_path: Path, name: str, lacking: str, there: list[int], told: list[int]
+) -> None:
+    """Names of splits since rosbag2 0.33.1: ``{n}_{name}_{date}.mcap``, n not padded."""
+    for number in there:
+        (tmp_path / name.format(number)).write_bytes(LOGS["broken/ok.mcap"].data())
+    with open_log(tmp_path) as log:
+        missing = [each for each in log.losses if "missing" in each]
+    assert missing == [f"{lacking.format(number)}: the file is missing (byte 0)" for number in told]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda path, whole: path.write_bytes(whole[:5000] + bytes(8) + whole[5008:]),
+        lambda path, whole: path.write_bytes(whole[: len(whole) // 2]),
+        lambda path, whole: path.write_bytes(whole + whole),
+    ],
+    ids=["other bytes", "cut off", "longer"],
+)
+def test_a_log_that_is_written_anew_while_it_is_read_is_refused(tmp_path: Path, change) -> None:
+    path = make("broken/ok.mcap", tmp_path)
+    whole = path.read_bytes()
+    with open_log(path) as log:
+        change(path, whole)
+        os.utime(path, ns=(1, 1))  # a coarse clock would hide it
+        with pytest.raises(LogError, match=r"it changed while it was read; run again$"):
+            assert log.losses
+
+
+def test_a_log_that_grows_or_is_replaced_while_it_is_read_is_as_it_was(tmp_path: Path) -> None:
+    path = make("broken/ok.mcap", tmp_path)
+    whole = path.read_bytes()
+    with open_log(path) as log:
+        (tmp_path / "new.mcap").write_bytes(whole[:100])
+        (tmp_path / "new.mcap").replace(path)
+        assert log.losses == ()
+    path.write_bytes(whole[: len(whole) // 2])
+    with open_log(path) as log:
+        before = log.losses
+        path.write_bytes(whole)
+        assert log.losses == before
 
 
 def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch) -> None:
