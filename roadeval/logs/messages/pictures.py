@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import chain
 from typing import Any, Final, Protocol
 
@@ -23,6 +23,7 @@ from roadeval.logs.container.records import Buffer, Message
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages import encodings
 from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, TopicKind, parts_of
+from roadeval.logs.messages.frame_numbers import FrameNumbers
 from roadeval.logs.settings import parse_time
 from roadeval.runtime.discovery import found_in
 
@@ -50,6 +51,8 @@ class CompressedPicture:
     format: str
     data: Buffer
     frame_id: str = ""
+    numbers: tuple[int | None, int | None] = None, None
+    """Of a packet, as its encoder and its recorder count them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +112,8 @@ def picture_in(message: Any) -> LoggedPicture:
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = message.format if hasattr(message, "format") else message.encoding
             data = _as(BUFFERS, message.data)
-            return CompressedPicture(stamp_ns, _name(name), data, frame_id)
+            pts = int(message.pts) if hasattr(message, "pts") else None
+            return CompressedPicture(stamp_ns, _name(name), data, frame_id, (pts, None))
         return RawPicture(
             stamp_ns,
             int(message.width),
@@ -235,6 +239,7 @@ def _one_error() -> Iterator[None]:
 
 PATIENCE: Final = 16
 """Packets to feed beyond a frame before it counts as not decodable."""
+LOST: Final = "a frame that it builds upon is lost"
 FARTHEST_KEY: Final = 3000
 """Packets to look back for a keyframe."""
 _DECODERS: Final = {"av1": "libdav1d"}
@@ -305,18 +310,41 @@ class Video:
                     return candidate
         return position
 
+    @cached_property
+    def _counted(self) -> tuple[bool, bool]:
+        """Whether encoder and recorder count the packets one by one, as the first ones show."""
+        first = []
+        for position in range(min(PATIENCE, len(self._packets))):
+            with suppress(FrameError):
+                first.append(self._packets.picture(position))
+        steps = [*map(_steps, first, first[1:])]
+        one, other = ([pair[k] == 1 for pair in steps] for k in (0, 1))
+        return 4 * sum(one) >= 3 * len(steps) > 0, 4 * sum(other) >= 3 * len(steps) > 0
+
+    def _follows(self, packet: Picture, last: Picture | None, numbers: FrameNumbers) -> bool:
+        """Whether no packet that this one builds upon is lost before it, as far as is known."""
+        is_gap = codec_of(packet) == "h264" and numbers.is_gap(bytes(packet.data))
+        if numbers.known or last is None:
+            return not is_gap
+        steps = zip(self._counted, _steps(last, packet), strict=True)
+        return not any(counted and step is not None and step > 1 for counted, step in steps)
+
     def _decode(self, begin: int) -> Iterator[bool]:
         """Decode from a keyframe on, a packet a step; the frames come into ``_ready``."""
         decoder: Any = None
+        last, numbers = None, FrameNumbers()
         waiting, broken = dict[int, Picture](), ""
         for position in range(begin, len(self._packets)):
             self._next = position + 1
             try:
                 packet = self._packets.picture(position)
+                follows, last = self._follows(packet, last, numbers), packet
                 if is_keyframe(packet):
                     broken = ""
                 elif decoder is None:
                     broken = "the video has no keyframe before it"
+                elif not follows:
+                    broken = broken or LOST
                 if broken:
                     raise FrameError(broken)
                 decoder = decoder or self._decoder(packet)
@@ -326,7 +354,7 @@ class Video:
                 self._take(decoder, unit, waiting)
             except (BadMessage, FrameError) as error:
                 self._ready[position] = FrameError(str(error))
-                broken = broken or "a frame that it builds upon is lost"
+                broken = broken or LOST
             yield True
         if decoder is not None:
             with suppress(BadMessage):
@@ -372,6 +400,17 @@ class Video:
         except ImageError as too_large:
             return str(too_large)
         return reason
+
+
+def _steps(one: Picture, other: Picture) -> tuple[int | None, int | None]:
+    """Return by how much the numbers of two packets differ; None where one has none."""
+    assert isinstance(one, CompressedPicture)
+    assert isinstance(other, CompressedPicture)
+    first, second = (
+        None if a is None or b is None else b - a
+        for a, b in zip(one.numbers, other.numbers, strict=True)
+    )
+    return first, second
 
 
 def turn_of(frame: Any) -> int:

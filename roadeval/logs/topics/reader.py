@@ -18,6 +18,7 @@ from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import PICTURES, TopicKind
 from roadeval.logs.messages.pictures import (
+    CompressedPicture,
     Decoder,
     LoggedPicture,
     RawPicture,
@@ -280,7 +281,11 @@ class TopicReader:
         """Read the picture of a message; a `FrameError` if it cannot be read or decoded."""
         message = self.message(position)
         try:
-            return self._decoder(position).picture(message.data)
+            picture = self._decoder(position).picture(message.data)
+            if isinstance(picture, CompressedPicture):
+                numbers = picture.numbers[0], message.sequence
+                return replace(picture, numbers=numbers)
+            return picture
         except BadMessage as error:
             raise self._error(position, str(error)) from error
 

@@ -10,7 +10,7 @@ from roadeval.data import Frame
 from roadeval.images import Limits
 from roadeval.logs import FrameError, FrameSettings, LogConfig, TopicKind, open_log
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, Video, is_keyframe
-from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar
+from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar, packets
 from tests.fixtures.shared import both
 
 H264 = "fox_pb_CompressedVideo_h264.mcap"
@@ -90,6 +90,54 @@ def test_a_video_without_its_keyframe_is_not_guessed_at(log: Path) -> None:
     packets = Packets(log, {0})
     with pytest.raises(FrameError, match=r"keyframe|builds upon"):
         Video(packets, Limits()).picture(1)
+
+
+class Missing:
+    """The packets of a video without one of them, of which no message is left."""
+
+    def __init__(self, codec: str, lost: int, counted: str) -> None:
+        self.left = [number for number in range(VIDEO_FRAMES) if number != lost]
+        numbers = {
+            number: (number if counted == "pts" else None, number if counted == "log" else None)
+            for number in self.left
+        }
+        data = packets(codec)
+        self.packets = [CompressedPicture(n, codec, data[n], "", numbers[n]) for n in self.left]
+
+    def __len__(self) -> int:
+        return len(self.packets)
+
+    def picture(self, position: int) -> Picture:
+        return self.packets[position]
+
+
+@pytest.mark.parametrize("lost", range(VIDEO_FRAMES))
+@pytest.mark.parametrize(
+    ("codec", "counted"),
+    [
+        ("h264", ""),
+        ("h264", "log"),
+        ("vp9", "pts"),
+        ("vp9", "log"),
+        ("h265", "log"),
+        ("av1", "pts"),
+    ],
+)
+def test_what_builds_upon_a_packet_that_is_missing_is_lost(
+    codec: str, counted: str, lost: int
+) -> None:
+    """FFmpeg 7 conceals a missing reference of H.264 and VP9, and raises and flags nothing."""
+    missing = Missing(codec, lost, counted)
+    video, found = Video(missing, Limits()), []
+    for position, number in enumerate(missing.left):
+        try:
+            video.picture(position)
+        except FrameError:
+            continue
+        found.append(number)
+    whole = Missing(codec, VIDEO_FRAMES, counted).packets
+    keys = (n for n in range(lost + 1, VIDEO_FRAMES) if is_keyframe(whole[n]))
+    assert found == [*range(lost), *range(next(keys, VIDEO_FRAMES), VIDEO_FRAMES)]
 
 
 CODECS = [f"made:flavours/fox_pb_CompressedVideo_{codec}.mcap" for codec in ENCODERS]
