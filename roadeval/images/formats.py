@@ -24,6 +24,8 @@ class Limits:
     """Most pixels. An image's own head says how many it has, so none is decoded that has more."""
     turn: bool = False
     """Whether an image whose EXIF orientation says so is turned, as viewers do."""
+    full_range: bool = False
+    """Whether a video's luma spans 0 to 255, whatever the video says, and not 16 to 235."""
 
     def check(self, width: int, height: int) -> None:
         """Refuse a size; an `ImageError` if it is empty or too large."""

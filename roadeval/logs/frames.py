@@ -16,6 +16,7 @@ import numpy.typing as npt
 from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
+from roadeval.geometry.settings import GroundSettings
 from roadeval.images import format_of, orientation_of
 from roadeval.logs.errors import BadMessage, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import TopicKind
@@ -212,11 +213,18 @@ def settle(
     known = calibration_of(image, topics, readers)
     if any(known) and image.turned != 1 and camera.images.limits.turn:
         known = None, "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
-    ground, how = ground_of(known[0], config.ground, image.size)
-    if any(config.ground.distortion) and is_rectified(image.name):
-        how += "; `ground.distortion` is applied although the topic's name says rectified"
+    ground = _ground_of(image, known[0], config.ground)
     white = _white_of(readers[image.name], config.frames.white)
-    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, ground, how, white)
+    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, *ground, white)
+
+
+def _ground_of(
+    image: TopicInfo, known: Calibration | None, asked: GroundSettings
+) -> tuple[Ground | None, str]:
+    ground, how = ground_of(known, asked, image.size)
+    if any(asked.distortion) and is_rectified(image.name):
+        how += "; `ground.distortion` is applied although the topic's name says rectified"
+    return ground, how
 
 
 BITS: Final = (8, 10, 12, 14, 16)
@@ -290,6 +298,8 @@ class Accounting:
     """Of the frames returned, those of another width and height than the topic's first."""
     blank: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that are black or white."""
+    of_video: Mapping[str, str] = field(default_factory=dict)
+    """Sentences on a video, by what they are of."""
     in_chunks: set[int] = field(default_factory=set)
     """Those of them whose chunk cannot be read, which is a damage of the log by itself."""
 
@@ -310,6 +320,7 @@ class Accounting:
                 f"{self.repeated} of the {self.read} images repeat an earlier one, by stamp and "
                 "content; each of them is counted"
             )
+        yield from self.of_video.values()
         for level in ("black", "white"):
             blank = [number for number, own in self.blank.items() if own == level]
             if blank and FEW * len(blank) >= self.read:
@@ -446,6 +457,8 @@ class FrameStream:
             name: (source, source.partners(begin)) for name, source in selection.labels.items()
         }
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
+        if isinstance(self._pictures, Video):
+            self.accounting.of_video = self._pictures.notes
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
         read: Iterable[int] = numbers

@@ -104,7 +104,11 @@ class Log:
         self.name = visible(path.stem if is_file else path.resolve().name)
         self.config = config
         self._as_opened = {} if opened else _states(files)
-        self._limits = Limits(config.frames.max_pixels, turn=not config.frames.unturned)
+        self._limits = Limits(
+            config.frames.max_pixels,
+            turn=not config.frames.unturned,
+            full_range=config.frames.full_range,
+        )
         self._lost_files = damage
         self._beside: list[Log] = []
         self._of_rig = False

@@ -232,6 +232,9 @@ class FrameSettings:
     unturned: Annotated[bool, Flag("--unturned", group="Input")] = False
     """Leave images as they are stored, where their EXIF orientation, or a video's display matrix,
     asks to turn them. Viewers and annotation tools turn them; calibrations are of the sensor."""
+    full_range: Annotated[bool, Flag("--full-range", group="Input")] = False
+    """Take the luma of a video to span 0 to 255, as that of converted JPEGs does, and not 16 to
+    235, which is what a video means that does not say."""
     white: Annotated[float | None, Interval(gt=0), Flag("--white", "V", "Input")] = None
     """The sample that is white in images of more than 8 bits. Default: the greatest of 8, 10, 12,
     14 or 16 bits, whichever hold the samples of some of the camera's images; of fractions 1."""

@@ -56,6 +56,7 @@ OTHER = {
     "frames.max_pixels": 1_000_000,
     "frames.unturned": True,
     "frames.white": 4095.0,
+    "frames.full_range": True,
     "ground": {"height": 1.4, "pitch": 1.2, "focal": [485.0]},
     "run.jobs": 1,
     "run.patience_s": 5.0,

@@ -8,7 +8,10 @@ from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
 
 
-@takes("truth", "topics", "cameras", "ground", "labels", "frames.max_pixels")
+@takes(
+    *("truth", "topics", "cameras", "ground", "labels", "frames.max_pixels"),
+    *("frames.white", "frames.unturned", "frames.full_range"),
+)
 def info(
     drive: arguments.Drive,
     *,

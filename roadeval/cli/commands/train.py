@@ -14,6 +14,7 @@ from roadeval.cli.options import Given, takes
     *("truth", "cameras", "topics.truth", "topics.masks", "labels"),
     *("topics.sync_tolerance_ms", "topics.resize_truth"),
     *("frames.scale", "frames.max_pixels"),
+    *("frames.white", "frames.unturned", "frames.full_range"),
     *("frames.start", "frames.end", "run.patience_s"),
 )
 def train(

@@ -15,6 +15,7 @@ from functools import cache, cached_property, lru_cache
 from itertools import chain
 from typing import Any, Final, Protocol
 
+import numpy as np
 from mcap.records import Channel, Schema
 
 from roadeval.data import Rgb
@@ -239,6 +240,10 @@ def _one_error() -> Iterator[None]:
 
 PATIENCE: Final = 16
 """Packets to feed beyond a frame before it counts as not decodable."""
+_LIMITED: Final = 16, 235
+"""The luma of black and white in a video that does not say its range."""
+_STRAY: Final = 0.02
+"""Share of the luma beyond it that compression explains."""
 LOST: Final = "a frame that it builds upon is lost"
 FARTHEST_KEY: Final = 3000
 """Packets to look back for a keyframe."""
@@ -271,8 +276,11 @@ class Video:
         import av
 
         self._av: Final = av
+        self._whole = av.video.reformatter.ColorRange.JPEG
         self._packets = packets
         self._limits = limits
+        self.notes: Final = dict[str, str]()
+        """What a user should know of the frames so far, by its kind."""
         self._ready: dict[int, DecodedPicture | FrameError]
         self._begin(0)
 
@@ -300,6 +308,7 @@ class Video:
     def _begin(self, position: int) -> None:
         self._next, self._damaged = position, False
         self._ready = {}
+        self._shown = position, 0
         self._steps = self._decode(position)
 
     def _keyframe(self, position: int) -> int:
@@ -384,10 +393,37 @@ class Video:
                 what = "its video" if frame.is_corrupt else "a frame that it builds upon"
                 self._ready[frame.pts] = FrameError(f"{what} is damaged")
             elif packet is not None:
-                pixels, turned = frame.to_ndarray(format="rgb24"), turn_of(frame)
+                self._look(frame, packet)
+                whole = {"src_color_range": self._whole} if self._limits.full_range else {}
+                pixels, turned = frame.to_ndarray(format="rgb24", **whole), turn_of(frame)
                 pixels = upright(pixels, turned if self._limits.turn else 1)
                 found = DecodedPicture(packet.stamp_ns, packet.data, pixels, turned)
                 self._ready[frame.pts] = found
+
+    def _look(self, frame: Any, packet: Picture) -> None:
+        """Note what is doubtful of a frame, which come in the order in which they are shown."""
+        last, stamp = self._shown
+        self._shown = frame.pts, packet.stamp_ns
+        if frame.pts < last:
+            self.notes["order"] = (
+                "the video has B-frames, and stamps in the order of decoding: frames bear stamps "
+                "and numbers of others near by; record it without B-frames"
+                if packet.stamp_ns <= stamp
+                else "the video has B-frames: frames are numbered in the order of decoding, and "
+                "labels that are paired by number in the order of stamps, in which it is shown"
+            )
+        if frame.color_range or self._limits.full_range or not frame.format.name.startswith("yuv4"):
+            return
+        plane = frame.planes[0]
+        luma = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[::4, : frame.width : 4]
+        share = ((luma < _LIMITED[0]) | (luma > _LIMITED[1])).mean()
+        if share > _STRAY:
+            self.notes.setdefault(
+                "range",
+                f"{100 * share:.0f} % of the luma of frame {frame.pts} lies beyond 16 to 235, and "
+                "the video does not say which range it has: if it is the full one, as of converted "
+                "JPEGs, set `frames.full_range`",
+            )
 
     def _reason(self, decoder: Any, error: Any) -> str:
         """Return why a packet cannot be decoded: its size, where the decoder tells it."""

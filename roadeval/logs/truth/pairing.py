@@ -10,6 +10,7 @@ import hashlib
 import re
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -34,7 +35,7 @@ from roadeval.logs.files import (
     time_in,
     without_hashes,
 )
-from roadeval.logs.messages.pictures import Picture
+from roadeval.logs.messages.pictures import Picture, codec_of
 from roadeval.logs.settings import NS, LabelPlace, TopicSettings
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.runtime.text import visible
@@ -679,13 +680,13 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
     certain number, and no label. A `LogError` if no number is a frame's.
     """
-    frames = len(images)
+    frames, shown = len(images), _as_shown(images)
     if isinstance(labels, TopicReader):
         first = settings.first or 0
         known = labels.sure - first if labels.sure < len(labels) else frames
         unsure = frames - max(0, min(images.sure, known))
         numbers = Times(range(-first, labels.sure - first))
-        return Pairing(Times(range(frames), images.sure), numbers, 0, unsure=unsure)
+        return Pairing(Times(shown, images.sure), numbers, 0, unsure=unsure)
     name, keys, first = labels.name, labels.log_times, labels.first
     named, cut = labels.images, images.expected() != frames
     if named is not None and (named < frames or (named > frames and not cut)):
@@ -704,4 +705,14 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
     unsure = frames - images.sure
-    return Pairing(Times(range(frames), images.sure), labels, 0, unused=unused, unsure=unsure)
+    return Pairing(Times(shown, images.sure), labels, 0, unused=unused, unsure=unsure)
+
+
+def _as_shown(images: TopicReader) -> Sequence[int]:
+    """Return the number of each image: of a video with B-frames, that in the order of stamps."""
+    with suppress(FrameError):
+        if not _rise(images) and codec_of(images.picture(0)):
+            stamps = [images.stamp(position) for position in range(len(images))]
+            ranks: list[int] = np.argsort(np.argsort(stamps, kind="stable")).tolist()
+            return ranks
+    return range(len(images))

@@ -1,5 +1,6 @@
 """Video in a log: frames that need the frames before them."""
 
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,19 @@ import pytest
 
 from roadeval.data import Frame
 from roadeval.images import Limits
-from roadeval.logs import FrameError, FrameSettings, LogConfig, TopicKind, open_log
+from roadeval.logs import (
+    FrameError,
+    FrameSettings,
+    LabelPlace,
+    LabelSettings,
+    LogConfig,
+    TopicKind,
+    open_log,
+)
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, Video, is_keyframe
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar, packets
 from tests.fixtures.shared import both
+from tests.logs.making import compressed, png, ros2_log
 
 H264 = "fox_pb_CompressedVideo_h264.mcap"
 VIDEOS = both("flavours", H264, "fox_pb_CompressedVideo_vp9.mcap")
@@ -188,3 +198,81 @@ def test_a_video_of_too_many_pixels_is_not_decoded(log: Path) -> None:
         pytest.raises(FrameError, match=too_large),
     ):
         next(opened.frames(opened.select())).decode()
+
+
+def encoded(pictures: list[np.ndarray], bf: int) -> list[tuple[int, bytes]]:
+    """Encode planes of luma nearly without loss, ``bf`` B-frames in a row: places and packets."""
+    import av
+
+    encoder = av.CodecContext.create("libx264", "w")
+    encoder.height, encoder.width = pictures[0].shape
+    encoder.pix_fmt, encoder.framerate, encoder.time_base = "yuv420p", 10, Fraction(1, 10)
+    encoder.max_b_frames = bf
+    encoder.options = {"x264-params": "qp=1:scenecut=0:b-adapt=0"}
+    found = []
+    for number, luma in enumerate(pictures):
+        grey = np.full((luma.shape[0] // 2, luma.shape[1]), 128, np.uint8)
+        frame = av.VideoFrame.from_ndarray(np.concatenate([luma, grey]), "yuv420p")
+        frame.pts = number
+        found += encoder.encode(frame)
+    return [(int(packet.pts), bytes(packet)) for packet in (*found, *encoder.encode(None))]
+
+
+class Stamped(Missing):
+    """Packets with stamps: by their places, or in the order of the packets."""
+
+    def __init__(self, video: list[tuple[int, bytes]], *, by_place: bool = True) -> None:
+        self.packets = [
+            CompressedPicture(100 + (place if by_place else order), "h264", data)
+            for order, (place, data) in enumerate(video)
+        ]
+
+
+@pytest.mark.parametrize(
+    ("bf", "by_place", "told"),
+    [
+        (0, True, None),
+        (2, True, "the video has B-frames: frames are numbered in the order of decoding"),
+        (2, False, "the video has B-frames, and stamps in the order of decoding"),
+    ],
+)
+def test_b_frames_are_told(bf: int, by_place: bool, told: str | None) -> None:
+    slope = np.arange(64, dtype=np.uint8) + 60
+    pictures = [np.roll(slope, 5 * i)[None].repeat(48, 0) for i in range(9)]
+    packets = Stamped(encoded(pictures, bf), by_place=by_place)
+    video = Video(packets, Limits())
+    for position in range(len(packets)):
+        video.picture(position)
+    assert video.notes.get("order", "")[: len(told or "")] == (told or "")
+    assert bool(video.notes) == bool(told)
+
+
+def test_labels_with_numbers_are_those_of_b_frames_as_they_are_shown(tmp_path: Path) -> None:
+    pictures = [np.full((48, 64), 20 + 20 * i, np.uint8) for i in range(10)]
+    video = encoded(pictures, 2)
+    messages = [
+        ("/camera", 1000 + at, compressed(1000 + 100 * place, data, "h264"))
+        for at, (place, data) in enumerate(video)
+    ]
+    (tmp_path / "labels").mkdir()
+    for number in range(10):
+        label = np.full((48, 64), number, np.uint8)
+        (tmp_path / "labels" / f"{number:03d}.png").write_bytes(png(label))
+    path = ros2_log(tmp_path / "a.mcap", messages)
+    labels = LabelSettings(road=(0,))
+    config = LogConfig(truth=LabelPlace(str(tmp_path / "labels"), first=0), labels=labels)
+    with open_log(path, config) as log:
+        found = {frame.number: frame for frame in log.frames(log.select())}
+        numbers = [Path(found[n].labels["/truth"].place).stem for n in range(10)]
+    assert [int(number) for number in numbers] == [place for place, _ in video]
+
+
+@pytest.mark.parametrize("full_range", [False, True])
+def test_luma_beyond_its_range_is_told_and_read_as_asked(full_range: bool) -> None:
+    levels = np.repeat(np.array([16, 64, 128, 192, 240, 250], np.uint8), 16)
+    packets = Stamped(encoded([levels[None].repeat(48, 0)] * 3, 0))
+    video = Video(packets, Limits(full_range=full_range))
+    grey = video.picture(0).pixels[24, 8::16, 0].astype(int)
+    expected = levels[8::16] if full_range else [0, 56, 130, 205, 255, 255]
+    assert np.abs(grey - expected).max() < 3
+    assert (video.notes.get("range") is None) == full_range
