@@ -10,6 +10,7 @@ An image that is to be turned, by its EXIF orientation, is turned where `Limits`
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -28,6 +29,8 @@ File = bytes | memoryview
 _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
 _SCAN: Final = b"\xff\xda"
+_TWELVE_BITS: Final = re.compile(rb"\xff[\xc0-\xc2]\x00[\x0b\x11]\x0c", re.DOTALL)
+"""The head of a frame of one or three colours."""
 OPAQUE: Final = 128
 """Opacity from which a pixel of a mask counts as painted."""
 MOST_SCANS: Final = 100
@@ -201,7 +204,7 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     try:
         return simplejpeg.decode_jpeg(data, "RGB", strict=True)
     except ValueError as error:
-        raise ImageError(f"a damaged JPEG ({error})") from error
+        raise _jpeg_error(data, f"a damaged JPEG ({error})") from error
 
 
 def _jpeg_size(data: File) -> tuple[int, int]:
@@ -210,8 +213,14 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     try:
         height, width, *_ = simplejpeg.decode_jpeg_header(data)
     except (ValueError, KeyError) as error:  # KeyError for a subsampling that has no name
-        raise ImageError("a JPEG whose head is damaged, or of a rare chroma subsampling") from error
+        what = "a JPEG whose head is damaged, or of a rare chroma subsampling"
+        raise _jpeg_error(data, what) from error
     return width, height
+
+
+def _jpeg_error(data: File, what: str) -> ImageError:
+    is_deep = _TWELVE_BITS.search(data) is not None
+    return ImageError("a JPEG of 12 bits a sample, which is not read: log PNG" if is_deep else what)
 
 
 def _decoded(data: File, limits: Limits) -> Any:

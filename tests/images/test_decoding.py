@@ -97,6 +97,13 @@ def test_half_a_file_is_damaged(name: str) -> None:
         images.to_rgb(data[: len(data) // 2], LIMITS)
 
 
+def test_a_jpeg_of_twelve_bits_is_called_so() -> None:
+    data = bytearray(LOSSY["JPEG"])
+    data[data.index(b"\xff\xc0") + 4] = 12
+    with pytest.raises(ImageError, match="a JPEG of 12 bits a sample, which is not read"):
+        images.to_rgb(bytes(data), LIMITS)
+
+
 def test_a_jpeg_without_its_end_is_damaged() -> None:
     with pytest.raises(ImageError, match="Premature end"):
         images.to_rgb(JPEG[:-2], LIMITS)

@@ -1,10 +1,15 @@
 """Samples of other kinds than eight bits: whose sign, range and names a log leaves open."""
 
+import gzip
+import struct
+from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 
 from roadeval.logs import (
     FrameSettings,
@@ -14,6 +19,8 @@ from roadeval.logs import (
     describe,
     open_log,
 )
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.pictures import picture_in
 from tests.logs.making import SECOND, compressed, grey, jpeg, png, raw, ros2_log
 
 STAMPS = [1_700_000_000 * SECOND + i * SECOND // 10 for i in range(20)]
@@ -89,6 +96,18 @@ def test_the_sample_that_is_white_is_the_topics_whatever_the_range(
         assert selection.notes == (
             (f"a sample of {said} is white; `frames.white` sets another",) if said else ()
         )
+
+
+@pytest.mark.parametrize("pack", [zstandard.compress, gzip.compress])
+@pytest.mark.parametrize("harm", ["bomb", "cut", "noise"])
+def test_a_packed_image_that_is_damaged_is_refused_in_bounded_memory(pack, harm: str) -> None:
+    head = struct.pack("<IIBII", 6, 8, 0, 8, 5) + b"mono8"
+    data = pack(bytes(100_000_000 if harm == "bomb" else 48))
+    data = {"bomb": data, "cut": data[:9], "noise": data[:2] + b"noise"}[harm]
+    message = SimpleNamespace(header=SimpleNamespace(stamp="0", frame_id=""), format="zstd")
+    message.data = head + data
+    with suppress(BadMessage):
+        assert len(picture_in(message).data) <= 4 * 48
 
 
 @pytest.mark.parametrize(("level", "word"), [(0, "black"), (9, "black"), (250, "white")])

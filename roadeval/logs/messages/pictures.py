@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import struct
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from mcap.records import Channel, Schema
 
 from roadeval.data import Rgb
 from roadeval.images import ORIENTATIONS, ImageError, Limits, upright
-from roadeval.logs.container.records import Buffer, Message
+from roadeval.logs.container.records import LARGEST, Buffer, Message
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages import encodings
 from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, TopicKind, parts_of
@@ -113,6 +114,8 @@ def picture_in(message: Any) -> LoggedPicture:
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = message.format if hasattr(message, "format") else message.encoding
             data = _as(BUFFERS, message.data)
+            if _name(name).lower() == "zstd":
+                return _unpacked(stamp_ns, bytes(data), frame_id)
             pts = int(message.pts) if hasattr(message, "pts") else None
             return CompressedPicture(stamp_ns, _name(name), data, frame_id, (pts, None))
         return RawPicture(
@@ -127,6 +130,33 @@ def picture_in(message: Any) -> LoggedPicture:
         )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it lacks the fields of an image") from error
+
+
+_PACKED: Final = struct.Struct("<IIBII")
+"""Height, width, whether the upper byte comes first, bytes a row, letters of the encoding."""
+_GZIP: Final = b"\x1f\x8b"
+
+
+def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
+    """Return the raw image in a message of image_transport's ``zstd``, which once was gzip."""
+    import zstandard
+
+    try:
+        height, width, big_endian, step, letters = _PACKED.unpack_from(data)
+        begin = _PACKED.size + letters
+        packed, most = data[begin:], min(4 * step * height, LARGEST)
+        if packed.startswith(_GZIP):
+            pixels = zlib.decompressobj(zlib.MAX_WBITS | 16).decompress(packed, most)
+        elif zstandard.frame_content_size(packed) <= most:
+            pixels = zstandard.ZstdDecompressor().decompress(packed, most)
+        else:
+            raise BadMessage("an image in zstd of another size than it says")
+    except (struct.error, zlib.error, zstandard.ZstdError) as error:
+        raise BadMessage("an image in zstd that cannot be uncompressed") from error
+    encoding = data[_PACKED.size : begin].decode("ascii", "replace")
+    return RawPicture(
+        stamp_ns, width, height, _name(encoding), step, bool(big_endian), pixels, frame_id
+    )
 
 
 def _name(text: Any) -> str:

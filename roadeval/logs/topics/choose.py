@@ -28,6 +28,8 @@ NO_TRUTH_WORDS: Final = _set(
 )
 """Words for a network's output, and for pictures of labels."""
 TRANSPORT_WORDS: Final = _set("image img images raw compressed png mono rect color")
+TRANSPORTS: Final = _set("compressed compressedDepth theora zstd ffmpeg h264 h265 hevc av1")
+"""Last parts of topics by which image_transport sends the images of the topic before them."""
 SIDES: Final = _set("front rear left right side top bottom center")
 PLAIN_WORDS: Final = TRANSPORT_WORDS | _set("camera cam front left right rear")
 DEPTH_FORMATS: Final = ("16uc1", "32fc1")
@@ -66,16 +68,26 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         return named(topics, asked, "`topics.image`"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
-    cameras = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
+    found = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
+    cameras = _of_one_transport(found)
     if len(cameras) == 1:
-        others = len(images) - 1
-        return cameras[0], "the only camera image" if others else "the only image topic"
+        why = "the only camera image" if len(images) > 1 else "the only image topic"
+        return cameras[0], f"{why}, of {len(found)} transports" if len(found) > 1 else why
     if not cameras:
         raise LogError(_no_image(topics, images))
     raise LogError(
         f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or give "
         "it once for each of several"
     )
+
+
+def _of_one_transport(topics: Sequence[TopicInfo]) -> list[TopicInfo]:
+    """Return a topic of each camera: of several transports one that can be read, without loss."""
+    best: dict[str, TopicInfo] = {}
+    for topic in sorted(topics, key=lambda topic: (bool(topic.problem), bool(topic.lossy))):
+        base, _, transport = topic.name.rpartition("/")
+        best.setdefault(base if transport in TRANSPORTS else topic.name, topic)
+    return [topic for topic in topics if topic in best.values()]
 
 
 def choose_truth(

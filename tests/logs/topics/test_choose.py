@@ -1,5 +1,7 @@
 """Which topics are picked, and when the user is asked."""
 
+from dataclasses import replace
+
 import pytest
 
 from roadeval.logs import LabelSettings, LogError, TopicInfo, TopicKind
@@ -35,6 +37,30 @@ def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
     depth = TopicInfo("/cam/depth", "Image", "cdr", TopicKind.IMAGE, 5, format="16UC1", channels=1)
     assert choose_image([camera("/cam/rgb"), depth], None)[0].name == "/cam/rgb"
     assert choose_image([depth], None)[0].name == "/cam/depth"
+
+
+@pytest.mark.parametrize(
+    ("names", "chosen"),
+    [
+        (("/cam/image_raw/compressed", "/cam/image_raw"), "/cam/image_raw"),
+        (("/cam/image_raw/theora", "/cam/image_raw/compressed"), "/cam/image_raw/compressed"),
+        (("/cam/image_raw/zstd", "/cam/image_raw/compressed"), "/cam/image_raw/zstd"),
+    ],
+)
+def test_transports_of_one_camera_are_one_camera(names: tuple[str, ...], chosen: str) -> None:
+    """image_transport's plugins publish below the topic of the raw images; all may be recorded."""
+    topics = [
+        replace(
+            camera(name),
+            problem="no image" if name.endswith("theora") else "",
+            lossy="JPEG" if name.endswith("compressed") else "",
+        )
+        for name in names
+    ]
+    topic, why = choose_image([*topics, label("/road_mask")], None)
+    assert (topic.name, why) == (chosen, "the only camera image, of 2 transports")
+    with pytest.raises(LogError, match=f"2 image topics: {chosen}, /rear/image_raw;"):
+        choose_image([*topics, camera("/rear/image_raw")], None)
 
 
 def test_an_unknown_topic_lists_the_valid_ones() -> None:
