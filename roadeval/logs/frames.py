@@ -151,6 +151,7 @@ class Selection:
             if name == SHADOW:
                 words = words.replace("road is", "shadow is")
             lines.append(f"{what}: {source.where} ({source.why}; {words})")
+            lines += [f"{what}: {note}" for note in (*source.notes, *source.meaning.notes)]
         if known := self.calibration:
             place = f", mounted in {known.mounting.parent}" if known.mounting else ""
             model = known.model or f"{'a nameless' if known.bends else 'no'} distortion"

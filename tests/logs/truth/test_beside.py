@@ -206,6 +206,17 @@ def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
     assert run.stderr.startswith("roadeval: error: ")
 
 
+@pytest.mark.parametrize("name", ["coco/labelformat.json", "cvat/annotations.xml"])
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_a_file_that_ends_early_is_refused_alone_or_beside_another(tmp_path, name, share):
+    whole = (LABELS / name).read_text()
+    path = written(tmp_path / "truth", f"b.{name[-4:]}", whole[: int(share * len(whole))])
+    for place in (path, path.parent):
+        with pytest.raises(LogError, match=r"it is no (JSON|XML), or ends early \(line \d+, col"):
+            labels_in(place, SIZE)
+        shutil.copy(LABELS / name, path.with_name(f"a.{name[-4:]}"))
+
+
 def test_a_note_beside_label_images_is_no_label(drive, tmp_path):
     path = images(tmp_path / "truth", "1.png")
     (path / "notes.txt").touch()
@@ -268,6 +279,16 @@ def test_what_cannot_be_drawn_is_one_line(drive, tmp_path, what):
     path = written(tmp_path / "truth", "a.json", WRONG[what])
     assert str(path) in refusal(drive, path, "road")
     assert time.perf_counter() - began < 20
+
+
+def test_what_is_doubtful_about_labels_is_among_the_reasons_that_info_prints(drive, tmp_path):
+    content = coco(SQUARE, file_name="0.png")
+    content["categories"].append({"id": 2, "name": "car"})
+    content["images"].append(content["images"][0] | {"id": 2, "file_name": "2.png"})
+    content["annotations"].append(content["annotations"][0] | {"image_id": 2, "category_id": 2})
+    selection, _, _ = select(drive, written(tmp_path / "t", "a.json", content), "road")
+    (doubt, *_) = (line for line in selection.reasons if "none of road" in line)
+    assert doubt.startswith("truth: 1 of 2 images have shapes, but none of road")
 
 
 def test_what_cannot_be_drawn_loses_its_frame_alone(drive, tmp_path):

@@ -134,6 +134,18 @@ def test_the_same_square_is_read_from_each_format(tmp_path, what):
     np.testing.assert_array_equal(label, expected)
 
 
+def test_two_annotators_of_an_image_cost_it_and_are_named(tmp_path):
+    both = [task(POLYGON, completed_by=n)["annotations"][0] for n in (1, 2)]
+    for content in (
+        [task(POLYGON) | {"annotations": both}],
+        [task(POLYGON, completed_by=n) for n in (1, 2)],
+    ):
+        other = task(POLYGON, data={"image": "2.png"})  # its number is the same
+        found, _ = read(tmp_path, "a.json", [*content, other])
+        assert found["1.png"].startswith("it has 2 annotations (of annotators 1 and 2): mark one")
+        assert (found["2.png"] == "road").sum() == 100
+
+
 def test_an_address_without_an_ending_names_its_image(tmp_path):
     content = [task(POLYGON, data={"image": "https://x/0007", "by": "a.png"})]
     assert [*read(tmp_path, "a.json", content)[0]] == ["0007"]

@@ -37,20 +37,20 @@ def _is_label_studio(_: Path, content: Any) -> bool:
 def _label_studio(
     _: Path, content: list[Mapping[str, Any]], size: drawn.Size | None
 ) -> Iterator[drawn.Drawing]:
-    annotations: defaultdict[Any, list[Mapping[str, Any]]] = defaultdict(list)
-    tasks = {}
-    for place, task in enumerate(content):
-        number = task.get("id", f"number {place}")
-        tasks[number] = task
-        annotations[number] += task.get("annotations", [task])
-    for number, task in tasks.items():
+    # An image may be in several tasks, and of merged projects two tasks may have the same number.
+    tasks: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    sizes: dict[str, drawn.Size | None] = {}
+    for task in content:
+        made = task.get("annotations", [task]) or []
         regions: list[Mapping[str, Any]] = []
         with suppress(AttributeError, TypeError):
-            regions = [region for made in annotations[number] for region in _regions(made)]
-        sizes = (drawn.size_in(region, "original_width", "original_height") for region in regions)
-        stated = next(filter(None, sizes), None)
-        shapes = _shapes(annotations[number], f"task {number}", stated or size)
-        yield drawn.Drawing(_image(task, regions), stated, shapes)
+            regions = [region for annotation in made for region in _regions(annotation)]
+        image = _image(task, regions)
+        tasks[image] += made
+        stated = (drawn.size_in(r, "original_width", "original_height") for r in regions)
+        sizes[image] = sizes.get(image) or next(filter(None, stated), None)
+    for image, made in tasks.items():
+        yield drawn.Drawing(image, sizes[image], _shapes(made, sizes[image] or size))
 
 
 def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -88,14 +88,14 @@ def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str
 
 
 def _shapes(
-    annotations: Sequence[Mapping[str, Any]], about: str, size: drawn.Size | None
+    annotations: Sequence[Mapping[str, Any]], size: drawn.Size | None
 ) -> Iterator[drawn.Shape]:
     made = [annotation for annotation in annotations if not annotation.get("was_cancelled")]
     made = [made[0]] if len(made) == 1 else [a for a in made if a.get("ground_truth")] or made
     if len(made) > 1:
         who = " and ".join(str(a.get("completed_by", a.get("annotator"))) for a in made)
         raise BadMessage(
-            f"{about} has {len(made)} annotations (of annotators {who}): mark one of them as "
+            f"it has {len(made)} annotations (of annotators {who}): mark one of them as "
             "ground truth in Label Studio and export JSON, or delete the others"
         )
     # A region and its class may be two results of one id, or of one place where there are no ids.
