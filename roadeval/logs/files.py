@@ -87,7 +87,8 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
         _check(path)
         return [path], []
     try:
-        found = sorted((f for f in path.iterdir() if f.suffix == ".mcap"), key=natural)
+        inside = filter(is_shown, path.iterdir())
+        found = sorted((file for file in inside if file.suffix == ".mcap"), key=natural)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
     damage = [Damage(file, 0, why) for file in found if (why := _problem(file))]
@@ -192,6 +193,11 @@ def _empty_folder(path: Path) -> str:
     return f"{path}: a folder without *.mcap files"
 
 
+def is_shown(file: Path) -> bool:
+    """Return whether a file is not hidden, as the ``._0000.png`` that macOS puts beside others."""
+    return not file.name.startswith(".")
+
+
 def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
     """Return the files of a folder that have one of these endings, in natural order.
 
@@ -200,7 +206,7 @@ def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> li
     """
     try:
         inside = folder.rglob("*") if below and folder.is_dir() else folder.iterdir()
-        found = [file for file in inside if file.suffix.lower() in endings]
+        found = [file for file in inside if file.suffix.lower() in endings and is_shown(file)]
     except NotADirectoryError as error:
         raise LogError(f"{folder}: a file, not a folder") from error
     except FileNotFoundError as error:

@@ -192,7 +192,7 @@ class Schedule:
         if self.picks is not None:
             if self.picks.is_proposal(frame.stamp_ns, frame.truth):
                 return Role.UNLABELLED
-            if frame.stamp_ns not in self.picks.stamps_of(Why.RANDOM):
+            if not self.picks.is_picked(frame.stamp_ns, Why.RANDOM):
                 return Role.PICKED
         return Role.EVALUATED
 
@@ -251,9 +251,9 @@ def from_log(
         )
     held, schedule = HeldFrames(on_frame), Schedule()
     if labelled and picks:
-        ranked = picks.stamps_of(Why.RANKED)
         every = frames(labelled=True)
-        for frame in decoded(each for each in every if each.stamp_ns in ranked):
+        ranked = (each for each in every if picks.is_picked(each.stamp_ns, Why.RANKED))
+        for frame in decoded(ranked):
             if frame.truth is not None and not picks.is_proposal(frame.stamp_ns, frame.truth):
                 held.add(frame)
     with_truth = labelled and picks is None

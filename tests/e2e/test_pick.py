@@ -1,6 +1,7 @@
 """From no truth to a number: pick frames, label them, replay with them, pick on."""
 
 import json
+import re
 import shlex
 import shutil
 
@@ -61,6 +62,11 @@ def label(folder, truths, only=None, form="png"):
         (folder / "labels" / name).write_bytes(content)
 
 
+def stamps_of(picks, why):
+    """Return the stamps of the frames that were picked for a reason."""
+    return {each.stamp_ns for each in picks.picked if each.why is why}
+
+
 def scored(work, *words):
     """Replay with the picked labels; return the summary and what was said."""
     outputs = ("--save", "new.rrd", "--reports", "new")
@@ -95,7 +101,7 @@ def test_the_folder_has_images_masks_to_correct_and_why_each(begun):
 
 def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(labelled):
     work, summary, done = labelled
-    drawn = Picks.read(work / "to_label").stamps_of(Why.RANDOM)
+    drawn = stamps_of(Picks.read(work / "to_label"), Why.RANDOM)
     frames = pd.read_csv(work / "new" / "frames.csv").query("variant == 'unfiltered'")
     assert {*frames.stamp_ns} == drawn
     assert summary["frames"]["trained_on"] == 5
@@ -130,10 +136,50 @@ def test_every_format_gives_the_numbers_of_the_images(form, work, truths, labell
     assert others["totals"] == images["totals"]
 
 
+def test_the_folder_of_labels_alone_is_taken_for_the_picks_whose_labels_it_holds(labelled):
+    work, summary, _ = labelled
+    words = ("--truth", "to_label/labels", "--record", "none", *HIDDEN)
+    done = here("replay", "street.mcap", "--reports", "alone", *words, cwd=work)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((work / "alone" / "summary.json").read_text())
+    assert found["estimate"] == summary["estimate"]
+
+
+def test_stamps_that_a_program_has_rounded_are_found_nevertheless(work, truths, labelled):
+    """JavaScript and jq 1.6 keep numbers as floats of 64 bits."""
+    _, summary, _ = labelled
+    label(work / "to_label", truths)
+    path = work / "to_label" / "pick.json"
+    rounded = re.sub(r"\d{19}", lambda digits: f"{float(digits[0]):.17g}", path.read_text())
+    path.write_text(rounded)
+    assert scored(work, "--record", "none")[0]["estimate"] == summary["estimate"]
+
+
+def test_labels_that_were_renumbered_are_refused(work, truths):
+    folder = work / "to_label"
+    label(folder, truths)
+    for number, file in enumerate(sorted((folder / "labels").iterdir())):
+        file.rename(file.with_name(f"{number:04}.png"))
+    done = here("replay", "street.mcap", *HIDDEN, "--truth", "to_label", cwd=work)
+    assert done.returncode == 1
+    assert "labels have numbers of frames that were not picked (0000.png" in done.stderr
+
+
+def test_a_pick_that_was_killed_can_be_run_again(begun, work):
+    folder = work / "to_label"
+    (folder / "pick.json").unlink()
+    words = ("pick", "out.rrd", "-n", 10, "-o", "to_label")
+    assert here(*words, cwd=work).returncode == 0
+    assert Picks.read(folder) == Picks.read(begun / "to_label")
+    (folder / "pick.json").unlink()
+    (folder / "labels" / "mine.png").touch()
+    assert "holds something else" in here(*words, cwd=work).stderr
+
+
 def test_proposals_as_they_are_count_as_no_labels(work, truths):
     folder = work / "to_label"
     label(folder, truths)
-    drawn = sorted(Picks.read(folder).stamps_of(Why.RANDOM))
+    drawn = sorted(stamps_of(Picks.read(folder), Why.RANDOM))
     for stamp in drawn[:2]:
         shutil.copy(folder / "proposals" / f"{stamp:019d}.png", folder / "labels")
     summary, done = scored(work, "--record", "none")
@@ -182,7 +228,7 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert {each.probability for each in random} == {9 / len(after.stamps)}
     at_once = here("pick", "out.rrd", "-n", 18, "-o", "at_once", cwd=work)
     assert at_once.returncode == 0
-    assert Picks.read(work / "at_once").stamps_of(Why.RANDOM) == after.stamps_of(Why.RANDOM)
+    assert stamps_of(Picks.read(work / "at_once"), Why.RANDOM) == stamps_of(after, Why.RANDOM)
 
 
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
@@ -198,7 +244,7 @@ def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, tru
     assert here(*command[1:], cwd=work).returncode == 0
     scored = roadeval.Result(work / "labelled").frames
     picks = [Picks.read(work / "both" / name) for name in ("street", "second")]
-    assert {*scored.stamp_ns} == picks[0].stamps_of(Why.RANDOM) | picks[1].stamps_of(Why.RANDOM)
+    assert {*scored.stamp_ns} == stamps_of(picks[0], Why.RANDOM) | stamps_of(picks[1], Why.RANDOM)
 
 
 @pytest.mark.parametrize(

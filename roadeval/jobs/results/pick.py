@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -182,8 +183,8 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     known, own = _known(drive, rows, name, wanted), rows.of_variant(name)
     scores = known.every_score()
     if (sign := score.sign_of(rows, name)) is not None:  # how much they are in doubt by now
-        now = dict(zip(own["stamp_ns"].tolist(), own[sign].tolist(), strict=True))
-        scores = np.array([now.get(stamp, np.nan) for stamp in known.stamps])
+        now = dict(zip(map(float, own["stamp_ns"]), own[sign].tolist(), strict=True))
+        scores = np.array([now.get(float(stamp), np.nan) for stamp in known.stamps])
     taken = [known.places[stamp] for stamp in known.by_stamp]
     choose = partial(score.chosen, drawn=known.drawn, taken=taken)
     found = choose(np.array(known.stamps, np.int64), scores, wanted.count, known.seed)
@@ -212,7 +213,13 @@ def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Pic
     folder, facts = wanted.folder, drive.facts
     found = Picks.read(folder)
     if found is None:
-        if folder.exists() and any(folder.iterdir()):
+        # What a run that was killed has left is written again.
+        left = {*folder.rglob("*")} if folder.exists() else set()
+        begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
+        begun |= {file for file in left if re.fullmatch(r"\d{19}\.png", file.name)}
+        proposed = {file for file in left if folder / PROPOSALS in file.parents}
+        labels = {file for file in left if folder / LABELS in file.parents}
+        if labels or left - begun - proposed:
             raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
         return _nothing_yet(drive, rows, variant, wanted)
     if (found.log, found.camera) != (facts.log_digest, facts.drive.camera):
@@ -292,7 +299,7 @@ def _with(
     ]
     new = []
     for place in sorted({*random, *ranked}):
-        if (stamp := known.stamps[place]) not in known.by_stamp:
+        if float(stamp := known.stamps[place]) not in known.by_stamp:
             why, chance = (Why.RANDOM, probability) if place in random else (Why.RANKED, None)
             frame = known.frames[place]
             own = why, chance, known.scores[place], proposals[frame], wave

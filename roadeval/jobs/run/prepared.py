@@ -200,7 +200,9 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
     selection = log.select()
     again = partial(log.frames, selection)
     variants = config.variants()
-    picks = logs.Picks.read(Path(config.truth.path)) if config.truth.path else None
+    picks = logs.Picks.of_labels(Path(config.truth.path)) if config.truth.path else None
+    if picks and selection.truth and isinstance(selection.truth.pictures, logs.NamedLabels):
+        picks.check(selection.truth.pictures)
     if picks and config.frames.scale != 1:
         raise RoadevalError("`frames.scale` and picked frames do not go together")
     labelled = selection.truth is not None

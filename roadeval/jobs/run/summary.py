@@ -143,7 +143,7 @@ def _estimate(run: Run) -> EstimateFacts | None:
             known = np.isfinite(values)
             if rate in SHORT and known.any():
                 stamps = mask.stamps[known].tolist()
-                scores = every[[picks.places.get(stamp, -1) for stamp in stamps]]
+                scores = every[[picks.places[float(stamp)] for stamp in stamps]]
                 found = estimate(values[known], scores, every, run.config.evaluation.confidence)
                 rates.setdefault(mask.variant, {})[rate] = found
     apart: dict[str, dict[str, float | None]] = {
@@ -361,14 +361,15 @@ def _of_picks(run: Run) -> Iterator[str]:
             f"{missing} of the {picks.drawn} frames that were drawn at random have no label yet: "
             f"{rest}"
         )
+    known = {each.frame for each in picks.picked}
+    unread = len(known & run.frames.accounting.undecodable.keys())
     used = (Role.PICKED, *([Role.TRAINING] if run.model.source == "truth" else []))
     own = scored + sum(roles[each] for each in used)
-    if (unchanged := run.frames.accounting.labelled - own) > 0:
+    if (unchanged := run.frames.accounting.labelled - own - unread) > 0:
         yield (
             f"{unchanged} labels are as they were proposed, or ignored as a whole, and count as "
             f"not labelled; of one that is right as it is, empty `proposal` in {PICK}"
         )
-    known = {each.frame for each in picks.picked}
     if others := len(run.board.apart.keys() - known):
         yield f"{others} labels are of frames that were not picked: they are in no number"
 

@@ -21,6 +21,7 @@ from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Truth
 from roadeval.data.words import counted
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.files import is_shown
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import (
     format_of,
@@ -459,7 +460,8 @@ def label_files(settings: LabelPlace) -> list[Path]:
     """
     named = (log_and_topic(settings.path)[0] or settings.path, settings.images)
     paths = [Path(each) for each in named if each is not None]
-    return [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
+    files = [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
+    return [*filter(is_shown, files)]
 
 
 Size = tuple[int, int]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
@@ -19,10 +20,12 @@ from pydantic import TypeAdapter, ValidationError
 from roadeval.data import ROAD, Truth
 from roadeval.images import Limits
 from roadeval.logs.errors import LogError
+from roadeval.logs.files import some
 from roadeval.logs.truth.drawn import PROPOSED, Proposal
 from roadeval.logs.truth.formats.coco import COCO
 from roadeval.logs.truth.formats.cvat import CVAT
 from roadeval.logs.truth.formats.labelme import LABELME
+from roadeval.logs.truth.pairing import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
 PICK: Final = "pick.json"
@@ -95,32 +98,69 @@ class Picks:
         except (OSError, ValueError, ValidationError) as error:
             reason = str(error).partition("\n")[0]
             raise LogError(f"{path}: damaged ({reason}); pick into a new folder") from error
-        sizes = {len(found.frames), len(found.stamps), len(found.scores)}
-        if found.format != FORMAT or len(sizes) > 1 or len({*found.stamps}) < len(found.stamps):
-            raise LogError(f"{path}: not as roadeval pick writes it; pick into a new folder")
+        if problem := found._contradiction():
+            raise LogError(
+                f"{path}: not as roadeval pick writes it ({problem}): take the file as it was "
+                "written, or pick into a new folder"
+            )
         return found
 
+    @classmethod
+    def of_labels(cls, labels: Path) -> Picks | None:
+        """Read the picks whose folder labels lie in, or are; None where there are none."""
+        folders = [labels, *labels.resolve().parents[:2]]
+        return next((picks for folder in folders if (picks := cls.read(folder))), None)
+
+    def _contradiction(self) -> str:
+        """Return which of the numbers contradict each other; empty if none."""
+        own = Counter(each.why for each in self.picked)
+        known = dict(zip(self.stamps, self.frames, strict=False))
+        sizes = {len(self.frames), len(self.stamps), len(self.scores), len(known)}
+        if self.format != FORMAT or len(sizes) > 1 or not self.frames:
+            return "its lists of frames, stamps and scores do not fit together"
+        if len(self.by_stamp) < len(self.picked):
+            return "a frame is picked twice"
+        if any(known.get(each.stamp_ns) != each.frame for each in self.picked):
+            return "a picked frame is not in the list of all"
+        if own[Why.RANDOM] != self.drawn:
+            return f"{own[Why.RANDOM]} frames are random, but {self.drawn} were drawn"
+        return ""
+
+    # Stamps are compared as floats, for programs that rewrite JSON round them to such.
+
     @cached_property
-    def places(self) -> dict[int, int]:
+    def places(self) -> dict[float, int]:
         """The places of all frames that could be picked, by their stamps."""
-        return {stamp: place for place, stamp in enumerate(self.stamps)}
+        return {float(stamp): place for place, stamp in enumerate(self.stamps)}
 
     @cached_property
-    def by_stamp(self) -> dict[int, Picked]:
+    def by_stamp(self) -> dict[float, Picked]:
         """The picked frames by their stamps."""
-        return {each.stamp_ns: each for each in self.picked}
+        return {float(each.stamp_ns): each for each in self.picked}
 
-    def stamps_of(self, why: Why) -> frozenset[int]:
-        """Return the stamps of the frames that were picked for a reason."""
-        return frozenset(each.stamp_ns for each in self.picked if each.why is why)
+    def is_picked(self, stamp_ns: int, why: Why) -> bool:
+        """Return whether a frame was picked for a reason."""
+        own = self.by_stamp.get(float(stamp_ns))
+        return own is not None and own.why is why
 
     def every_score(self) -> npt.NDArray[np.float64]:
         """Return how much each frame was in doubt, ``(n,)``; NaN where that is not known."""
         return np.array([math.nan if each is None else each for each in self.scores])
 
+    def check(self, labels: NamedLabels) -> None:
+        """Refuse, as a `LogError`, labels with numbers that are not those of the picked frames."""
+        picked = {each.frame for each in self.picked}
+        keys = labels.log_times.tolist()
+        others = [labels.labels[at].path for at, key in enumerate(keys) if key not in picked]
+        if labels.by == "number" and others:
+            raise LogError(
+                f"{labels.name}: {len(others)} of {len(keys)} labels have numbers of frames that "
+                f"were not picked ({some(others)}): give them the names of their images in {IMAGES}"
+            )
+
     def is_proposal(self, stamp_ns: int, truth: Truth) -> bool:
         """Return whether a label is still as it was proposed, so that nobody has corrected it."""
-        own = self.by_stamp.get(stamp_ns)
+        own = self.by_stamp.get(float(stamp_ns))
         return own is not None and own.proposal == digest_of(truth == ROAD)
 
 

@@ -19,6 +19,7 @@ from roadeval.logs import (
     LogError,
     LogWriter,
     TopicSettings,
+    label_files,
     open_log,
 )
 from roadeval.logs.errors import FrameError
@@ -467,3 +468,13 @@ def test_truth_of_another_camera_is_refused_unless_its_topic_is_named(rig, which
     with pytest.raises(LogError, match=f"{topic} belongs to another camera than /right/image, by"):
         select_of("right", path)
     assert select_of("right", f"{path}:{topic}").startswith(f"{topic} of ")
+
+
+def test_hidden_files_are_no_labels(drive, tmp_path):
+    """macOS puts ``._NAME`` beside each file on other disks, and into ZIP archives."""
+    path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
+    for file in [*path.iterdir()]:
+        file.with_name(f"._{file.name}").write_bytes(b"\0\5\x16\7")
+    (path / ".DS_Store").touch()
+    assert select(drive, path)[1] == [*range(FRAMES)]
+    assert not any(file.name.startswith(".") for file in label_files(LabelPlace(str(path))))
