@@ -1,4 +1,4 @@
-"""Inputs of every kind that are pointers of Git LFS: one line names the command that fetches them."""
+"""Pointers of Git LFS in place of inputs: one line names the command that fetches them."""
 
 from pathlib import Path
 

@@ -1,0 +1,164 @@
+"""Truth and masks that do not belong to the images are found, and others are left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from roadeval.data import Frame, Packed
+from roadeval.evaluation.score import TRUTH, Finding, FitCheck, Misfit
+
+FRAMES = 40
+HEIGHT, WIDTH = 120, 160
+Masks = Sequence[np.ndarray]
+
+
+def road_at(moment: float) -> np.ndarray:
+    """A road that bends and sways: its far end wanders, its near end follows."""
+    rows = np.arange(HEIGHT)[:, None]
+    depth = np.clip((rows - 45) / (HEIGHT - 45), 0, 1)
+    far = 95 + 22 * np.sin(moment / 3)
+    centre = far + (70 + 8 * np.cos(moment / 5) - far) * depth
+    half = 6 + 50 * depth
+    columns = np.arange(WIDTH)
+    return ((rows >= 45) & (abs(columns - centre) <= half)).astype(np.uint8)
+
+
+def image_of(road: np.ndarray, seed: int) -> np.ndarray:
+    """The road on grass below a sky, with noise."""
+    grey = np.where(road, 90, 150) + np.where(np.arange(HEIGHT)[:, None] < 40, 60, 0)
+    noise = np.random.default_rng(seed).normal(0, 8, grey.shape)
+    return np.repeat(np.clip(grey + noise, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+ROADS = [road_at(moment) for moment in range(FRAMES)]
+IMAGES = [image_of(road, seed) for seed, road in enumerate(ROADS)]
+
+
+def late(masks: Masks, frames: int) -> Masks:
+    return [masks[min(max(place - frames, 0), len(masks) - 1)] for place in range(len(masks))]
+
+
+def moved(masks: Masks, right: int, down: int) -> Masks:
+    return [np.roll(mask, (down, right), (0, 1)) for mask in masks]
+
+
+def rough(masks: Masks, *, grow: int = 0, holes: float = 0.0) -> Masks:
+    """Masks as a method makes them: grown or shrunk all around, with parts that it misses."""
+    import cv2
+
+    block = np.ones((2 * abs(grow) + 1,) * 2, np.uint8)
+    change = cv2.dilate if grow > 0 else cv2.erode
+    noise = np.random.default_rng(1)
+    missed = (noise.random((len(masks), 15, 20)) >= holes).astype(np.uint8)
+    return [
+        change(mask, block) & np.kron(keep, np.ones((8, 8), np.uint8))
+        for mask, keep in zip(masks, missed, strict=True)
+    ]
+
+
+def found(
+    truth: Masks | None, images: Masks = IMAGES, computed: Masks | None = None, **external: Masks
+) -> list[Finding]:
+    check = FitCheck(range(len(images)))
+    for number, image in enumerate(images):
+        frame = Frame(
+            *(number, number * 10**8, number * 10**8, image, b""),
+            truth=None if truth is None else truth[number],
+            external={name: masks[number] for name, masks in external.items()},
+        )
+        check.add(frame, [] if computed is None else [Packed.of(computed[number])])
+    return list(check.findings())
+
+
+WRONG: dict[str, tuple[Callable[[Masks], Masks], Finding]] = {
+    **{
+        f"{frames} late": (
+            lambda masks, frames=frames: late(masks, frames),
+            Finding("", Misfit.LAG, frames=frames),
+        )
+        for frames in (1, 2, 3, 5, -1, -4)
+    },
+    "mirrored": (lambda masks: [mask[:, ::-1] for mask in masks], Finding("", Misfit.MIRRORED)),
+    "upside down": (lambda masks: [mask[::-1] for mask in masks], Finding("", Misfit.UPSIDE_DOWN)),
+    "inverted": (lambda masks: [1 - mask for mask in masks], Finding("", Misfit.INVERTED)),
+}
+MOVES = [(3, 0), (-4, 0), (0, 5), (0, -3), (8, -6), (0, 12)]
+
+
+@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("method", ["exact", "holes"])
+def test_masks_that_do_not_fit_are_named(name: str, method: str) -> None:
+    change, finding = WRONG[name]
+    masks = rough(ROADS, holes=0.1) if method == "holes" else ROADS
+    kind = found(ROADS, mine=change(masks))
+    assert kind == [Finding("mine", finding.misfit, finding.frames)]
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_truth_that_does_not_fit_is_named_by_the_images_alone(name: str) -> None:
+    change, finding = WRONG[name]
+    assert found(change(ROADS)) == [Finding(TRUTH, finding.misfit, finding.frames)]
+
+
+def test_truth_that_is_late_is_named_once_beside_masks_that_fit_the_images() -> None:
+    assert found(late(ROADS, 2), mine=ROADS) == [Finding(TRUTH, Misfit.LAG, frames=2)]
+
+
+def test_masks_computed_here_tell_that_truth_is_late_where_the_image_has_no_edge() -> None:
+    blank = [np.full((HEIGHT, WIDTH, 3), 99, np.uint8)] * FRAMES
+    assert found(late(ROADS, 2), blank, ROADS) == [Finding(TRUTH, Misfit.LAG, frames=2)]
+
+
+@pytest.mark.parametrize(("right", "down"), MOVES)
+@pytest.mark.parametrize("holes", [0.0, 0.1])
+def test_moved_masks_are_named_with_their_pixels(right: int, down: int, holes: float) -> None:
+    (finding,) = found(ROADS, mine=moved(rough(ROADS, holes=holes), right, down))
+    assert finding.misfit is Misfit.MOVED
+    assert abs(finding.right - right) <= 1
+    assert abs(finding.down - down) <= 1
+
+
+def straight(_: float) -> np.ndarray:
+    return road_at(0.0)
+
+
+@pytest.mark.parametrize(
+    "masks",
+    [
+        ROADS,
+        rough(ROADS, grow=4),
+        rough(ROADS, grow=-4),
+        rough(ROADS, holes=0.5),
+        moved(ROADS, 1, 1),
+        [np.zeros((HEIGHT, WIDTH), np.uint8)] * FRAMES,
+        [np.ones((HEIGHT, WIDTH), np.uint8)] * FRAMES,
+        list((np.random.default_rng(3).random((FRAMES, HEIGHT, WIDTH)) < 0.5).astype(np.uint8)),
+    ],
+    ids=["right", "wide", "narrow", "holes", "a pixel off", "nowhere", "everywhere", "noise"],
+)
+def test_masks_that_are_merely_bad_are_left_alone(masks: Masks) -> None:
+    assert found(ROADS, mine=masks) == []
+
+
+def test_a_standing_vehicle_is_left_alone() -> None:
+    road = road_at(2.0)
+    images = [image_of(road, seed) for seed in range(FRAMES)]
+    assert found([road] * FRAMES, images, mine=[road] * FRAMES) == []
+
+
+def test_few_frames_say_nothing() -> None:
+    assert found(late(ROADS, 3)[:5], IMAGES[:5], mine=ROADS[:5]) == []
+
+
+def test_small_images_and_masks_of_another_size_are_left_alone() -> None:
+    small = [image[::4, ::4] for image in IMAGES]
+    assert found(None, small, mine=[road[::-4, ::4] for road in ROADS]) == []
+    assert found(ROADS, mine=[road[::2, ::-2] for road in ROADS]) == []
+
+
+def test_labels_of_few_frames_are_held_against_each_image_around() -> None:
+    labelled = [road if number % 4 == 1 else None for number, road in enumerate(late(ROADS, 2))]
+    assert found(labelled) == [Finding(TRUTH, Misfit.LAG, frames=2)]  # type: ignore[arg-type]
