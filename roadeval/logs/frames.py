@@ -47,6 +47,7 @@ from roadeval.logs.truth.pairing import (
     by_time,
     frames_of,
 )
+from roadeval.runtime.text import visible
 
 TRUTH: Final = "/truth"
 SHADOW: Final = "/shadow"
@@ -185,6 +186,7 @@ def settle(
     A `LogError` as `roadeval.logs.Log.select` says.
     """
     asked = config.topics
+    topics = [_of_camera(topic, readers[topic.name], asked.frame_id) for topic in topics]
     image, why = choose_image(topics, asked.image)
     if image.problem or "depth" in image.format.lower():
         _check_readable(readers[image.name], image)
@@ -226,6 +228,15 @@ def _ground_of(
     if any(asked.distortion) and is_rectified(image.name):
         how += "; `ground.distortion` is applied although the topic's name says rectified"
     return ground, how
+
+
+def _of_camera(topic: TopicInfo, reader: TopicReader, frame_id: str | None) -> TopicInfo:
+    """Return a topic as that of the camera that is asked for, if some of its images are of it."""
+    if frame_id is None or not topic.is_image or not len(reader):
+        return topic
+    looked_at = {*np.linspace(0, len(reader) - 1, 2 * LOOKED_AT, dtype=int).tolist()}
+    is_of_it = frame_id in map(reader.frame_id, looked_at)
+    return replace(topic, frame_id=frame_id) if is_of_it else topic
 
 
 BITS: Final = (8, 10, 12, 14, 16)
@@ -293,6 +304,10 @@ class Accounting:
     """Of these, those that have a mask of another method, by its name."""
     repeated: int = 0
     """Of these, those that repeat an earlier one, by stamp and content."""
+    labels_repeated: int = 0
+    """Of the labelled ones, those whose label is an earlier one's, bit for bit."""
+    frame_ids: Counter[str] = field(default_factory=Counter)
+    """Frames by the ``frame_id`` of their images."""
     undecodable: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that could not be decoded, and why."""
     odd_sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
@@ -322,6 +337,17 @@ class Accounting:
                 "content; each of them is counted"
             )
         yield from self.of_video.values()
+        if self.labels_repeated:
+            yield (
+                f"{self.labels_repeated} of the {self.labelled} labels repeat an earlier one bit "
+                "for bit, under another stamp: one that was only repeated does not fit its image"
+            )
+        if len(self.frame_ids) > 1:
+            names = [f"{visible(name)} ({count})" for name, count in self.frame_ids.items()]
+            yield (
+                f"the images are of several cameras, by frame_id: {first_of(names, NAMED)}; "
+                "`topics.frame_id` chooses one"
+            )
         for level in ("black", "white"):
             blank = [number for number, own in self.blank.items() if own == level]
             if blank and FEW * len(blank) >= self.read:
@@ -462,6 +488,8 @@ class FrameStream:
             self.accounting.of_video = self._pictures.notes
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
+        self._contents: set[int] = set()
+        """Hashes of the labels that were read."""
         read: Iterable[int] = numbers
         if labelled:
             read = with_label(truth, images, numbers) if (truth := selection.truth) else ()
@@ -511,8 +539,14 @@ class FrameStream:
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels
         self.accounting.masks.update(labels.keys() - {TRUTH, SHADOW})
+        if (label := labels.get(TRUTH)) and not isinstance(label.picture, FrameError):
+            content = hash(bytes(label.picture.data))
+            self.accounting.labels_repeated += content in self._contents
+            self._contents.add(content)
         # Reading a message corrects its log time where the file's index is wrong.
         picture = read_or_error(self._pictures, number)
+        if name := getattr(picture, "frame_id", ""):
+            self.accounting.frame_ids[name] += 1
         camera = self._selection.camera
         log_time = int(camera.images.log_times[number])
         stamp = camera.images.stamp(number) if camera.clock is Clock.STAMP else UNREADABLE

@@ -301,6 +301,15 @@ class Log:
                 f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
             )
         numbers: Sequence[int] = range(first, last)
+        if (camera := self.config.topics.frame_id) is not None:
+            reader, count = selection.camera.images, asked.every * (asked.max_frames or last)
+            of_camera = (number for number in numbers if reader.frame_id(number) == camera)
+            numbers = [*(of_camera if asked.labelled else islice(of_camera, count))]
+            if not numbers:
+                raise LogError(
+                    f"{self.path.name}: `topics.frame_id` {camera}: no image of the range has it; "
+                    f"the first has {reader.frame_id(first) or 'none'}"
+                )
         if asked.labelled:
             truth, most = selection.truth, asked.every * (asked.max_frames or last)
             found = with_label(truth, selection.camera.images, numbers) if truth else ()

@@ -82,6 +82,8 @@ class TopicSettings:
 
     image: str | None = None
     """The camera's topic, where the log has several."""
+    frame_id: Annotated[str | None, Flag("--frame-id", "ID")] = None
+    """Only images whose header has this ``frame_id``, where several cameras share the topic."""
     truth: Annotated[str | None, Flag("--truth-topic", "T")] = None
     """The topic of label images that show where road is; an empty name takes none."""
     shadow: Annotated[str | None, Flag("--shadow-topic", "T")] = None

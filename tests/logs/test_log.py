@@ -190,3 +190,61 @@ def test_labels_are_paired_only_within_the_range(
         assert len(found) >= 3
         assert all(number % 4 == 0 for number in found)
         assert len(read) < len(messages) / 8
+
+
+def two_cameras(path: Path, names: list[str]) -> Path:
+    """Write a log in which a topic's images, and their labels, are of these cameras in turn."""
+    messages = []
+    for number, name in enumerate(names):
+        stamp = SECOND * (number + 1)
+        for topic, value in (("/camera", number), ("/labels", 0)):
+            message = compressed(stamp, png(grey(value)))
+            message["header"]["frame_id"] = name
+            messages.append((topic, stamp, message))
+    return ros2_log(path, messages)
+
+
+@pytest.mark.parametrize(
+    "names", [["front", "rear"] * 6, ["front"] * 20 + ["rear"] * 4, ["a", "b", "c"] * 5]
+)
+def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(
+    tmp_path: Path, names: list[str]
+) -> None:
+    path = two_cameras(tmp_path / "a.mcap", names)
+    with open_log(path) as log:
+        stream = log.frames(log.select())
+        assert sum(1 for _ in stream) == len(names)
+        (told,) = (note for note in stream.accounting.notes if "several cameras" in note)
+        assert f"{names[0]} ({names.count(names[0])})" in told
+        assert "`topics.frame_id` chooses one" in told
+    for name in {*names}:
+        own = [number for number, other in enumerate(names) if other == name]
+        asked = LogConfig(topics=TopicSettings(frame_id=name, truth="/labels"))
+        with open_log(path, asked) as log:
+            stream = log.frames(log.select())
+            assert [frame.number for frame in stream] == own
+            assert not any("several cameras" in note for note in stream.accounting.notes)
+
+
+def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:
+    asked = LogConfig(topics=TopicSettings(frame_id="left", truth=""))
+    path = two_cameras(tmp_path / "a.mcap", ["front", "rear"])
+    why = "left: no image of the range has it; the first has front"
+    with open_log(path, asked) as log, pytest.raises(LogError, match=why):
+        log.frames(log.select())
+
+
+@pytest.mark.parametrize(("apart", "repeated"), [(1, 0), (2, 6), (3, 8)])
+def test_a_label_under_several_stamps_is_told(tmp_path: Path, apart: int, repeated: int) -> None:
+    """A converter may repeat each label under the stamps of the frames between."""
+    messages = []
+    for number in range(12):
+        mask = grey(0)
+        mask[: 1 + number // apart % 6, : 1 + number // apart] = 255
+        messages.append(("/camera", number + 1, compressed(number + 1, png(grey(number)))))
+        messages.append(("/labels", number + 1, compressed(number + 1, png(mask))))
+    with open_log(ros2_log(tmp_path / "a.mcap", messages)) as log:
+        stream = log.frames(log.select())
+        assert len([*stream]) == 12
+        told = [note for note in stream.accounting.notes if "labels repeat" in note]
+    assert [note.split(" labels")[0] for note in told] == [f"{repeated} of the 12"] * (repeated > 0)

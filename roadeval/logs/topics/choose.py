@@ -236,8 +236,8 @@ def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicIn
 
 
 def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
-    found = [topic for topic in topics if topic.is_image and topic.count and topic != image]
-    return [topic for topic in found if not _looks_like_label(topic)]
+    found = [topic for topic in topics if topic.is_image and topic.count]
+    return [each for each in found if each.name != image.name and not _looks_like_label(each)]
 
 
 def _camera_words(name: str) -> frozenset[str]:

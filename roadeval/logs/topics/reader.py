@@ -307,6 +307,13 @@ class TopicReader:
             self._stamps[position] = stamp
         return stamp
 
+    def frame_id(self, position: int) -> str:
+        """Return the camera's name in a message's header; empty if it has none or is damaged."""
+        try:
+            return self.picture(position).frame_id
+        except FrameError:
+            return ""
+
     def place(self, _position: int) -> str:
         """Return where a message lies, for messages to people."""
         return self.name
