@@ -137,29 +137,8 @@ def _damage(error: Exception) -> str:
 def _drawn(
     files: Sequence[Path], format_: LabelFormat, size: Size | None, asked: MaskSettings
 ) -> LabelSet:
-    """Read all files of a format. An image whose label cannot be read is an unreadable label.
-
-    A `LogError` if a file of several images cannot be read, or there is no label.
-    """
-    drawn: list[Drawing] = []
-    broken: dict[str, str] = {}
-    others: list[str] = []
-    for file in files:
-        try:
-            content = _parsed(file)
-            if not format_.holds(file, content):
-                others.append(file.name)
-                continue
-            for drawing in format_.read(file, content, size):
-                try:
-                    drawn.append(drawing.whole(size))
-                except _WRONG as error:
-                    broken[drawing.image] = _in_words(error, format_)
-        except _WRONG as error:
-            problem = _in_words(error, format_).removeprefix(f"{file}: ")
-            if not format_.one_image:
-                raise LogError(f"{file}: {problem}") from error
-            broken[str(file)] = problem
+    """Return the labels of all files of a format; a `LogError` if there is none."""
+    drawn, broken, others = _images_in(files, format_, size)
     labelled = [drawing for drawing in drawn if drawing.shapes]
     notes = []
     if others:
@@ -178,6 +157,39 @@ def _drawn(
     unread = [NamedLabel(Path(name), bytes, partial(_raise, why)) for name, why in broken.items()]
     labels = [*(_label(drawing, classes, format_) for drawing in labelled), *unread]
     return LabelSet(labels, classes, occurring=occurring, notes=tuple(notes))
+
+
+def _images_in(
+    files: Sequence[Path], format_: LabelFormat, size: Size | None
+) -> tuple[list[Drawing], dict[str, str], list[str]]:
+    """Return the images in some files, those whose labels cannot be read, and files of others.
+
+    A file that cannot be read is such an image where each file has one. A `LogError` if they have
+    several.
+    """
+    drawn: list[Drawing] = []
+    whole, damaged = Counter[Path](), dict[Path, str]()
+    broken: dict[str, str] = {}
+    others: list[str] = []
+    for file in files:
+        try:
+            content = _parsed(file)
+            if not format_.holds(file, content):
+                others.append(file.name)
+                continue
+            for drawing in format_.read(file, content, size):
+                whole[file] += 1
+                try:
+                    drawn.append(drawing.whole(size))
+                except _WRONG as error:
+                    broken[drawing.image] = _in_words(error, format_)
+        except _WRONG as error:
+            damaged[file] = _in_words(error, format_).removeprefix(f"{file}: ")
+    for file, problem in damaged.items():
+        if file in whole or max(whole.values(), default=0) > 1:
+            raise LogError(f"{file}: {problem}")
+        broken[str(file)] = problem
+    return drawn, broken, others
 
 
 def _in_words(error: Exception, format_: LabelFormat) -> str:

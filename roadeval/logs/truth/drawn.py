@@ -256,9 +256,6 @@ class LabelFormat:
     write: Callable[[Sequence[Proposal]], Mapping[str, bytes]] | None = None
     """Returns the files of masks for an annotator to correct, by their names; None where it writes
     none."""
-    one_image: bool = False
-    """Whether a file is the label of one image, so that one that cannot be read costs that alone.
-    """
 
 
 @dataclass(frozen=True)
@@ -319,7 +316,8 @@ def _with_known(drawing: Drawing, meant: Meant, broken: dict[str, str]) -> Drawi
 
 
 LOOKED_AT: Final = 20
-"""Images in which overlaps are looked for, spread over all."""
+PIXELS: Final = 20_000_000
+"""Images, or pixels if these are more, in which overlaps are looked for, spread over all."""
 TOUCHING: Final = 0.005
 """Share of the road's pixels that may cover another shape without a word: outlines that touch."""
 
@@ -327,7 +325,8 @@ TOUCHING: Final = 0.005
 def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
     """Yield a warning where road covers earlier shapes of other classes, which count as road."""
     crossed = [drawing for drawing in drawn if _is_over(drawing, meant)]
-    looked = crossed[:: -(-len(crossed) // LOOKED_AT) or 1]
+    area = max((math.prod(drawing.size or (1, 1)) for drawing in crossed), default=1)
+    looked = crossed[:: -(-len(crossed) // max(LOOKED_AT, PIXELS // max(area, 1))) or 1]
     shares, classes = list[float](), Counter[str]()
     for drawing in looked:
         names = ["", *drawing.classes]
@@ -344,10 +343,12 @@ def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
                 shares.append(len(hidden) / np.count_nonzero(is_road))
                 classes.update(names[value] for value in np.unique(hidden).tolist())
     if shares:
-        every = len(looked) if len(looked) < len(crossed) else len(drawn)
+        images = f"{len(drawn)} images"
+        if len(looked) < len(crossed):
+            images = f"{len(looked)} images that were looked at"
         yield (
             f"road was drawn over {', '.join(name for name, _ in classes.most_common())} in "
-            f"{len(shares)} of {every} images: {100 * np.mean(shares):.1f} % of the road's pixels "
+            f"{len(shares)} of {images}: {100 * np.mean(shares):.1f} % of the road's pixels "
             "there, which count as road; draw road first, or name these classes in `labels.ignore`"
         )
 

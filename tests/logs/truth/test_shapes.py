@@ -252,6 +252,17 @@ def test_a_mask_of_another_size_than_its_image_costs_that_image(tmp_path):
     assert (found["2.png"] == "road").any()
 
 
+def test_a_damaged_file_costs_its_image_where_each_file_has_one(tmp_path):
+    for n in range(3):
+        content = {"name": f"{n}", "frames": [{"objects": [TYPED]}]}
+        path = written(tmp_path / "truth", f"{n}.json", content)
+    path.write_text(path.read_text()[:-9])
+    asked = MaskSettings(str(path.parent), labels=LabelSettings(("road",)))
+    found, _ = labels_of(path.parent, asked)
+    assert found.pop("2.json").startswith("cannot be read as labels: it is no JSON, or ends early")
+    assert [(label == "road").sum() for label in found.values()] == [100, 100]
+
+
 # --- What the meaning of the classes decides ------------------------------------------------------
 
 

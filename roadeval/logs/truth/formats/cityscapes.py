@@ -24,7 +24,5 @@ def _cityscapes(
     yield drawn.Drawing(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
 
 
-CITYSCAPES: Final = drawn.LabelFormat(
-    "Cityscapes", ".json", _is_cityscapes, _cityscapes, one_image=True
-)
+CITYSCAPES: Final = drawn.LabelFormat("Cityscapes", ".json", _is_cityscapes, _cityscapes)
 FORMATS: Final = (CITYSCAPES,)

@@ -86,7 +86,5 @@ def _outlines(proposal: drawn.Proposal) -> Iterator[tuple[str, list[list[float]]
             yield HOLE if inner[place] else drawn.PROPOSED, ((ring - 0.5) / 2).tolist()
 
 
-LABELME: Final = drawn.LabelFormat(
-    "LabelMe", ".json", _is_labelme, _labelme, _as_labelme, one_image=True
-)
+LABELME: Final = drawn.LabelFormat("LabelMe", ".json", _is_labelme, _labelme, _as_labelme)
 FORMATS: Final = (LABELME,)

@@ -53,5 +53,5 @@ def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
             yield drawn.Outline(label, flat)
 
 
-YOLO: Final = drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo, one_image=True)
+YOLO: Final = drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo)
 FORMATS: Final = (YOLO,)
