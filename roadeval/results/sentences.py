@@ -328,7 +328,7 @@ def from_labels(found: EstimateFacts | None, variant: str) -> Iterator[str]:
     if own.unseen:
         yield (
             f"{number(own.unseen)} frames are far more in doubt than any that was drawn: the upper "
-            "end takes them for wrong altogether. Label them."
+            "end takes them for wrong altogether. More labels, drawn at random, would tell."
         )
     worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in found.apart.items())
     if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:

@@ -139,10 +139,14 @@ def estimate(
 
 
 def _unseen(scores: Floats, every_score: Floats) -> int:
-    """Return how many frames are far more in doubt than the rest, if none of them was drawn."""
+    """Return how many frames are far more in doubt than the rest, if none of them was drawn.
+
+    A single one is no burst.
+    """
     lower, upper = np.quantile(every_score, (0.25, 0.75))
     far = upper + FAR * (upper - lower)
-    return 0 if (scores > far).any() else int(np.count_nonzero(every_score > far))
+    beyond = int(np.count_nonzero(every_score > far))
+    return 0 if beyond < 2 or (scores > far).any() else beyond
 
 
 def _student(confidence: float, freedom: int) -> float:
