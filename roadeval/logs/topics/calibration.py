@@ -128,10 +128,10 @@ def _read(topic: str, message: Any, image: TopicInfo) -> Known:
 
     def numbers(name: str) -> tuple[float, ...]:
         value = getattr(message, name, None)
-        return tuple(map(float, getattr(message, name.upper()) if value is None else value))
+        return tuple(map(float, getattr(message, name.upper(), ()) if value is None else value))
 
     size, p = (int(message.width), int(message.height)), numbers("p")
-    lens = str(message.distortion_model), numbers("d")
+    lens = str(getattr(message, "distortion_model", "")), numbers("d")
     frame = str(getattr(message, "header", message).frame_id)
     made, note = Calibration(topic, *size, numbers("k"), *lens, frame), ""
     if is_rectified(image.name):

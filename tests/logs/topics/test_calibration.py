@@ -220,6 +220,15 @@ def test_a_camera_of_foxglove_is_known(tmp_path: Path):
     assert (known.mounting.parent, known.mounting.translation) == ("car", at)
 
 
+@pytest.mark.parametrize("name", ["P", "D", "distortion_model"])
+def test_fields_that_are_not_needed_may_be_missing(tmp_path: Path, name: str):
+    topic, kind, content = lens()
+    content = {key: value for key, value in content.items() if key != name}
+    known, why = found(foxglove(tmp_path / "a.mcap", [(topic, kind, content), picture()]))
+    assert known is not None, why
+    assert known.matrix == tuple(K)
+
+
 def test_of_rectified_images_the_projection_holds_without_distortion(tmp_path: Path):
     messages = [lens(), picture("/front/image_rect")]
     known, _ = found(foxglove(tmp_path / "a.mcap", messages))
