@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from roadeval.jobs.run.frame import run_frame
     from roadeval.jobs.run.replay import Outcome, replay
     from roadeval.jobs.run.train import train
-    from roadeval.jobs.serve import serve
     from roadeval.recording import Recording
     from roadeval.training import Model, load_model, save_model
 
@@ -62,7 +61,6 @@ __all__ = [
     "replay_fleet",
     "run_frame",
     "save_model",
-    "serve",
     "train",
     "write_report",
 ]

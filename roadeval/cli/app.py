@@ -22,7 +22,7 @@ from roadeval.runtime import memory
 from roadeval.runtime.text import debug, defect
 
 FIRST: Final = (
-    *("replay", "fleet", "report", "serve", "inspect", "compare"),
+    *("replay", "fleet", "report", "inspect", "compare"),
     *("pick", "info", "train", "config", "pack", "demo"),
 )
 """The order of the commands in the help; others follow by their names."""

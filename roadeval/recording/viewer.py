@@ -12,9 +12,8 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-from threading import Lock
 from typing import Final, TypeVar
 
 import rerun_cli
@@ -43,49 +42,19 @@ def show(recording: Path, frame: int | None = None) -> None:
     Without a frame it opens where the recording itself wants to begin. A `RecordingError` if there
     is no screen, or the viewer does not come up.
     """
-    window = WindowViewer()
-    try:
-        window.show(recording, frame).wait()
-    finally:
-        window.close()
+    if not has_screen():
+        raise RecordingError(
+            f"No screen to open a window on: open {recording} on a machine that has one, or "
+            "take a screenshot."
+        )
+    with opened(recording) as (process, client):
+        go(client, frame)
+        process.wait()
 
 
 def has_screen() -> bool:
     """Return whether a window can be opened here."""
     return os.name != "posix" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
-
-
-class WindowViewer:
-    """The viewer's window, moved from frame to frame; opened again after it was closed."""
-
-    def __init__(self) -> None:
-        self._stack = ExitStack()
-        self._lock = Lock()
-        self._shown: tuple[Path, subprocess.Popen[bytes], ViewerClient] | None = None
-
-    def show(self, recording: Path, frame: int | None) -> subprocess.Popen[bytes]:
-        """Show a frame of a recording; return the window's process.
-
-        A `RecordingError` if there is no screen, or the viewer does not come up.
-        """
-        if not has_screen():
-            raise RecordingError(
-                f"No screen to open a window on: open {recording} on a machine that has one, or "
-                "take a screenshot."
-            )
-        with self._lock:
-            known = self._shown
-            if known is None or known[0] != recording or known[1].poll() is not None:
-                self._shown = None
-                self._stack.close()
-                known = self._shown = recording, *self._stack.enter_context(opened(recording))
-            _, process, client = known
-            go(client, frame)
-            return process
-
-    def close(self) -> None:
-        """End the viewer."""
-        self._stack.close()
 
 
 def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:

@@ -123,10 +123,6 @@ class Cell(Block):
     bold: bool = False
     dot: str | None = None
     """The colour of a dot before the text."""
-    opens: str = ""
-    """Address below that of a served page at which its frame is opened in the viewer; or empty."""
-    leads: str = ""
-    """Address below that of a served page to which it leads; or empty."""
 
 
 @dataclass(frozen=True)

@@ -213,17 +213,6 @@ class FleetFolder:
         heights = {row["height"] or 0 for row in self.drives.values() if row["evaluated"]}
         return heights.pop() if len(heights) == 1 else 0
 
-    def pages(self) -> dict[str, str]:
-        """Return where each drive's own page lies below that of a served fleet.
-
-        By the drives' identity; a drive that failed has none.
-        """
-        return {
-            drive: f"drive/{place}/"
-            for place, (drive, row) in enumerate(self.drives.items())
-            if row["status"] != FAILED
-        }
-
     def frames(self, drive: str) -> pa.Table:
         """Read the rows of a drive's frames; a FileNotFoundError if none was scored."""
         remedy = f"remove {record_path(self.path, drive)} and {AGAIN}"

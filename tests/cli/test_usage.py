@@ -78,7 +78,6 @@ UNREADABLE = {
     "report": ["{}"],
     "inspect": ["{}"],
     "compare": ["{}", "{}"],
-    "serve": ["{}"],
     "train": ["{}", "-o", "a.model"],
     "pack": ["{}", "-o", "a.mcap"],
     "config": ["--config", "{}"],

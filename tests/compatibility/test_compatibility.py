@@ -12,7 +12,7 @@ def made(request, tmp_path_factory):
     return request.param, unpack(request.param, tmp_path_factory.mktemp(request.param))
 
 
-@pytest.mark.parametrize("command", ["report", "compare", "inspect --list", "serve"])
+@pytest.mark.parametrize("command", ["report", "compare", "inspect --list"])
 @pytest.mark.parametrize("name", [RECORDING, RESULTS])
 def test_its_version_is_named_and_the_way_out(made, name, command, capsys):
     version, folder = made

@@ -12,11 +12,9 @@ import pytest
 
 from roadeval.logs import LogWriter
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
-from tests.e2e.serving import serving
 from tests.fixtures.browser import browser, watched  # noqa: F401
 from tests.fixtures.figures import drawn, without_figures  # noqa: F401
 from tests.fixtures.make import make
-from tests.results.fleet.making import fleet_of
 from tests.training.making import frame
 
 
@@ -106,10 +104,3 @@ def ignored(once) -> Replayed:
         return replay(folder, folder / "drive.mcap", *words).run
 
     return once("ignored", do)
-
-
-@pytest.fixture(scope="module")
-def address(demo, tmp_path_factory):
-    fleet = fleet_of(tmp_path_factory.mktemp("fleet") / "week", 8, pictures=3)
-    with serving(demo.recording, demo.reports, fleet) as (address, _):
-        yield address

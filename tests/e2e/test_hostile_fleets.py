@@ -2,12 +2,10 @@
 
 import json
 import os
-import re
 import shutil
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Thread
 
 import pyarrow as pa
 import pytest
@@ -15,12 +13,10 @@ from pyarrow import parquet
 
 import roadeval
 from roadeval.fleet import remote
-from roadeval.jobs.serve import serving
 from roadeval.recording import viewer
 from roadeval.results.facts import digest_of
 from roadeval.runtime.files import claimed
 from tests.e2e.commands import here
-from tests.e2e.serving import status
 from tests.e2e.test_fleet import Here, write
 from tests.fleet.serving import Server
 
@@ -129,17 +125,6 @@ def looked_into(fleet):
             "page": here("report", fleet, "-o", fleet / "page.html"),
             "compare": here("compare", fleet, fleet),
         }
-        try:
-            with serving([fleet]) as server:
-                Thread(target=server.serve_forever, daemon=True).start()
-                origin = re.match(r"http://[^/]+", server.address)[0]
-                for address in ("0/", "0/drive/0/"):
-                    status(f"{server.address}{address}")
-                view = f"{server.address}0/worst/1/view"
-                runs["button"] = status(view, method="POST", Origin=origin)
-                server.shutdown()
-        except roadeval.RoadevalError:
-            pass
     assert outside(fleet) == before
     temporary = Path("/tmp")
     elsewhere = [
@@ -151,7 +136,7 @@ def looked_into(fleet):
         and not path.startswith("/dev/")
     ]
     assert elsewhere == []
-    said = "".join(run.stdout + run.stderr for run in runs.values() if not isinstance(run, int))
+    said = "".join(run.stdout + run.stderr for run in runs.values())
     return runs, said, seen
 
 
@@ -171,7 +156,7 @@ def test_a_drives_name_in_the_tables_alone_is_no_path(fleet):
     called(fleet, "../../mine/x", summary=False)
     runs, _, _ = looked_into(fleet)
     assert "a drive is called '../../mine/x', which is no name" in runs["worst"].stderr
-    assert {run.returncode for name, run in runs.items() if name != "button"} == {1}
+    assert {run.returncode for run in runs.values()} == {1}
 
 
 @pytest.mark.parametrize("link", ["recordings", "recordings/{}.rrd", "recordings/.{}.rrd.lock"])
@@ -239,7 +224,6 @@ def test_a_drives_url_is_not_asked(fleet, server):
     assert server.asked == []
     assert runs["worst"].returncode == 1
     assert f"make it with: roadeval replay {server.url('whole/a.mcap')} " in runs["worst"].stderr
-    assert runs["button"] == 409
     assert PASSWORD not in said
 
 

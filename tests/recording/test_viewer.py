@@ -1,13 +1,9 @@
 """What the viewer needs from the machine, and what is said where it lacks that or is late."""
 
-from contextlib import contextmanager
-from pathlib import Path
-
 import pytest
 
 from roadeval.recording import viewer
 from roadeval.recording.layout import RecordingError
-from roadeval.recording.viewer import WindowViewer
 
 
 @pytest.fixture
@@ -56,42 +52,3 @@ def test_a_viewer_that_never_answers_or_has_ended_is_told_in_one_line(failure, s
 
     with pytest.raises(RecordingError, match=f"^{said}$"):
         viewer.asked(ask)
-
-
-class Process:
-    """A viewer's process: it runs until somebody closes the window."""
-
-    def __init__(self):
-        self.code = None
-
-    def poll(self):
-        return self.code
-
-
-@pytest.fixture
-def windows(monkeypatch):
-    """What became of each window, in order: the recording, its process, and what is shown."""
-    made = []
-
-    @contextmanager
-    def opened(recording):
-        window = {"recording": recording, "process": Process(), "frames": [], "ended": False}
-        made.append(window)
-        yield window["process"], window
-        window["ended"] = True
-
-    monkeypatch.setattr(viewer, "opened", opened)
-    monkeypatch.setattr(viewer, "go", lambda window, frame: window["frames"].append(frame))
-    monkeypatch.setattr(viewer, "has_screen", lambda: True)
-    return made
-
-
-def test_a_window_is_led_from_frame_to_frame_until_it_is_closed_or_another_recording_comes(windows):
-    window = WindowViewer()
-    for name, frame in (("a.rrd", 84), ("a.rrd", 12), ("b.rrd", 2)):
-        window.show(Path(name), frame)
-    windows[1]["process"].code = 0
-    window.show(Path("b.rrd"), 3)
-    assert [each["recording"].name for each in windows] == ["a.rrd", "b.rrd", "b.rrd"]
-    assert [each["frames"] for each in windows] == [[84, 12], [2], [3]]
-    assert [each["ended"] for each in windows] == [True, True, False]

@@ -252,7 +252,6 @@ def browsed(result: DriveResult) -> FrameBrowser:
         rows=[*facts_of(result)],
         variants=frames.distinct("variant"),
         titles=names,
-        served=frozenset(result.pictured),
         charts=over_frames(frames, names) if len(frames) else [],
         command=result.inspect("{}") if result.recording else "",
         masks=[f"{each.name}: {each.stages[-1]}" for each in there],

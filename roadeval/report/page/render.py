@@ -43,56 +43,47 @@ _SCRIPTS: Final = (
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where a page finds what belongs to it."""
-
-    frames: str | None = None
-    """Address of a frame, with ``{}`` for its number, where a server gives it; None: all that the
-    page shows is on it."""
-    home: str = ""
-    """Address of the page above, or empty."""
-    home_title: str = "All results"
-
-    @property
-    def policy(self) -> str:
-        """The content security policy: nothing but the page's own parts."""
-        return "; ".join(
-            [
-                "default-src 'none'",
-                "img-src data:",
-                f"style-src {_hash(style())}",
-                f"script-src {_hash(script())}",
-                *(["connect-src 'self'"] if self.frames else []),
-                "base-uri 'none'",
-                "form-action 'none'",
-            ]
-        )
-
-
-INSIDE: Final = Place()
-
-
-def page(document: Document, place: Place = INSIDE) -> bytes:
+def page(document: Document) -> bytes:
     """Return a document as a page in UTF-8; equal documents give equal bytes."""
-    found = sections(document.blocks)
-    return _rendered(
-        "page.html",
-        place,
-        document,
-        doc=document,
-        sections=found,
-        policy=place.policy,
-        home=place.home,
-        home_title=place.home_title,
-        style=style(),
-        script=script(),
+    parts = [*document.parts()]
+    span = span_of_frames(part for part in parts if isinstance(part, Chart))
+    browsers = (part for part in parts if isinstance(part, FrameBrowser))
+    variants = next((part.variants for part in browsers), ())
+    made = (
+        _environment()
+        .get_template("page.html")
+        .render(
+            doc=document,
+            sections=sections(document.blocks),
+            policy=_policy(),
+            style=style(),
+            script=script(),
+            drawn=lambda chart: drawn(chart, span),
+            legend=legend,
+            values=values,
+            source=_source,
+            filled=_filled,
+            variants=variants,
+            variant_of=partial(_variant_of, variants),
+            unknown=_unknown,
+        )
     )
+    return str(made).encode("utf-8")
 
 
-def part(block: Block, place: Place) -> bytes:
-    """Return one block as a part of a page."""
-    return _rendered("part.html", place, None, block=block)
+@cache
+def _policy() -> str:
+    """Return the content security policy: nothing but the page's own parts."""
+    return "; ".join(
+        [
+            "default-src 'none'",
+            "img-src data:",
+            f"style-src {_hash(style())}",
+            f"script-src {_hash(script())}",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
 
 
 @cache
@@ -115,32 +106,6 @@ def _asset(name: str) -> str:
 def _hash(code: str) -> str:
     digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
     return f"'sha256-{digest}'"
-
-
-def _rendered(template: str, place: Place, document: Document | None, **given: Any) -> bytes:
-    parts = [*document.parts()] if document else []
-    span = span_of_frames(part for part in parts if isinstance(part, Chart))
-    browsers = (part for part in parts if isinstance(part, FrameBrowser))
-    variants = next((part.variants for part in browsers), ())
-    own_frame = "#frame-{}" if place.frames is None else place.frames
-    made = (
-        _environment()
-        .get_template(template)
-        .render(
-            drawn=lambda chart: drawn(chart, span),
-            legend=legend,
-            values=values,
-            source=_source,
-            frame_link=own_frame.format,
-            filled=_filled,
-            variants=variants,
-            variant_of=partial(_variant_of, variants),
-            unknown=_unknown,
-            is_live=place.frames is not None,
-            **given,
-        )
-    )
-    return str(made).encode("utf-8")
 
 
 def _variant_of(variants: Sequence[str], text: Cell | str) -> str:

@@ -122,9 +122,9 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     Or the ``worst`` ones, those with the highest ERR, without state and group.
     """
     scores, differences = findings.first_scores, _differences(findings)
-    tags, pages = _tags(findings), findings.pages()
+    tags = _tags(findings)
     columns: dict[str, Callable[[str], Cell | str]] = {
-        "drive": lambda drive: Cell(findings.names[drive], leads=pages.get(drive, "")),
+        "drive": lambda drive: findings.names[drive],
         "state": lambda drive: str(findings.drives[drive]["status"]),
         "group": lambda drive: str(findings.drives[drive]["group"] or ""),
         "tags": lambda drive: tags.get(drive, ""),
@@ -280,16 +280,15 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
 
 def _commands_table(findings: FleetFolder, rows: Sequence[Row]) -> Table:
     """Tabulate the worst frames with the command that opens each in the viewer."""
-    pages = findings.pages()
     return Table(
         ["", "drive", "frame", "ERR, %", "in the viewer"],
         [
             [
                 str(row["rank"]),
-                Cell(findings.names[row["drive"]], leads=pages[row["drive"]]),
-                Cell(str(row["frame"]), leads=f"{pages[row['drive']]}#frame-{row['frame']}"),
+                findings.names[row["drive"]],
+                str(row["frame"]),
                 Cell(percent(row["ERR"]), bold=True),
-                Cell(findings.inspect(row), opens=f"worst/{row['rank']}"),
+                findings.inspect(row),
             ]
             for row in rows
         ],

@@ -144,10 +144,8 @@ class FrameBrowser(Block):
     """Rates along the drive."""
     command: str = ""
     """Opens a frame in the viewer, with ``{}`` for its number; empty without a recording."""
-    served: frozenset[int] = frozenset()
-    """Frames that a server has the pictures of."""
     strips: Sequence[Strip] = ()
-    """Frames with their pictures, in order; none where they are asked for one by one."""
+    """Frames with their pictures, in order."""
     masks: Sequence[str] = ()
     """Names of the pictures of final masks, which are compared where there is no truth."""
     titles: Sequence[str] = tuple(SHORT)
@@ -156,7 +154,7 @@ class FrameBrowser(Block):
     @property
     def pictured(self) -> frozenset[int]:
         """The frames whose pictures can be had."""
-        return frozenset(strip.frame for strip in self.strips) or self.served
+        return frozenset(strip.frame for strip in self.strips)
 
     @property
     def shown(self) -> list[NotableFrame]:

@@ -9,7 +9,6 @@ class Browser {
     this.byFrame = new Map(this.rows.map((row) => [Number(row.dataset.frame), row]));
     this.held = new Map([...this.strips.children].map((each) => [Number(each.dataset.frame), each]));
     this.stage = new Stage(element.querySelector(".stage"), element.dataset.left, element.dataset.right);
-    this.live = element.querySelector("tr.pictured a")?.getAttribute("href").startsWith("#") === false;
     this.tools();
     this.filters();
     for (const row of this.rows) {
@@ -43,12 +42,9 @@ class Browser {
     this.where = tools.querySelector(".where");
     this.previous = tools.querySelector(".previous");
     this.next = tools.querySelector(".next");
-    this.opener = tools.querySelector(".open");
     tools.hidden = false;
     this.previous.addEventListener("click", () => this.step(-1));
     this.next.addEventListener("click", () => this.step(1));
-    this.opener.addEventListener("click", () => this.open());
-    this.opener.hidden = !this.live;
     document.addEventListener("keydown", (event) => {
       if (event.altKey || event.ctrlKey || event.metaKey) return;
       if (event.target.closest("input, select, textarea")) return;
@@ -73,7 +69,7 @@ class Browser {
   }
 
   /** Show a frame; the address names it, as a step to go back from or in the place of the last. */
-  async show(frame, { scroll = false, follow = false, address = "pushState" } = {}) {
+  show(frame, { scroll = false, follow = false, address = "pushState" } = {}) {
     this.frame = frame;
     if (address && location.hash !== `#frame-${frame}`) history[address](null, "", `#frame-${frame}`);
     this.element.querySelector(".viewer").hidden = false;
@@ -84,16 +80,10 @@ class Browser {
     for (const each of along) each.mark(frame);
     for (const each of this.held.values()) each.hidden = Number(each.dataset.frame) !== frame;
     this.position();
-    if (!this.held.has(frame) && this.live && row?.classList.contains("pictured")) {
-      this.where.textContent = `Frame ${frame} \u2026`;
-      await this.fetch(frame);
-    }
-    if (this.frame !== frame) return;
     const strip = this.held.get(frame);
     this.stage.offer(strip ? [...strip.querySelectorAll(".tile")] : []);
     this.absent.hidden = Boolean(strip);
     if (!strip) this.tellAbsent(frame);
-    this.opener.disabled = !this.live || !row?.classList.contains("pictured");
     if (scroll) this.element.querySelector(".viewer").scrollIntoView({ block: "start" });
   }
 
@@ -117,30 +107,6 @@ class Browser {
       this.absent.append(" ", button);
     }
     if (command) this.absent.append(" In the viewer: ", words);
-  }
-
-  /** Ask the server for a frame's pictures. */
-  async fetch(frame) {
-    const address = this.byFrame.get(frame).querySelector("a").href;
-    const answer = await fetch(`${address}/part`);
-    const made = document.createElement("template");
-    made.innerHTML = await answer.text();
-    const strip = made.content.querySelector(".strip");
-    if (answer.ok && strip) {
-      makeCommands(strip);
-      this.strips.append(strip);
-      this.held.set(frame, strip);
-      strip.hidden = this.frame !== frame;
-    }
-    this.position();
-  }
-
-  async open() {
-    const { opener, frame } = this;
-    const address = this.byFrame.get(frame).querySelector("a").href;
-    const problem = await openInViewer(opener, `${address}/view`);
-    this.absent.hidden = !problem;
-    this.absent.textContent = problem;
   }
 
   filters() {
@@ -189,21 +155,6 @@ class Browser {
     const each = new Set(shown.map((title) => title.dataset.variant)).size;
     for (const group of this.element.querySelectorAll(".frames .groups th")) group.colSpan = each;
   }
-}
-
-/** Ask the server to show a frame in the viewer; the answer is what went wrong, or empty. */
-async function openInViewer(button, address) {
-  const words = button.textContent;
-  [button.disabled, button.textContent] = [true, "Opening \u2026"];
-  let told = "The server has ended.";
-  try {
-    const answer = await fetch(address, { method: "POST" });
-    told = (await answer.text()).trim();
-  } catch {
-    // It is told below.
-  }
-  [button.disabled, button.textContent] = [false, words];
-  return told;
 }
 
 function hasCondition(row, condition) {

@@ -1,9 +1,9 @@
 // Everything is there without a script; this makes it answer.
 
 /** Give each command a button that copies it, where the browser lets a page do that. */
-function makeCommands(part) {
+function makeCommands() {
   if (!navigator.clipboard) return;
-  for (const command of part.querySelectorAll(".command")) {
+  for (const command of document.querySelectorAll(".command")) {
     const button = document.createElement("button");
     button.type = "button";
     button.textContent = "Copy";
@@ -43,7 +43,7 @@ function followOutline() {
 document.documentElement.classList.add("scripted-on");
 for (const table of document.querySelectorAll("table")) makeSortable(table);
 for (const long of document.querySelectorAll(".long")) makeSearchable(long);
-makeCommands(document);
+makeCommands();
 const element = document.querySelector(".browser");
 let browser = null;
 startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), { scroll: true }));
@@ -62,18 +62,6 @@ function nearestFrame(frame) {
   return known[nearest(known, frame)];
 }
 
-for (const button of document.querySelectorAll(".opens")) {
-  button.hidden = false;
-  button.addEventListener("click", async () => {
-    button.parentElement.querySelector(".problem")?.remove();
-    const problem = await openInViewer(button, `${button.dataset.open}/view`);
-    if (!problem) return;
-    const told = document.createElement("p");
-    [told.className, told.textContent] = ["problem", problem];
-    told.setAttribute("role", "status");
-    button.after(told);
-  });
-}
 for (const image of document.querySelectorAll(".grid img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }
