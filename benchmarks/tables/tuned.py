@@ -7,7 +7,7 @@ each half of IDD's drives teaches what the other is scored with.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,10 +43,13 @@ def measured(sources: Sources, network: Path) -> dict[str, Any]:
 
 def _on(name: str, sources: Sources, network: Path) -> dict[str, Any]:
     drive = DRIVES[name]
-    tables = {"labels": drive.labels, "training": {"seeds": SEEDS_OF_ROBUST}}
-    config = _config(tables, sources, network)
-    reports = sources.work / f"{name}.tuned"
-    return of_summary(roadeval.replay(drive.find(sources, name), config, reports=reports).summary)
+    summaries = []
+    for seed in range(SEEDS_OF_ROBUST):
+        tables = {"labels": drive.labels, "training": {"seed": seed}}
+        config, reports = _config(tables, sources, network), sources.work / f"{name}.tuned.{seed}"
+        outcome = roadeval.replay(drive.find(sources, name), config, reports=reports)
+        summaries.append(outcome.summary)
+    return of_summaries(summaries)
 
 
 def _config(tables: dict[str, Any], sources: Sources, network: Path) -> RunConfig:
@@ -82,18 +85,27 @@ def told_of_idd(blind: idd.Counted, counted: Mapping[str, list[idd.Counted]]) ->
     }
 
 
-def of_summary(summary: dict[str, Any]) -> dict[str, Any]:
-    """Return what is kept of a replay's summary."""
-    seeds, totals = summary["seeds"]["totals"], summary["totals"]
-    once = {name: [own[FINAL_STAGE]["ERR"]] for name, own in totals.items()}
-    each = {name: own[FINAL_STAGE]["ERR"] for name, own in seeds.items() if FINAL_STAGE in own}
+def of_summaries(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what is kept of the summaries of replays, one a seed of the training from 0.
+
+    The network as it comes learns nothing: its ERR is there once.
+    """
+    summary = summaries[0]
+    totals = summary["totals"]
+    errors = {
+        key: [
+            each["totals"][variant][FINAL_STAGE]["ERR"]
+            for each in (summaries[:1] if key == "network" else summaries)
+        ]
+        for key, variant in NAMES.items()
+    }
     found: dict[str, Any] = {
         "blind": totals["blind"][FINAL_STAGE]["ERR"],
         "own": summary["thresholds"]["net"]["own"],
         "chosen": summary["thresholds"]["net"]["threshold"],
         "change": change_of(summary["against_unfiltered"]["net_tuned"]["ERR"]),
         "against_network": change_of(summary["against_method"]["net_tuned"]["ERR"]),
-        **{key: {**once, **each}[variant] for key, variant in NAMES.items()},
+        **errors,
     }
     kept: dict[str, Any] = rounded(found)
     return kept

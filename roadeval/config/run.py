@@ -112,8 +112,6 @@ class RunConfig(LogConfig):
             path = getattr(self.output, key)
             if path is not None and not path.endswith(ending):
                 raise ConfigError(f"`output.{key}` {path}: name a file that ends in {ending}")
-        if self.training.seeds > 1 and not any(p.learning() for p in self.pipelines().values()):
-            raise ConfigError("`training.seeds`: no stage of any variant learns anything")
         if self.output.mcap is not None and self.frames.scale != 1:
             raise ConfigError(
                 "`output.mcap` and `frames.scale` do not go together: reduced masks would not lie "

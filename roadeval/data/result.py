@@ -145,13 +145,11 @@ class VariantResult:
 
     ``oracles`` holds, by the name of a stage that was replaced by the truth, the road masks of
     the stages after it by theirs. They are no results: see `roadeval.pipeline.chain.Chain`.
-    ``repeats`` holds, by the seed of another training, the masks by the stages' names.
     """
 
     variant: str
     stages: tuple[StageResult, ...]
     oracles: Mapping[str, Mapping[str, Packed]] = field(default_factory=dict)
-    repeats: Mapping[int, Mapping[str, Packed]] = field(default_factory=dict)
 
     def masks(self) -> Iterator[tuple[str, Packed]]:
         """Yield each stage that has a road mask, with the mask; `Packed.pixels` gives its array."""
@@ -233,9 +231,9 @@ class FrameResult:
     against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
     those of the final masks by variant, ``histograms`` the labelled pixels by how probable road is,
     for each variant and stage that says so, and ``oracles`` the counts of what the stages
-    made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
-    their seed. ``metres`` are the measures of each final mask by variant where the camera is known,
-    and ``above`` the ground seen from above by how probable road is. ``doubts`` has each variant's,
+    made once one was replaced by the truth, by that one. ``metres`` are the measures of each
+    final mask by variant where the camera is known, and ``above`` the ground seen from above by how
+    probable road is. ``doubts`` has each variant's,
     without truth. ``notes`` are sentences for a person.
     """
 
@@ -251,7 +249,6 @@ class FrameResult:
     contours: Mapping[str, Contour] = field(default_factory=dict)
     histograms: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
-    repeats: Mapping[int, tuple[Tally, ...]] = field(default_factory=dict)
     doubts: tuple[Doubt, ...] = ()
     metres: Mapping[str, FrameMetres] = field(default_factory=dict)
     above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)

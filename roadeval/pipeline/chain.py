@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import takewhile
 from typing import Any
 
 from roadeval.data import LayerSpec, Output, Packed, Truth
@@ -147,18 +146,6 @@ class Chain:
                 seen = view.after(oracle(step.settings, step.parameters, view, truth))
                 yield step.stage.name, dict(_masks(self.steps[place + 1 :], seen))
             view = view.after(output)
-
-    def repeated(self, view: View, outputs: Sequence[Output]) -> Iterator[tuple[str, Packed]]:
-        """Yield the masks of this chain where another of the same stages has run already.
-
-        ``view`` and ``outputs`` are the argument and the outputs of the other's `run`. They hold
-        for this one, too, up to the first stage that learns: from there on the masks are computed
-        and yielded.
-        """
-        taken = list(takewhile(lambda step: step.stage.fit is None, self.steps))
-        for output in outputs[: len(taken)]:
-            view = view.after(output)
-        yield from _masks(self.steps[len(taken) :], view)
 
 
 def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import (
     DASH,
     MINUS,
@@ -23,7 +22,7 @@ from roadeval.evaluation.score import final_stages
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
-from roadeval.results.sentences import marked_interval, overconfident, spread_in_words
+from roadeval.results.sentences import marked_interval, overconfident
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 """The rates whose differences stand beside that of ERR."""
@@ -162,28 +161,6 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
         rows,
         breaks=[place for place, (a, b) in enumerate(pairwise(effects), 1) if a.base != b.base],
         groups=[("", 1), ("ERR", 4), ("", len(OTHERS)), (unit, len(counts))] if counts else (),
-        small=True,
-    )
-
-
-def seeds_table(seeds: Mapping[str, Any], names: Sequence[str]) -> Table:
-    """Tabulate the spread of rates over seeds: of each variant that learns, and of the filter."""
-    rows: list[list[Cell | str]] = [
-        [
-            variant_cell(name, names),
-            *(spread_in_words(stages[FINAL_STAGE].get(rate, ()), percent) for rate in FULL),
-        ]
-        for name, stages in seeds["totals"].items()
-    ]
-    if effect := seeds["difference"].get(FINAL_STAGE):
-        words = f"{FILTERED} {MINUS} {UNFILTERED}, pp"
-        rows.append([words, *(spread_in_words(effect.get(rate, ()), points) for rate in FULL)])
-    first, *_, last = seeds["seeds"]
-    return Table(
-        ["final mask", *FULL],
-        rows,
-        caption=f"Percent, with seeds {first} to {last} of the training: the middle, and from the "
-        f"least to the greatest. All else is of seed {first}.",
         small=True,
     )
 

@@ -226,8 +226,6 @@ class Facts(Document):
     """Each other variant's final mask minus that of ``unfiltered`` or ``blind``, by variant."""
     against_method: Differences = field(default_factory=dict)
     """Each tuned variant's minus that of the method that was tuned, by variant."""
-    seeds: dict[str, Any] = field(default_factory=dict)
-    """The rates with each further seed of the training; empty with one."""
     oracles: dict[str, Totals] = field(default_factory=dict)
     """Totals where a stage was replaced by the truth."""
     misfits: list[str] = field(default_factory=list)
@@ -270,12 +268,12 @@ class Facts(Document):
     VALUES = 200_000  # a run with two variants writes some two thousand
     RESULTS = (
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
-        *("against_unfiltered", "against_blind", "against_method", "seeds", "oracles"),
+        *("against_unfiltered", "against_blind", "against_method", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
         *("cameras", "unlabelled", "estimate", "misfits"),
     )
     OPTIONAL = (
-        *("against_method", "curves", "thresholds", "seeds", "methods", "masks", "files"),
+        *("against_method", "curves", "thresholds", "methods", "masks", "files"),
         *("cameras", "unlabelled", "estimate", "misfits"),
     )
 

@@ -1,17 +1,15 @@
-"""A result in words: differences, the verdict, notes on frames, seeds, and the paper's claims."""
+"""A result in words: differences, the verdict, notes on frames, and the paper's claims."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from statistics import median
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Tally
 from roadeval.data.words import (
-    DASH,
     counted,
     defined,
     in_percent,
@@ -456,19 +454,6 @@ def step_by_step(parts: Mapping[str, float]) -> str:
         for name, cost in rest
     )
     return ", ".join([f"{first}{without} leaves {error:.1f} % wrong", *steps])
-
-
-def spread_in_words(values: Sequence[float | None], written: Callable[[float], str]) -> str:
-    """Return the median, least and greatest of the values that are defined.
-
-    >>> spread_in_words([0.01, 0.02, 0.04], percent)
-    '2.00 (1.00 to 4.00)'
-    """
-    known = [value for value in values if defined(value)]
-    if not known:
-        return DASH
-    middle, least, most = map(written, (median(known), min(known), max(known)))
-    return f"{middle} ({least} to {most})"
 
 
 def without_filter(notes: Iterable[str]) -> list[str]:

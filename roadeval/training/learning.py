@@ -230,20 +230,20 @@ def from_log(
     labelled: bool,
     base: Model | None = None,
     picks: Picks | None = None,
-) -> tuple[tuple[Model, ...], Schedule]:
-    """Train on some frames of a log, with each seed of the settings.
+) -> tuple[Model, Schedule]:
+    """Train on some frames of a log.
 
     A `TrainingError` if there is nothing to learn from, or nothing left to evaluate. Of the
     ``frames`` of the selected range only as many are decoded as are needed, and ``on_frame`` is
     called with the number of those so far. ``labelled`` says that the log's truth may be used: then
     only frames that have one train, and some must be left to evaluate. Where no frame of the range
     has one, the first ones train. ``base`` is what was learnt from other drives. With ``picks``
-    those train that were picked by rank. Returned are the model of each seed, the first with
-    warnings, and which frames are left out.
+    those train that were picked by rank. Returned are the model and which frames are left
+    out.
     """
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
     if not learning:
-        return (fit((), pipelines, settings),), Schedule(picks=picks)
+        return fit((), pipelines, settings), Schedule(picks=picks)
     if not settings.frames:
         raise TrainingError(
             f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
@@ -274,12 +274,9 @@ def from_log(
             f"{len(held.frames)} of its own {how}: the rates are not those on a drive that it has "
             "not seen"
         )
-    first, *others = (
-        fit(held.frames, pipelines, replace(settings, seed=seed, seeds=1), base)
-        for seed in range(settings.seed, settings.seed + settings.seeds)
-    )
-    schedule = replace(schedule, digests=first.digests, picks=picks)
-    return (replace(first, warnings=tuple(warnings)), *others), schedule
+    model = fit(held.frames, pipelines, settings, base)
+    schedule = replace(schedule, digests=model.digests, picks=picks)
+    return replace(model, warnings=tuple(warnings)), schedule
 
 
 def _require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_truth: bool) -> None:

@@ -40,13 +40,7 @@ class TrainingSettings:
     """Upper bound over all frames and both classes: the SVM's training time grows with its square.
     """
     seed: Annotated[int, Interval(ge=0, le=1_000_000_000)] = 0
-    """Of the draw."""
-    seeds: Annotated[int, Interval(ge=1, le=100), Flag("--seeds", "N")] = 1
-    """Train N times, each with another draw of pixels: shows how far the rates depend on it. The
-    draws are those of ``seed`` and of the numbers after it. Recording and tables are the first
-    one's. It is not the one with the middle rate: which that is differs from rate to rate, and a
-    result that was chosen by its numbers is no longer the result of a rule that was fixed before.
-    """
+    """Of the draw. Another seed draws other pixels, and gives other rates."""
     patch: ReferencePatch = field(default_factory=ReferencePatch)
     """Self-supervision: the trapezoid in front of the vehicle that is taken for road."""
     horizon: Share = 0.4
@@ -59,7 +53,3 @@ class TrainingSettings:
     def __post_init__(self) -> None:
         if self.adapt and self.model is None:
             raise ValueError("`training.adapt` needs `training.model`, which it builds on")
-        if self.model is not None and self.seeds > 1:
-            raise ValueError(
-                "`training.seeds` trains several times, and `training.model` is trained already"
-            )

@@ -16,13 +16,6 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_seeds_are_for_what_learns():
-    chain = {"chain": ["post"], "training": {"seeds": 2}}
-    with pytest.raises(ConfigError, match=r"`training.seeds`: no stage of any variant learns"):
-        configure(chain)
-    assert configure(chain | {"variants": {"v": {}}}).training.seeds == 2
-
-
 def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
     config = load_config(write(tmp_path, "[shadow]\nring_width = 3\n[training]\nframes = 20"))
     assert config.pipeline.settings["shadow"].ring_width == 3

@@ -29,7 +29,6 @@ OTHER = {
     "training.frames": 4,
     "training.placement": "spread",
     "training.gap": 2,
-    "training.seeds": 5,
     "only": ["unfiltered"],
     "truth.path": "labels/{drive}",
     "truth.pair": "stamp",

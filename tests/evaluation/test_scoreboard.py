@@ -1,12 +1,11 @@
 """A drive's score, from its frames to its sums."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from roadeval.data import Health, Packed, Role
+from roadeval.data import Health, Role
 from roadeval.evaluation.score import (
     BlindPrior,
     Scoreboard,
@@ -83,34 +82,3 @@ def test_the_mask_fits_a_frame_of_another_size() -> None:
 def test_truths_of_several_sizes_make_one_prior() -> None:
     prior = BlindPrior.of_truths([pixels("..##"), pixels(*["....####"] * 2)])
     assert prior.road.tolist() == [[0, 0, 1, 1]]
-
-
-# --- Rates with each seed of the training, from the frames' counts --------------------------------
-
-FRAME_TRUTH = pixels("##..", "##..")
-RIGHT, ONE_WRONG, TWO_WRONG = FRAME_TRUTH, pixels("###.", "##.."), pixels("####", "##..")
-
-
-def with_seeds(name, own, **others):
-    """A variant with a final mask of its own, and those with other seeds, as ``seed_3``."""
-    repeats = {int(seed[5:]): {"post": Packed.of(mask)} for seed, mask in others.items()}
-    return replace(a_variant(name, {"post": own}), repeats=repeats)
-
-
-def a_board_of(*frames, prior=None):
-    board = Scoreboard(
-        EvaluationSettings(boundary_width=1, bands=1), ["filtered", "unfiltered", "net"], prior
-    )
-    for number, variants in enumerate(frames):
-        board.add(board.score(a_frame(FRAME_TRUTH, number), Role.EVALUATED, variants))
-    return board
-
-
-def test_the_rates_stand_in_the_order_of_the_seeds_the_run_s_own_first():
-    filtered = with_seeds("filtered", RIGHT, seed_11=TWO_WRONG, seed_10=ONE_WRONG)
-    unfiltered = with_seeds("unfiltered", ONE_WRONG, seed_10=ONE_WRONG, seed_11=RIGHT)
-    found = a_board_of((filtered, unfiltered)).repeats()
-    assert found["totals"]["filtered"]["post"]["ERR"] == [0, 1 / 8, 2 / 8]
-    assert found["totals"]["filtered"]["post"]["pooled_FPR"] == [0, 1 / 4, 2 / 4]
-    assert found["totals"]["unfiltered"]["post"]["ERR"] == [1 / 8, 1 / 8, 0]
-    assert found["difference"]["post"]["ERR"] == [-1 / 8, 0, 2 / 8]

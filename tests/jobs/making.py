@@ -20,7 +20,7 @@ TABLES: Final = {
     "max_pixels": "frames",
     **dict.fromkeys(("masks", "resize_truth", "sync_tolerance_ms", "image", "truth"), "topics"),
     **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors"), "labels"),
-    **dict.fromkeys(("model", "gap", "train_frames", "source", "seed", "seeds"), "training"),
+    **dict.fromkeys(("model", "gap", "train_frames", "source", "seed"), "training"),
     "record": "output",
     "jobs": "run",
 }

@@ -217,30 +217,6 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
     assert recording.layer("filtered", "post", number).shape == (small["height"], small["width"])
 
 
-def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
-    common = {"record": "none", "train_frames": 3, "max_frames": 12, "seed": 4}
-    alone, other, both = (
-        run(drive, tmp_path / name, **common | given)
-        for name, given in {"a": {}, "b": {"seed": 5}, "c": {"seeds": 2, "jobs": 3}}.items()
-    )
-    for table in ("frames", "oracles", "windows"):
-        first, again = (tmp_path / name / "reports" / f"{table}.csv" for name in "ac")
-        assert first.read_bytes() == again.read_bytes()
-    assert "seeds" not in alone.summary
-    seeds = both.summary["seeds"]
-    assert seeds["seeds"] == [4, 5]
-    for variant, stages in seeds["totals"].items():
-        for stage, rates in stages.items():
-            for rate, values in rates.items():
-                each = [run.summary["totals"][variant][stage][rate] for run in (alone, other)]
-                assert values == each
-    assert list(seeds["totals"]) == ["filtered", "unfiltered"]
-    for stage, rates in seeds["difference"].items():
-        for rate, values in rates.items():
-            each = [run.summary["difference"][stage][rate]["mean"] for run in (alone, other)]
-            assert values == each
-
-
 def test_damage_that_costs_no_message_is_a_warning(tmp_path):
     path = write_log(tmp_path / "twice.mcap")
     path.write_bytes(2 * path.read_bytes())

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from roadeval.data import Packed
-from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.stage import Output, View
 from roadeval.pipeline.stages import STAGES
@@ -91,35 +90,3 @@ def test_a_perfect_filter_leaves_a_frame_without_shadow_as_it_is(chain):
     assert list(told) == list(expected)
     for name, mask in expected.items():
         assert_same(told[name], mask, name)
-
-
-# --- A chain that takes over what another of the same stages has computed -------------------------
-
-PICTURE = View.of(noise(40, 60))
-
-
-def of(*names: str) -> Chain:
-    return chain_of(names, {name: SETTINGS["paper"][name] for name in names})
-
-
-def test_the_masks_are_those_of_the_chain_itself():
-    chain = of(*NAMES)
-    results = list(chain.run(PICTURE))
-    masks = dict(chain.repeated(PICTURE, [output for _, output in results]))
-    assert list(masks) == ["similarity", "svm", "post"]
-    for name, output in results:
-        if output.mask is not None:
-            np.testing.assert_array_equal(masks[name].pixels(), output.mask.pixels())
-
-
-def test_other_parameters_give_their_own_masks():
-    chain, other = of(*NAMES), chain_of(NAMES, SETTINGS["paper"] | {"svm": wide()})
-    outputs = [output for _, output in chain.run(PICTURE)]
-    expected = {name: output.mask for name, output in other.run(PICTURE)}
-    masks = dict(other.repeated(PICTURE, outputs))
-    np.testing.assert_array_equal(masks["svm"].pixels(), expected["svm"].pixels())
-    assert (masks["svm"].pixels() != outputs[2].mask.pixels()).any()
-
-
-def wide():
-    return type(SETTINGS["paper"]["svm"])(gamma=0.01, c=0.1)

@@ -6,14 +6,12 @@ from dataclasses import replace
 import pytest
 
 from roadeval.data import Counts
-from roadeval.data.words import DASH, points
 from roadeval.evaluation import metrics
 from roadeval.evaluation.score import Effect
 from roadeval.evaluation.stats import Difference
 from roadeval.results.sentences import (
     notes,
     sentence,
-    spread_in_words,
     verdict,
 )
 from tests.evaluation.making import a_difference
@@ -195,20 +193,3 @@ def test_a_failure_is_noted_with_its_reason() -> None:
     assert tuple(notes({"net": missed}, None)) == ("net finds 5.0 % of the road.",)
     wrong = tuple(notes({"net": with_error(30)}, None))
     assert wrong == ("net gets 30.0 % of the pixels wrong.",)
-
-
-# --- What several seeds come to -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("values", "told"),
-    [
-        ([0.03, 0.01, 0.02], "+2.00 (+1.00 to +3.00)"),
-        ([0.01, 0.02, 0.03, 0.1], "+2.50 (+1.00 to +10.00)"),
-        ([None, 0.02, math.nan], "+2.00 (+2.00 to +2.00)"),
-        ([None, math.nan], DASH),
-        ([], DASH),
-    ],
-)
-def test_a_spread_is_the_middle_the_least_and_the_greatest_of_what_is_defined(values, told):
-    assert spread_in_words(values, points) == told

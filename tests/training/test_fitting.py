@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from roadeval.config import ConfigError, configure
 from roadeval.data import NON_ROAD, ROAD
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import View
@@ -123,18 +122,3 @@ def test_the_patch_is_road_whatever_it_shows(shape):
     truth = patch_truth(image, TrainingSettings(horizon=1.0, far=0.01))
     assert truth.dtype == np.uint8
     np.testing.assert_array_equal(truth == ROAD, patch_mask(*shape, ReferencePatch()) > 0)
-
-
-# --- What cannot be asked of a training -----------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"seeds": 2, "model": "city.model"}, "`training.model` is trained already"),
-        ({"seeds": 0}, "must be at least 1"),
-    ],
-)
-def test_seeds_that_cannot_be_are_refused(given, said):
-    with pytest.raises(ConfigError, match=said):
-        configure({"training": given})

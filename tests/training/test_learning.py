@@ -52,11 +52,6 @@ def roles(frames, schedule: Schedule) -> str:
 
 
 def learn(logged, *, labelled: bool = True, **settings):
-    (model,), schedule = with_seeds(logged, labelled=labelled, **settings)
-    return model, schedule
-
-
-def with_seeds(logged, *, labelled: bool = True, **settings):
     wanted = TrainingSettings(**settings)
     return from_log(
         lambda only=None, **_: logged, PIPELINES, wanted, lambda done: None, labelled=labelled

@@ -17,7 +17,6 @@ from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import (
     cameras_table,
     differences_table,
-    seeds_table,
     stages_table,
     thresholds_table,
 )
@@ -60,8 +59,6 @@ def _scores(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block
         yield differences_table(facts, brief=True)
         if legend := correction(each.rates["ERR"] for each in pairs):
             yield Text(legend)
-    if facts.seeds:
-        yield seeds_table(facts.seeds, [*facts.totals])
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
     if metres:

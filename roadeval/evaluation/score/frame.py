@@ -106,7 +106,6 @@ def score_frame(
         contours=contours(final_bits, truth, settings.boundary_width),
         histograms=_by_stage(variants, partial(histogram, truth=frame.truth)),
         oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
-        repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
         metres=metres,
         above=_by_stage(variants, partial(survey.levels, truth=frame.truth)) if survey else {},
     )

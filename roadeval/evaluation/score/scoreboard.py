@@ -37,7 +37,6 @@ from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.counts import (
     Camera,
     EdgesAndFlicker,
-    FrameCounts,
     GrowingCounts,
     Name,
     RegionSums,
@@ -187,7 +186,6 @@ class Scoreboard:
         self._health = defaultdict[str, Counter[str]](Counter)
         self._counts = GrowingCounts()
         self._oracles = defaultdict[str, GrowingCounts](GrowingCounts)
-        self._repeats = defaultdict[int, GrowingCounts](GrowingCounts)
         self._regions = RegionSums()
         self.heat = defaultdict[str, HeatMap](HeatMap)
         """Where each variant's final mask errs."""
@@ -232,8 +230,6 @@ class Scoreboard:
         self._counts.add(number, result.tallies)
         for oracle, tallies in result.oracles.items():
             self._oracles[oracle].add(number, tallies)
-        for seed, tallies in result.repeats.items():
-            self._repeats[seed].add(number, tallies)
         self._regions.add(result.tallies)
         for name, layer in result.errors.items():
             self.heat[name].add(layer.array.astype(np.uint8, copy=False))
@@ -281,27 +277,6 @@ class Scoreboard:
         """
         return self.curves.at_best_of(self._training)
 
-    def repeats(self) -> dict[str, Any]:
-        """Return the rates with each seed, in their order: first those of the run's own.
-
-        Returned are ``totals``, by variant and stage the mean and the pooled rates, and
-        ``difference``, by stage the mean paired differences, filtered minus unfiltered. It is empty
-        without a further seed; a mask that no training has to do with is not in it.
-        """
-        further = [self._so_far(masks) for _, masks in sorted(self._repeats.items())]
-        if not further:
-            return {}
-        trainings = [{mask.name: mask for mask in each} for each in (self.masks(), *further)]
-        names = [name for name in trainings[0] if name in trainings[-1]]
-        sums, difference, rates = {}, {}, (*METRICS, *(f"pooled_{rate}" for rate in METRICS))
-        for variant, stage in names:
-            each = [sum_up(training[variant, stage].counts) for training in trainings]
-            sums[variant, stage] = {rate: [own[rate] for own in each] for rate in rates}
-            if variant == FILTERED and (UNFILTERED, stage) in names:
-                changes = [_mean_difference(training, stage) for training in trainings]
-                difference[stage] = {rate: [one[rate] for one in changes] for rate in COMPARED}
-        return {"totals": as_tree(sums.items()), "difference": difference}
-
     def summary(self) -> dict[str, Any]:
         """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
@@ -337,11 +312,3 @@ class Scoreboard:
 def totals(masks: Camera) -> Totals:
     """Sum up masks by variant and stage, as in ``summary.json``: see `sum_up`."""
     return as_tree((mask.name, sum_up(mask.counts)) for mask in masks)
-
-
-def _mean_difference(training: Mapping[Name, FrameCounts], stage: str) -> dict[str, float]:
-    """Return the mean difference of each rate, filtered minus unfiltered."""
-    pair = training[FILTERED, stage].paired(training[UNFILTERED, stage])
-    columns = zip(METRICS, (pair.rates - pair.base).T, strict=True)
-    known = {rate: own[~np.isnan(own)] for rate, own in columns}
-    return {rate: float(own.mean()) if len(own) else math.nan for rate, own in known.items()}

@@ -44,14 +44,12 @@ def run_variant(
     truth: Truth | None = None,
     shadow_truth: Truth | None = None,
     known: dict[Any, Any] | None = None,
-    repeats: Mapping[int, Chain] | None = None,
 ) -> VariantResult:
     """Run a chain on a frame and time each of its stages.
 
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
     ``known`` is what the frame's variants share: the first stage of chains that makes a mask and
-    has learnt nothing, as a network that is tuned besides. Then the chains of further trainings
-    run, too, by their seeds.
+    has learnt nothing, as a network that is tuned besides.
     """
     shared = {} if known is None else known
     results, seen = [], view
@@ -73,8 +71,7 @@ def run_variant(
         return VariantResult(name, tuple(results))
     outputs = [each.output for each in results]
     oracles = dict(chain.oracles(view, outputs, truth, shadow_truth))
-    again = {s: dict(other.repeated(view, outputs)) for s, other in (repeats or {}).items()}
-    return VariantResult(name, tuple(results), oracles, again)
+    return VariantResult(name, tuple(results), oracles)
 
 
 def external_layout(name: str, where: str, *, probable: bool = False) -> VariantLayout:

@@ -113,8 +113,6 @@ class Run:
     schedule: Schedule
     """What they learnt, and which frames are not evaluated because of it."""
     chains: Mapping[str, Chain]
-    repeats: Mapping[int, Mapping[str, Chain]]
-    """The same for each further seed of the training, by the seed."""
     layouts: tuple[VariantLayout, ...]
     """Every variant that is scored, those included whose masks the log carries."""
     methods: Mapping[str, Mapping[str, Any]]
@@ -212,14 +210,12 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         note = f"at most {truths} of {frames} frames have road truth: "
         note += "`frames.labelled` reads these alone"
         on_progress(Progress(0, None, "opening", note))
-    # Without truth no rate could tell the trainings apart.
-    training = config.training if labelled else replace(config.training, seeds=1)
-    learn = partial(_learn, again, variants, training, on_progress)
-    (model, *others), schedule = learn(labelled=labelled, picks=picks)
+    learn = partial(_learn, again, variants, config.training, on_progress)
+    model, schedule = learn(labelled=labelled, picks=picks)
     try:
-        chains, *repeats = (bind(variants, each) for each in (model, *others))
+        chains = bind(variants, model)
     except MisfitError as error:
-        raise ModelError(f"{training.model}: {error}") from error
+        raise ModelError(f"{config.training.model}: {error}") from error
     trim()
     masks = selection.masks
     layouts = (
@@ -242,7 +238,6 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         model,
         schedule,
         chains,
-        dict(enumerate(repeats, training.seed + 1)),
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
@@ -259,14 +254,14 @@ def _learn(
     *,
     labelled: bool,
     picks: logs.Picks | None,
-) -> tuple[tuple[Model, ...], Schedule]:
+) -> tuple[Model, Schedule]:
     pipelines = {variant.name: variant.pipeline for variant in variants}
     base = None
     if settings.model is not None:
         base, schedule = learning.from_file(Path(settings.model), pipelines)
         schedule = replace(schedule, picks=picks)
         if not settings.adapt:
-            return (base,), schedule
+            return base, schedule
     total = min(settings.frames, len(frames()))
     return learning.from_log(
         frames,
@@ -415,10 +410,9 @@ def _process(
     view = View.of_frame(frame)
     variants = []
     for name, chain in run.chains.items():
-        repeats = {seed: chains[name] for seed, chains in run.repeats.items()}
         truths = {"truth": known[0], "shadow_truth": known[1]}
         try:
-            found = run_variant(name, chain, view, **truths, known=shared, repeats=repeats)
+            found = run_variant(name, chain, view, **truths, known=shared)
         except AbsentError:
             continue
         except StageError as error:

@@ -60,7 +60,6 @@ FLATTERED: Final = "look alike, which flatters the result: use a model of other 
 def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     """Return the facts of a run at its end, with the frames of figure 2 and the tables' sums."""
     found, effects = run.board.summary(), run.board.effects()
-    repeats = run.board.repeats()
     settings = run.config.training
     given = settings.model is not None and not settings.adapt
     unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run)
@@ -90,7 +89,6 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             ground=run.selection.ground_as_read,
         ),
         frames=_accounting(run),
-        seeds={"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else {},
         examples=examples,
         training=TrainingFacts(
             run.model.source,
@@ -265,7 +263,6 @@ def of_cameras(
         beyond={},
         curves={},
         thresholds={},
-        seeds={},
         oracles={},
         seconds={},
         examples=[],

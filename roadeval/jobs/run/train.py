@@ -34,10 +34,6 @@ def train(
     """
     config = (config or RunConfig()).resolved()
     settings, entries = config.training, find_drives([str(drive) for drive in listed(drives)])
-    if settings.seeds > 1:
-        raise TrainingError(
-            "`training.seeds`: a model file holds one training; set training.seed for another"
-        )
     total = settings.frames * len(entries)
     held = HeldFrames(lambda count: on_progress(Progress(count, total, "training")))
     with holding(output, inputs=[each.path for each in entries]):

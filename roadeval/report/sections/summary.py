@@ -19,7 +19,7 @@ from roadeval.report.blocks import (
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
 from roadeval.report.sections.drives import WORST_AT
-from roadeval.report.tables import differences_table, rates_table, seeds_table
+from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
@@ -55,8 +55,6 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     yield from _next(findings)
     if findings.totals:
         yield rates_table(findings.facts)
-        if seeds := findings.facts.seeds:
-            yield seeds_table(seeds, [*findings.finals])
     yield Text(account(findings.facts.frames, findings.facts.windows), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]

@@ -29,7 +29,7 @@ RUN = {
     "preset": "paper",
     "svm": {"kernel": "rbf"},
     "frames": {"scale": 1.0, "every": 1},
-    "training": {"seed": 0, "seeds": 1},
+    "training": {"seed": 0},
     "fleet": {"folds": None},
 }
 
