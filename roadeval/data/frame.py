@@ -74,11 +74,13 @@ class Frame:
 class Role(StrEnum):
     """The use of a frame in a run. Only `EVALUATED` frames are ever counted.
 
-    A `PICKED` one was labelled because it was in doubt, so that it says nothing of the others.
+    A `COPY` shows what a frame that trained the model shows. A `PICKED` one was labelled because it
+    was in doubt, so that it says nothing of the others.
     """
 
     EVALUATED = "evaluated"
     TRAINING = "training"
+    COPY = "copy"
     GAP = "gap"
     UNLABELLED = "unlabelled"
     PICKED = "picked"

@@ -19,7 +19,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Final
@@ -30,6 +30,7 @@ from roadeval.data import as_plain, is_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.logs import METADATA, LogConfig, files_of, natural
+from roadeval.logs.settings import CameraSettings
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.settings import Checked
 from roadeval.runtime.text import public_url, visible, without_secrets
@@ -146,6 +147,18 @@ class DriveEntry:
     def known(self) -> tuple[str | None, Mapping[str, str], Mapping[str, Any]]:
         """Group, tags and settings that were given for it."""
         return self.group, self.tags, self.settings
+
+    def of_cameras(self, cameras: Iterable[CameraSettings]) -> Iterator[DriveEntry]:
+        """Yield an entry for each of some cameras; itself where its own camera is given."""
+        for camera in () if self.camera else cameras:
+            given = {name: own for name, own in asdict(camera).items() if own or own == ""}
+            topics = {name: own for name, own in given.items() if name not in ("name", "ground")}
+            tables = {"topics": {**self.settings.get("topics", {}), **topics}}
+            if camera.ground.given:
+                tables["ground"] = {n: own for n, own in given["ground"].items() if own is not None}
+            yield replace(self, settings={**self.settings, **tables})
+        if self.camera:
+            yield self
 
     def config(self, config: RunConfig) -> RunConfig:
         """Return a run's configuration with what holds for this drive alone."""

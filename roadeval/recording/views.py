@@ -331,6 +331,7 @@ _STATES: Final[Mapping[str, Colour]] = {
     Health.FAILED: colours.VERMILLION,
     Role.EVALUATED: colours.SKY_BLUE,
     Role.TRAINING: colours.PURPLE,
+    Role.COPY: colours.DARK_GREY,
     Role.GAP: colours.DARK_GREY,
     Role.UNLABELLED: colours.GREY,
     Role.PICKED: colours.ORANGE,

@@ -68,8 +68,11 @@ def record_path(folder: Path, drive: str) -> Path:
 
 
 def frames_path(folder: Path, drive: str) -> Path:
-    """Return the table of a drive's frames."""
-    return folder / FRAMES / f"drive={drive}" / "frames.parquet"
+    """Return the table of a drive's frames; its folder's name is no partition's, as ``drive=ID``.
+
+    pandas and Arrow would read that as a second column ``drive``, and refuse the folder.
+    """
+    return folder / FRAMES / drive / "frames.parquet"
 
 
 def results_path(folder: Path, drive: str) -> Path:

@@ -141,6 +141,7 @@ def _counted(found: Difference) -> str:
 
 _WHY: Final = {
     "trained on": "to train on",
+    "equal to a training frame": "equal to one of them",
     "unlabelled": "without truth",
     "picked": "labelled because they were in doubt",
     "undecodable": "that cannot be decoded",

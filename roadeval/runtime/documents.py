@@ -97,8 +97,10 @@ def read_yaml(path: Path) -> Any:
         if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
             raise ValueError("it has aliases, as *name: write them out")
         found = yaml.safe_load(text)
-    except (RecursionError, yaml.YAMLError) as error:
+    except yaml.YAMLError as error:
         raise ValueError("it is damaged") from error
+    except (RecursionError, ValueError) as error:
+        raise ValueError(_damage(error)) from error
     _check(found, VALUES)
     return found
 

@@ -174,6 +174,8 @@ class Schedule:
 
     digests: frozenset[str] = frozenset()
     """Hashes of the frames that trained the model."""
+    trained: frozenset[int] = frozenset()
+    """Numbers of those frames, where all of them are this run's."""
     gap: frozenset[int] = frozenset()
     """Numbers of the frames after them that are left out as well."""
     first: int | None = None
@@ -184,7 +186,8 @@ class Schedule:
     def role(self, frame: Frame) -> Role:
         """Return what a decoded frame is used for."""
         if frame.digest() in self.digests:
-            return Role.TRAINING
+            copied = self.trained and frame.number not in self.trained
+            return Role.COPY if copied else Role.TRAINING
         if frame.number in self.gap:
             return Role.GAP
         if frame.truth is None or (frame.truth == IGNORE).all():
@@ -275,7 +278,8 @@ def from_log(
             "not seen"
         )
     model = fit(held.frames, pipelines, settings, base)
-    schedule = replace(schedule, digests=model.digests, picks=picks)
+    own = frozenset(frame.number for frame in held.frames) if base is None else frozenset()
+    schedule = replace(schedule, digests=model.digests, trained=own, picks=picks)
     return replace(model, warnings=tuple(warnings)), schedule
 
 

@@ -151,17 +151,21 @@ def test_worst_frames_of_all_cameras_are_recorded(rig: Path, tmp_path: Path):
     assert {frame for _, frame in worst.index} == {n for own in kept for n in own}
 
 
-def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(rig: Path, tmp_path: Path):
-    manifest = tmp_path / "cameras.toml"
-    manifest.write_text(
-        "".join(
-            f'[[drives]]\npath = "{rig / "rig.mcap"}"\ntopics.image = "/{name}{IMAGE}"\n'
-            for name in ("front", "copy")
-        )
-    )
-    roadeval.replay_fleet([manifest], tmp_path / "fleet", executor=Here())
+@pytest.mark.parametrize("by_manifest", [True, False])
+def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(
+    rig: Path, tmp_path: Path, *, by_manifest: bool
+):
+    images, drives = [f"/{name}{IMAGE}" for name in ("front", "copy")], rig / "rig.mcap"
+    config = roadeval.configure({"cameras": [{"image": image} for image in images]})
+    if by_manifest:
+        entries = [f'[[drives]]\npath = "{drives}"\ntopics.image = "{name}"\n' for name in images]
+        drives, config = tmp_path / "cameras.toml", None
+        drives.write_text("".join(entries))
+    roadeval.replay_fleet([drives], tmp_path / "fleet", config, executor=Here())
     fleet = roadeval.Result(tmp_path / "fleet")
     assert fleet.drives["name"].tolist() == ["rig front", "rig copy"]
+    whole = pd.read_parquet(tmp_path / "fleet" / "frames")
+    assert whole.groupby("drive").size().tolist() == [len(whole) // 2] * 2
     (effect,) = [
         e.rates["ERR"]
         for e in fleet.facts.effects

@@ -1,14 +1,18 @@
 """Which drives words name: logs, folders, rosbag2 folders, globs, URLs, manifests."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from roadeval.config import RunConfig
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.fleet import find_drives
-from roadeval.fleet.drives import identity
+from roadeval.fleet.drives import DriveEntry, identity
+from roadeval.geometry.settings import GroundSettings
+from roadeval.logs.settings import CameraSettings
 from tests.fixtures.elsewhere import split_bag, talker
 
 LOG = talker(3).bytes()
@@ -111,6 +115,20 @@ def test_a_manifest_says_more_of_a_drive_that_is_named_beside_it(folder):
         first, second = find_drives(words)
         assert (first.group, second.group) == (None, "tuesday")
         assert second.settings == {"frames": {"every": 5}}
+
+
+def test_cameras_that_are_asked_for_are_those_of_each_drive_that_names_none(folder):
+    cameras = (
+        CameraSettings("/front", truth="/front/labels", ground=GroundSettings(height=1.5)),
+        CameraSettings("/rear", truth=""),
+    )
+    own, named = DriveEntry("a.mcap", "a", "a"), {"topics": {"image": "/top"}, "labels": {}}
+    front, rear = own.of_cameras(cameras)
+    assert front.settings["topics"] == {"image": "/front", "truth": "/front/labels"}
+    assert front.config(RunConfig()).ground.height == 1.5
+    assert rear.config(RunConfig()).topics.truth == ""
+    drive = replace(own, settings=named)
+    assert [*drive.of_cameras(cameras)] == [drive]
 
 
 def test_a_log_may_be_named_once_for_each_of_its_cameras(folder):

@@ -120,7 +120,7 @@ def test_what_a_killed_worker_has_left_is_in_no_table_and_goes(logs, ran, folder
     left = {
         Path("recordings", f"{own}.0123abcd.partial.rrd"): b"half a recording",
         Path("records", f".{own}.0123abcd.partial.json"): b"{",
-        Path("frames", f"drive={own}", ".frames.0123abcd.partial.parquet"): b"PAR1",
+        Path("frames", own, ".frames.0123abcd.partial.parquet"): b"PAR1",
         Path("records", f".{own}.json.lock"): b"process 1",
         Path(".drives.0123abcd.partial.parquet"): b"PAR1",
     }

@@ -47,7 +47,7 @@ def log(count: int, unlabelled: tuple[int, ...] = (), broken: tuple[int, ...] = 
 
 
 def roles(frames, schedule: Schedule) -> str:
-    """Give the roles' first letters: t(raining), g(ap), u(nlabelled), e(valuated)."""
+    """Give the roles' first letters: t(raining), c(opy), g(ap), u(nlabelled), e(valuated)."""
     return "".join(schedule.role(f.frame)[0] for f in frames)
 
 
@@ -62,6 +62,15 @@ def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
     frames = log(8, unlabelled=(0, 2))
     _, schedule = learn(frames, frames=2)
     assert roles(frames, schedule) == "ututeeee"
+
+
+def test_a_frame_that_equals_one_that_trained_is_a_copy_and_was_not_trained_on():
+    frames = log(6)
+    same = frames[0].frame
+    for place in (3, 5):
+        frames[place] = Logged(replace(same, number=place))
+    _, schedule = learn(frames, frames=2)
+    assert roles(frames, schedule) == "ttecec"
 
 
 def test_frames_spread_along_the_drive_train_and_none_beside_them_is_evaluated():

@@ -12,7 +12,15 @@ from typing import Any
 
 from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
-from roadeval.fleet.drives import DriveEntry, FleetError, deal, find_drives, groups_of, shuffled
+from roadeval.fleet.drives import (
+    DriveEntry,
+    FleetError,
+    cameras_apart,
+    deal,
+    find_drives,
+    groups_of,
+    shuffled,
+)
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
@@ -89,14 +97,18 @@ def replay_fleet(
     config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in listed(drives)])
     if config.cameras:
-        raise FleetError("several cameras of a log stand in a manifest, each with `topics.image`")
+        entries = cameras_apart(
+            [own for each in entries for own in each.of_cameras(config.cameras)]
+        )
     if config.fleet.folds is not None and config.training.model is not None:
         raise FleetError(
             "`fleet.folds` and `training.model` do not go together: folds train models"
         )
     writer = FleetWriter(Path(output))
     writer.begin()
-    run = FleetRun(writer.folder, tuple(entries), config, on_progress, executor)
+    run = FleetRun(
+        writer.folder, tuple(entries), replace(config, cameras=()), on_progress, executor
+    )
     run.replay_all()
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]

@@ -249,7 +249,7 @@ class ExampleFrames:
         """Keep the frame at ``position`` (from 1) if one is due and it is not a training frame."""
         if not self._due or position < self._due[0]:
             return
-        if result.role in (Role.TRAINING, Role.GAP):
+        if result.role in (Role.TRAINING, Role.COPY, Role.GAP):
             return
         self._due.pop(0)
         frame = result.frame

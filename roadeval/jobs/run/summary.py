@@ -360,7 +360,7 @@ def _of_picks(run: Run) -> Iterator[str]:
         )
     known = {each.frame for each in picks.picked}
     unread = len(known & run.frames.accounting.undecodable.keys())
-    used = (Role.PICKED, *([Role.TRAINING] if run.model.source == "truth" else []))
+    used = (Role.PICKED, *([Role.TRAINING, Role.COPY] if run.model.source == "truth" else []))
     own = scored + sum(roles[each] for each in used)
     if (unchanged := run.frames.accounting.labelled - own - unread) > 0:
         yield (
@@ -495,6 +495,7 @@ def _accounting(run: Run) -> FrameAccount:
         "undecodable": len(seen.undecodable),
         "failed in a stage": len(run.failures),
         "trained on": roles[Role.TRAINING],
+        "equal to a training frame": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
         "picked": roles[Role.PICKED],

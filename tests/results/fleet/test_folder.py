@@ -69,7 +69,7 @@ def test_another_version_s_folder_is_not_written_to(folder):
 
 def test_a_damaged_table_of_frames_says_what_makes_it_anew(folder):
     drive = Result(folder).drives.query("status == 'scored'").drive.iloc[0]
-    path = folder / "frames" / f"drive={drive}" / "frames.parquet"
+    path = folder / "frames" / drive / "frames.parquet"
     column = parquet.ParquetFile(path).metadata.row_group(0).column(0)
     begin = column.dictionary_page_offset or column.data_page_offset
     content = bytearray(path.read_bytes())
