@@ -130,7 +130,7 @@ def test_an_image_that_trained_is_recognised_wherever_it_lies():
     frames = log(5)
     _, schedule = learn(frames, frames=2)
     elsewhere = replace(frames[1].frame, number=77, stamp_ns=5)
-    assert schedule.role(elsewhere) is Role.TRAINING
+    assert schedule.role(elsewhere) is Role.COPY
 
 
 LABELLED = [frame(n) for n in range(2)]
