@@ -238,6 +238,8 @@ class Log:
             if "`labels.road`" in reason and not settings.labels.road:
                 reason += "; or, for confidences, their threshold"
             reason = reason.replace("`labels.", f"`masks.{name}.labels.")
+            one_or_other = "give `truth.first` 0 or `truth.first` 1"
+            reason = reason.replace(one_or_other, "set `truth.first` to 0 or to 1")
             reason = reason.replace("`truth.", f"`masks.{name}.")
             raise LogError(f"`masks` {name}: {reason}") from error
         return masks

@@ -147,7 +147,7 @@ def with_keys(
         theirs = some([*shown.values()])
         raise LogError(f"{name}: no label has a name as `truth.names` {settings.names}: {theirs}")
     named = None if settings.images is None else _images(Path(settings.images))
-    by, keys = _keys({label.path: shown[label.path] for label in labels}, settings, named)
+    by, keys = _keys({each.path: shown[each.path] for each in labels}, settings, named)
     if named is not None and not keys:
         raise LogError(
             f"{name}: none of them has the name of an image in {settings.images}: theirs are "
@@ -161,17 +161,13 @@ def with_keys(
             both = f"{visible(str(first))} and {visible(str(second))}"
             raise LogError(f"{name}: {both} belong to the same frame, by {by}")
     in_order = np.array([keys[label.path] for label in found], np.int64)
-    first_number = settings.first or 0
-    if by == "number" and settings.first is None:
-        first_number = _first_number(in_order, frames, name)
-        if 1 == first_number < in_order[0]:
-            guess = f"the last label is number {frames}, as many as there are frames: so the first "
-            guess += "frame is taken for number 1; `truth.first` says otherwise"
-            origin = replace(origin, notes=(*origin.notes, guess))
+    number = settings.first or 0
+    if by == "number":
+        number = _first_number(in_order, frames, name) if settings.first is None else number
+        in_order -= number
     nameless, images = len(labels) - len(found), None if named is None else len(named)
-    in_order -= first_number if by == "number" else 0
     place = visible(name), tuple(found), origin, in_order, by
-    return NamedLabels(*place, limits, first_number, nameless, images)
+    return NamedLabels(*place, limits, number, nameless, images)
 
 
 def shown_name(file: Path, folder: str) -> str:
@@ -449,7 +445,9 @@ class Partners:
         Also return the nanoseconds between the first of them and the nearest image.
         """
         images, labels = self._pairing.images, self._pairing.labels
-        ends = (0, len(labels)) if of_all or not self.used else (min(self.used), max(self.used))
+        ends = (
+            (0, len(labels)) if of_all else (min(self.used, default=0), max(self.used, default=0))
+        )
         stamps = [labels.stamp(place) for place in range(*ends) if place not in self.used]
         stamps = [stamp for stamp in stamps if stamp != UNREADABLE]
         if not stamps:
@@ -605,8 +603,8 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
     outside = 2 * (-begin if apart < 0 else end) > abs(apart)
     one_log = labels.channels[0].container in [channel.container for channel in images.channels]
     if outside or (one_log and 2 * max(-logged, last) <= abs(apart)):
-        seconds = apart / NS
-        whole = round(seconds) if abs(seconds - round(seconds)) < 0.2 else round(seconds, 3)
+        # Labels come some moments after their images.
+        whole = round(apart / NS, 0 if abs(apart / NS - round(apart / NS)) < 0.2 else 3)
         side = "before" if whole < 0 else "after"
         raise LogError(
             f"{labels.name}: its stamps are of another clock than those of {images.name}: they lie "

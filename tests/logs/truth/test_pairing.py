@@ -188,3 +188,5 @@ def test_labels_without_a_frame_and_frames_that_lose_theirs_are_counted():
     assert [partners.of(image) for image in range(3)] == [None, 1, 3]
     assert (partners.unpaired(of_all=True), partners.missed) == ((2, 60), 1)
     assert partners.unpaired(of_all=False) == (1, 10)
+    none = Partners(Pairing(Stamps([900]), Stamps([40]), 5))
+    assert (none.of(0), none.unpaired(of_all=False)) == (None, (0, 0))
