@@ -12,7 +12,6 @@ from roadeval.runtime.imports import on_demand
 if TYPE_CHECKING:
     from roadeval.images.decoding import (
         ORIENTATIONS,
-        deep_samples,
         eight_bits,
         orientation_of,
         palette_indices,

@@ -54,16 +54,6 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
     return upright(pixels, _left_to_turn(data, limits))
 
 
-def deep_samples(data: File, limits: Limits) -> Array | None:
-    """Return the samples of a grey image of more than eight bits; None of any other.
-
-    Errors as of `to_rgb`.
-    """
-    format_ = format_of(data)
-    image = None if format_ is None or format_.plugin is None else _decoded(data, limits)
-    return _samples(image) if image and image.mode in _SAMPLES[1:] else None
-
-
 def to_labels(data: File, limits: Limits) -> Array:
     """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 

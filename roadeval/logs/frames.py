@@ -566,10 +566,10 @@ class FrameStream:
 
 def looked_at(selection: Selection) -> Iterator[str]:
     """Yield what some images of a camera show a user to know before a replay, a sentence each."""
-    count = len(selection.camera.images)
-    places = sorted({*np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist()})
-    if selection.image.kind is TopicKind.VIDEO:  # one after the other is quickest
-        places = [*range(min(LOOKED_AT, count))]
+    images = selection.camera.images
+    count, places = len(images), [*range(min(LOOKED_AT, len(images)))]
+    if images.is_small and selection.image.kind is not TopicKind.VIDEO:
+        places = sorted({*np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist()})
     stream = FrameStream(replace(selection, labels={}), count, places, labelled=False)
     for logged in stream:
         with suppress(FrameError):

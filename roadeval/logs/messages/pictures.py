@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
-from itertools import chain
+from itertools import chain, pairwise
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -53,8 +53,8 @@ class CompressedPicture:
     format: str
     data: Buffer
     frame_id: str = ""
-    numbers: tuple[int | None, int | None] = None, None
-    """Of a packet, as its encoder and its recorder count them."""
+    number: int | None = None
+    """Of a packet, as its encoder or its recorder counts it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def picture_in(message: Any) -> LoggedPicture:
             if _name(name).lower() == "zstd":
                 return _unpacked(stamp_ns, bytes(data), frame_id)
             pts = int(message.pts) if hasattr(message, "pts") else None
-            return CompressedPicture(stamp_ns, _name(name), data, frame_id, (pts, None))
+            return CompressedPicture(stamp_ns, _name(name), data, frame_id, pts)
         return RawPicture(
             stamp_ns,
             int(message.width),
@@ -350,23 +350,21 @@ class Video:
         return position
 
     @cached_property
-    def _counted(self) -> tuple[bool, bool]:
-        """Whether encoder and recorder count the packets one by one, as the first ones show."""
-        first = []
+    def _counted(self) -> bool:
+        """Whether the packets are counted one by one, as the first ones show."""
+        first = list[Picture]()
         for position in range(min(PATIENCE, len(self._packets))):
             with suppress(FrameError):
                 first.append(self._packets.picture(position))
-        steps = [*map(_steps, first, first[1:])]
-        one, other = ([pair[k] == 1 for pair in steps] for k in (0, 1))
-        return 4 * sum(one) >= 3 * len(steps) > 0, 4 * sum(other) >= 3 * len(steps) > 0
+        steps = [_step(*pair) for pair in pairwise(first)]
+        return 4 * steps.count(1) >= 3 * len(steps) > 0
 
     def _follows(self, packet: Picture, last: Picture | None, numbers: FrameNumbers) -> bool:
         """Whether no packet that this one builds upon is lost before it, as far as is known."""
         is_gap = codec_of(packet) == "h264" and numbers.is_gap(bytes(packet.data))
         if numbers.known or last is None:
             return not is_gap
-        steps = zip(self._counted, _steps(last, packet), strict=True)
-        return not any(counted and step is not None and step > 1 for counted, step in steps)
+        return not (self._counted and _step(last, packet) > 1)
 
     def _decode(self, begin: int) -> Iterator[bool]:
         """Decode from a keyframe on, a packet a step; the frames come into ``_ready``."""
@@ -468,15 +466,10 @@ class Video:
         return reason
 
 
-def _steps(one: Picture, other: Picture) -> tuple[int | None, int | None]:
-    """Return by how much the numbers of two packets differ; None where one has none."""
-    assert isinstance(one, CompressedPicture)
-    assert isinstance(other, CompressedPicture)
-    first, second = (
-        None if a is None or b is None else b - a
-        for a, b in zip(one.numbers, other.numbers, strict=True)
-    )
-    return first, second
+def _step(one: Picture, other: Picture) -> int:
+    """Return by how much the numbers of two packets differ; 0 where one has none."""
+    first, second = (getattr(each, "number", None) for each in (one, other))
+    return 0 if first is None or second is None else second - first
 
 
 def turn_of(frame: Any) -> int:

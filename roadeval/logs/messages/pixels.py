@@ -175,8 +175,8 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
         return rows_of(picture, limits) if is_deep else None
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return None
-    with _bad_message():
-        return images.deep_samples(file_of(picture), limits)
+    samples = to_labels(picture, limits)
+    return None if samples.dtype == np.uint8 else samples
 
 
 def to_labels(picture: Picture, limits: Limits) -> Array:

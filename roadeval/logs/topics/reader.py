@@ -282,9 +282,8 @@ class TopicReader:
         message = self.message(position)
         try:
             picture = self._decoder(position).picture(message.data)
-            if isinstance(picture, CompressedPicture):
-                numbers = picture.numbers[0], message.sequence
-                return replace(picture, numbers=numbers)
+            if isinstance(picture, CompressedPicture) and picture.number is None:
+                return replace(picture, number=message.sequence)
             return picture
         except BadMessage as error:
             raise self._error(position, str(error)) from error

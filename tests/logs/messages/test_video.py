@@ -105,14 +105,12 @@ def test_a_video_without_its_keyframe_is_not_guessed_at(log: Path) -> None:
 class Missing:
     """The packets of a video without one of them, of which no message is left."""
 
-    def __init__(self, codec: str, lost: int, counted: str) -> None:
+    def __init__(self, codec: str, lost: int, *, counted: bool) -> None:
         self.left = [number for number in range(VIDEO_FRAMES) if number != lost]
-        numbers = {
-            number: (number if counted == "pts" else None, number if counted == "log" else None)
-            for number in self.left
-        }
         data = packets(codec)
-        self.packets = [CompressedPicture(n, codec, data[n], "", numbers[n]) for n in self.left]
+        self.packets = [
+            CompressedPicture(n, codec, data[n], "", n if counted else None) for n in self.left
+        ]
 
     def __len__(self) -> int:
         return len(self.packets)
@@ -134,10 +132,10 @@ class Missing:
     ],
 )
 def test_what_builds_upon_a_packet_that_is_missing_is_lost(
-    codec: str, counted: str, lost: int
+    codec: str, counted: bool, lost: int
 ) -> None:
     """FFmpeg 7 conceals a missing reference of H.264 and VP9, and raises and flags nothing."""
-    missing = Missing(codec, lost, counted)
+    missing = Missing(codec, lost, counted=counted)
     video, found = Video(missing, Limits()), []
     for position, number in enumerate(missing.left):
         try:
@@ -145,7 +143,7 @@ def test_what_builds_upon_a_packet_that_is_missing_is_lost(
         except FrameError:
             continue
         found.append(number)
-    whole = Missing(codec, VIDEO_FRAMES, counted).packets
+    whole = Missing(codec, VIDEO_FRAMES, counted=counted).packets
     keys = (n for n in range(lost + 1, VIDEO_FRAMES) if is_keyframe(whole[n]))
     assert found == [*range(lost), *range(next(keys, VIDEO_FRAMES), VIDEO_FRAMES)]
 
