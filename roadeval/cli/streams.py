@@ -32,12 +32,6 @@ def take_over(*, debug: bool) -> None:
         os.environ.pop(name, None)
 
 
-def taken_over() -> bool:
-    """Return whether the process is the command's own, and not a caller's in Python."""
-    buffer = getattr(sys.stderr, "buffer", None)
-    return isinstance(getattr(buffer, "raw", None), _Lossy)
-
-
 def _fill_closed() -> None:
     """Open missing streams, so that no other file takes their numbers.
 

@@ -2,8 +2,6 @@
 
 import hashlib
 import importlib
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -125,25 +123,3 @@ def test_its_traceback_is_shown_where_it_is_asked_for(debug, drive, tmp_path, mo
     said = capsys.readouterr().err
     assert "roadeval: lost: frame 13: variant mine: stage fails_on_13 failed" in said
     assert ("Traceback" in said) == (debug == "1")
-
-
-@pytest.mark.parametrize("chain", [None, somebodys("LEARNS")["chain"]])
-def test_the_command_needs_no_pandas_and_spares_it_unless_code_of_ones_own_may(
-    drive, tmp_path, chain
-):
-    (tmp_path / "run.toml").write_text("" if chain is None else f"chain = {chain}\n")
-    words = ["replay", drive, "--config", "run.toml", "--save", "o.rrd", "--reports", "r", "-q"]
-    code = (
-        f"import sys; sys.argv[1:] = {[*map(str, words)]}; from roadeval.__main__ import main\n"
-        "try: main()\n"
-        "finally: print('pandas' in sys.modules)"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(Path(somebody.__file__).parents[2])},
-    )
-    assert (told.stdout.strip(), told.stderr) == (str(chain is not None), "")

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from roadeval.cli import arguments, console, messages, progress, streams
+from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.options import Given, takes
-
-if TYPE_CHECKING:
-    from roadeval.config import RunConfig
 
 
 @takes(
@@ -31,7 +26,6 @@ def replay(
     from roadeval.cli.screens import replay as screen
     from roadeval.jobs.run.replay import replay as run
 
-    _spare_pandas(config)
     with progress.watched(quiet) as watch:
         found = run(drive, config, on_progress=watch)
     if json:
@@ -44,11 +38,3 @@ def replay(
     for warning in found.warnings:
         messages.warning(warning)
     return messages.losses(found.losses)
-
-
-def _spare_pandas(config: RunConfig) -> None:
-    """Let the recording be made without pandas, unless code of somebody else may need it."""
-    if streams.taken_over() and config.output.record != "none" and not config.others_code():
-        from roadeval.runtime.imports import leave_out_pandas
-
-        leave_out_pandas()

@@ -45,7 +45,6 @@ from pydantic import BeforeValidator
 from roadeval.data.arrays import Floats, Sums
 from roadeval.data.words import counted
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.runtime.imports import special
 
 _FEWEST: Final = 90
 _PER_ROOT: Final = 2.5
@@ -99,7 +98,9 @@ class MeanDistribution(NamedTuple):
         return self.mean - self.scale * low, self.mean - self.scale * high
 
     def _half_width(self, confidence: float) -> float:
-        quantile = float(special("stdtrit")(self.degrees, (1 + confidence) / 2))
+        from scipy.special import stdtrit
+
+        quantile = float(stdtrit(self.degrees, (1 + confidence) / 2))
         low, high = quantile * float(self.errors.min()), quantile * float(self.errors.max())
         # By halves: scipy.optimize takes longer to import than a drive's differences to compute.
         while high - low > 1e-12 * high:
@@ -191,7 +192,9 @@ def _variance_of_mean(coefficients: Floats, shares: Floats, n: int) -> Floats:
 
 def _beyond(distance: float, errors: Floats, weights: Floats, degrees: int) -> float:
     """Return the probability that the mean is further off than ``distance``, skewness aside."""
-    return float(2 * weights @ special("stdtr")(degrees, -distance / errors))
+    from scipy.special import stdtr
+
+    return float(2 * weights @ stdtr(degrees, -distance / errors))
 
 
 def _straightened(t: float, skewness: float) -> float:

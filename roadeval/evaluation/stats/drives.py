@@ -40,7 +40,6 @@ import numpy as np
 
 from roadeval.data.arrays import Floats
 from roadeval.evaluation.stats.autocorrelation import Difference, holm
-from roadeval.runtime.imports import special
 
 LEAST_GROUPS: Final = 6
 """Groups that an interval needs. With five, the least two-sided p-value of a sign-flip test is
@@ -123,8 +122,10 @@ def _student(means: Floats, confidence: float) -> tuple[float, float, float]:
     if np.ptp(means) == 0:
         return mean, mean, float(mean == 0)
     error = float(means.std(ddof=1)) / math.sqrt(len(means))
-    half = float(special("stdtrit")(degrees, (1 + confidence) / 2)) * error
-    return mean - half, mean + half, float(2 * special("stdtr")(degrees, -abs(mean) / error))
+    from scipy.special import stdtr, stdtrit
+
+    half = float(stdtrit(degrees, (1 + confidence) / 2)) * error
+    return mean - half, mean + half, float(2 * stdtr(degrees, -abs(mean) / error))
 
 
 def sign_flip_p(values: Floats, mean: float = 0.0) -> float:

@@ -14,7 +14,6 @@ from typing import Final
 import numpy as np
 
 from roadeval.data.arrays import Floats, Sums
-from roadeval.runtime.imports import special
 
 REGRESSION_FROM: Final = 8
 """So many labels it takes to learn how a rate goes with the frames' score."""
@@ -150,13 +149,17 @@ def _unseen(scores: Floats, every_score: Floats) -> int:
 
 
 def _student(confidence: float, freedom: int) -> float:
-    return float(special("stdtrit")(freedom, (1 + confidence) / 2))
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, (1 + confidence) / 2))
 
 
 def _to_halve(labels: int, frames: int, fitted: int, confidence: float) -> int | None:
     """Return how many more labels would halve an interval, if the frames are as those seen."""
     counts = np.arange(labels, frames + 1)
-    quantiles = special("stdtrit")(counts - fitted, (1 + confidence) / 2)
+    from scipy.special import stdtrit
+
+    quantiles = stdtrit(counts - fitted, (1 + confidence) / 2)
     widths = quantiles * np.sqrt(1 / counts - 1 / frames)
     halved = np.flatnonzero(widths <= widths[0] / 2)
     return int(halved[0]) if len(halved) and halved[0] else None

@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.stage import check_arrays
-from roadeval.runtime.imports import whole
 
 CODES: Final = 256
 """Equal steps of a feature between its outer percentiles; each has a rank."""
@@ -101,7 +100,10 @@ def train(
     seen = np.ascontiguousarray(ranked(features, lowest, scale, ranks).T)
     rng, count = np.random.default_rng(seed), len(road)
     chances = None if weights is None else weights / weights.sum()
-    network = whole("sklearn.neural_network").MLPClassifier(
+    # Only here: the import takes a second, and a model from a file does not need it.
+    from sklearn.neural_network import MLPClassifier
+
+    network = MLPClassifier(
         (planes,),
         alpha=PENALTY,
         batch_size=min(count, max(FEWEST, min(BATCH, count // STEPS))),

@@ -57,7 +57,6 @@ from roadeval.pipeline.stage import (
     perfect_mask,
     stage_settings,
 )
-from roadeval.runtime.imports import whole
 
 Sizes = npt.NDArray[np.int32]
 
@@ -124,7 +123,9 @@ def grow(
     edges = [np.unique(feature) for feature in quantiles.T]
     bins = [np.searchsorted(*each).astype(np.uint8) for each in zip(edges, values.T, strict=True)]
     # Only here: the import takes a second, and a model from a file does not need it.
-    boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    boosting = HistGradientBoostingClassifier(
         learning_rate=RATE,
         max_iter=settings.trees,
         max_leaf_nodes=settings.leaves,

@@ -21,7 +21,6 @@ from roadeval.pipeline.stage import (
     check_range,
     stage_settings,
 )
-from roadeval.runtime.imports import special
 
 RIDGE: Final = 1.0
 """Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is
@@ -65,8 +64,10 @@ def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
 
 def limit(quantile: float) -> float:
     """Return the greatest ``d^2`` of a road pixel: ``chi2.ppf(quantile, 3)``."""
+    from scipy.special import chdtri
+
     # The same number as scipy.stats.chi2.ppf, whose import takes a second.
-    return float(special("chdtri")(3, 1.0 - quantile))
+    return float(chdtri(3, 1.0 - quantile))
 
 
 def whitening(covariance: Floats) -> Floats:

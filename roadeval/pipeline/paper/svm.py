@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from roadeval.data import Layer, Packed, mask_spec
-from roadeval.data.arrays import Flags, Floats, Plane, Words
+from roadeval.data.arrays import Floats, Plane, Words
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.colour_table import (
     EPS,
@@ -31,7 +31,6 @@ from roadeval.pipeline.stage import (
     perfect_mask,
     stage_settings,
 )
-from roadeval.runtime.imports import extension, whole
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
@@ -58,11 +57,6 @@ class SvmSettings:
     """A pixel is road where the decision function is above this."""
 
 
-# Of scipy.linalg's BLAS, which libsvm and liblinear call, the compiled part is enough.
-NOT_RUN: Final = ("sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg")
-"""The packages around scikit-learn's libsvm and liblinear: see `roadeval.runtime.imports`."""
-
-
 @dataclass(frozen=True, eq=False)
 class SupportVectors:
     """A fitted machine (Eq. 15-16)."""
@@ -85,10 +79,6 @@ class SupportVectors:
         check_range("scale", self.scale, 1e-6, 255)
 
 
-Solution = tuple[Floats, Floats, float]
-"""Support vectors, their weights and the offset."""
-
-
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     """Solve the dual (Eq. 14) for the training set's colours with scikit-learn's libsvm.
 
@@ -98,46 +88,13 @@ def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     mean, scale = colours.mean(axis=0), colours.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     features = (colours - mean) / scale
-    try:
-        solution = _by_libsvm(features, sample.road, settings)
-    except (ImportError, AttributeError, TypeError, ValueError):
-        solution = _by_svc(features, sample.road, settings)
-    return SupportVectors(mean, scale, *solution)
+    # Only here: the import takes a second, and a model from a file does not need it.
+    from sklearn.svm import SVC
 
-
-def _by_libsvm(features: Floats, road: Flags, settings: SvmSettings) -> Solution:
-    """Return what `_by_svc` does, bit for bit, by calling libsvm as it does.
-
-    That alone saves a second of computing, in which scikit-learn is imported. But the function
-    is not a public one: any of `ImportError`, `AttributeError`, `TypeError` and `ValueError` says
-    that another version of scikit-learn has it elsewhere, or with other arguments or results, or
-    that the numbers are not to be solved for.
-    """
-    libsvm = extension("sklearn.svm._libsvm", *NOT_RUN)
-    libsvm.set_verbosity_wrap(0)  # or it prints what it did
-    _, vectors, _, (weights,), (offset,), *_ = libsvm.fit(
-        features,
-        road.astype(np.float64),
-        kernel=settings.kernel,
-        C=settings.c,
-        gamma=settings.gamma,
-        class_weight=np.ones(2),
-        cache_size=200.0,
-    )
-    if not (np.isfinite(weights).all() and np.isfinite(offset)):
-        raise ValueError("no finite solution")
-    # libsvm counts the first class, non-road, as positive.
-    return vectors, -weights, -float(offset)
-
-
-def _by_svc(features: Floats, road: Flags, settings: SvmSettings) -> Solution:
-    """Solve the dual; return the support vectors, their weights and the offset."""
-    # Only here: the import takes a second and 40 MiB, and a model from a file needs neither.
-    svm = whole("sklearn.svm")
-    machine = svm.SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
-    machine.fit(features, road)
+    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
+    machine.fit(features, sample.road)
     vectors, weights = map(np.ascontiguousarray, (machine.support_vectors_, machine.dual_coef_[0]))
-    return vectors, weights, float(machine.intercept_[0])
+    return SupportVectors(mean, scale, vectors, weights, float(machine.intercept_[0]))
 
 
 def decision(colours: Plane, machine: SupportVectors, settings: SvmSettings) -> Floats:

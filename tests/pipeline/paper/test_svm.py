@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,17 +59,6 @@ def road(stage, colours):
     return stage(View.of(colours[None])).mask.pixels()[0]
 
 
-class Asked:
-    """A function that counts how often it is called."""
-
-    def __init__(self, function):
-        self.function, self.times = function, 0
-
-    def __call__(self, *given):
-        self.times += 1
-        return self.function(*given)
-
-
 COLOURS = np.concatenate([noise(1, 8000)[0], sample().colours(), sample(seed=1).colours()])
 
 
@@ -86,49 +75,6 @@ def test_the_mask_equals_predict_on_every_pixel_that_is_not_on_the_threshold(cas
     assert clear.mean() > 0.99
     expected = values > settings.threshold if settings.threshold else theirs.predict(COLOURS)
     np.testing.assert_array_equal(road(stage, COLOURS)[clear], expected[clear])
-
-
-def refuse(problem):
-    def extension(*_):
-        raise problem
-
-    return extension
-
-
-class Another:
-    """A libsvm of another version."""
-
-    @staticmethod
-    def fit(*_, **__):
-        return np.zeros(2), np.zeros((2, 3))
-
-
-@pytest.mark.parametrize(
-    "extension",
-    [
-        refuse(ImportError("it is elsewhere")),
-        lambda *_: object(),
-        lambda *_: svm,  # its "fit" takes other arguments
-        lambda *_: Another,
-    ],
-    ids=["elsewhere", "without fit", "other arguments", "other results"],
-)
-def test_where_libsvm_is_not_as_expected_scikit_learns_own_way_gives_the_same_bits(
-    case, monkeypatch, extension
-):
-    settings, machine, _, _ = case
-    monkeypatch.setattr(svm, "extension", extension)
-    monkeypatch.setattr(svm, "_by_svc", asked := Asked(svm._by_svc))
-    other = svm.fit(sample(), settings)
-    assert asked.times == 1
-    for ours, theirs in zip(astuple(machine), astuple(other), strict=True):
-        np.testing.assert_array_equal(ours, theirs, strict=True)
-
-
-def test_by_default_scikit_learn_is_not_asked(monkeypatch):
-    monkeypatch.setattr(svm, "_by_svc", asked := Asked(svm._by_svc))
-    svm.fit(sample(), SvmSettings())
-    assert not asked.times
 
 
 def test_nothing_is_printed():
