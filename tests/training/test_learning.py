@@ -167,7 +167,7 @@ def test_a_drive_without_truth_among_others_is_named(source, frames):
 def adapt(logged, path, pipelines, **settings):
     base, _ = from_file(path, pipelines)
     wanted = TrainingSettings(model=str(path), adapt=True, **settings)
-    (model,), schedule = from_log(
+    model, schedule = from_log(
         lambda only=None, **_: logged,
         pipelines,
         wanted,

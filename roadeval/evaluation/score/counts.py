@@ -188,9 +188,11 @@ def over_cameras(totals: Sequence[Total]) -> Total:
     counts = np.sum([[each[name] for name in OUTCOMES] for each in totals], axis=0)
     frames = sum(each["frames"] for each in totals)
     found = _total(frames, counts, *np.zeros((2, len(metrics.METRICS))))
-    means_of = np.array([[each[name] for name in metrics.METRICS] for each in totals])
-    undefined = {n: sum(each["undefined"][n] for each in totals) for n in metrics.METRICS}
-    return {**found, **means(means_of), "undefined": undefined}
+    names = (*metrics.METRICS, *metrics.OVERLAP)
+    rates = np.array([[each[name] for name in names] for each in totals])
+    undefined = {name: sum(each["undefined"][name] for each in totals) for name in names}
+    overlap = metrics.pooled(counts, metrics.OVERLAP)
+    return {**found, **means(rates, names), **overlap, "undefined": undefined}
 
 
 def means(rates: Floats, names: Iterable[str] = metrics.METRICS) -> dict[str, float]:
