@@ -43,7 +43,7 @@ _POINTS: Final = 400
 """Points of a mask's edge that are looked at."""
 _LEAST: Final = 6
 """Spots without which nothing is found."""
-_SURE: Final = 3.5
+_SURE: Final = 3.0
 """Least mean gain of what fits better over the spots, in standard errors."""
 _RATHER: Final = 1.5
 """The same of a move over an edge that lies farther out, or in, all around."""
