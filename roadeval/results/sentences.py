@@ -221,7 +221,9 @@ def misfit(found: Finding, period_ms: float | None, remedy: str) -> str:
         case Misfit.UPSIDE_DOWN:
             what = f"upside down: turned over {_it(verb)} the images better"
         case Misfit.INVERTED:
-            what = "inverted: there is road high in the image, and none before the vehicle"
+            what = (
+                "inverted, or of another class: road is high in the image, not before the vehicle"
+            )
         case _:
             ways = ((found.right, "right", "left"), (found.down, "down", "up"))
             parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]

@@ -149,6 +149,13 @@ def test_a_standing_vehicle_is_left_alone() -> None:
     assert found([road] * FRAMES, images, mine=[road] * FRAMES) == []
 
 
+def test_a_bad_method_before_a_standing_vehicle_is_not_called_moved() -> None:
+    road = road_at(2.0)
+    images = [image_of(road, seed) for seed in range(FRAMES)]
+    bad = rough([np.roll(road, (4, 6), (0, 1))] * FRAMES, holes=0.2)
+    assert found([road] * FRAMES, images, mine=bad) == []
+
+
 def test_few_frames_say_nothing() -> None:
     assert found(late(ROADS, 3)[:5], IMAGES[:5], mine=ROADS[:5]) == []
 

@@ -49,6 +49,9 @@ _RATHER: Final = 1.5
 """The same of a move over an edge that lies farther out, or in, all around."""
 _MUCH: Final = 0.05
 """Least mean gain, as a share of how well the plain pairing fits."""
+_STILL: Final = 0.005
+"""The share of pixels whose truth changes from spot to spot, on average, up to which the scene is
+one and the same: there a bad method's masks cannot be told from moved ones."""
 _SMALLEST: Final = 96
 """Rows and columns of images, at least, that are looked at."""
 _UPSIDE: Final = 0.4
@@ -200,6 +203,9 @@ class FitCheck:
         self._moved = defaultdict[str, dict[int, Floats]](dict)
         """By subject and spot: the same of each of `_MOVES`, ``(2, K)``."""
         self._upside = defaultdict[str, list[float]](list)
+        self._truth: Plane | None = None
+        """That of the last spot."""
+        self._changes: list[float] = []
 
     def add(self, frame: Frame, computed: Sequence[Packed] = ()) -> None:
         """Look at the next frame; ``computed`` are the masks that were made of it here."""
@@ -231,6 +237,10 @@ class FitCheck:
         if frame.truth is not None:
             ignored = shrunk((frame.truth == IGNORE).astype(np.uint8))
             subjects[TRUTH] = (frame.truth == ROAD).astype(np.uint8) * np.uint8(255)
+        road = subjects.get(TRUTH)
+        if road is not None and self._truth is not None and road.shape == self._truth.shape:
+            self._changes.append(float(np.mean(road != self._truth)))
+        self._truth = self._truth if road is None else road
         edges = {}
         for name, mask in subjects.items():
             if mask.shape != frame.image.shape[:2]:
@@ -290,7 +300,7 @@ class FitCheck:
         if len(fits.get(_PLAIN, ())) < _LEAST:
             return None
         moved = self._moved[name]
-        if len(moved) >= _LEAST and not alone:
+        if len(moved) >= _LEAST and not alone and np.mean(self._changes) > _STILL:
             place = int(sum(moved.values(), np.zeros((2, 1))).sum(0).argmax())
             down, right = _MOVES[:, place].tolist()
             fits[Misfit.MOVED, 0, right, down] = {n: (*v[:, place],) for n, v in moved.items()}

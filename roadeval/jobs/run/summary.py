@@ -192,7 +192,8 @@ def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -
     period_ms = 1000 / rate if rate else None
     source = selection.truth if is_truth else selection.masks[finding.subject]
     pictures = None if source is None else source.pictures
-    remedy = "No number is corrected for it: mend them where they are made."
+    what = "labels" if is_truth else "masks"
+    remedy = f"No number is corrected for it: mend the {what} where they are made."
     is_late = finding.misfit is Misfit.LAG
     if is_late and isinstance(pictures, NamedLabels) and pictures.by == "number":
         setting = "truth" if is_truth else f"masks.{finding.subject}"
