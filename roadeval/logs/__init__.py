@@ -31,16 +31,10 @@ if TYPE_CHECKING:
     )
     from roadeval.logs.topics.reader import TopicInfo
     from roadeval.logs.truth.drawn import Proposal
+    from roadeval.logs.truth.formats.coco import as_coco
     from roadeval.logs.truth.labels import LabelSource, label_files
     from roadeval.logs.truth.pairing import NamedLabels
-    from roadeval.logs.truth.picks import (
-        PICK,
-        Picked,
-        Picks,
-        Why,
-        digest_of,
-        proposal_files,
-    )
+    from roadeval.logs.truth.picks import PICK, Picked, Picks, Why, digest_of
     from roadeval.logs.writing.writer import LogWriter, NoSidecar, PackResult, SidecarWriter, pack
 
 if not TYPE_CHECKING:  # there every name is known

@@ -36,7 +36,7 @@ def pick(
         Path, arguments.option("-o --output", "Where they land, or go on.", "FOLDER")
     ],
     form: Annotated[
-        Literal["png", "coco", "labelme", "cvat"],
+        Literal["png", "coco"],
         arguments.option("--format", "Of the present masks, which are to be corrected."),
     ] = "png",
     variant: Annotated[

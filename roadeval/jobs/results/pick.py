@@ -21,8 +21,8 @@ from roadeval.evaluation import score
 from roadeval.images import png_of
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.logs import Picked, Picks, Proposal, Why, digest_of, proposal_files
-from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, as_read
+from roadeval.logs import Picked, Picks, Proposal, Why, as_coco, digest_of
+from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
@@ -80,8 +80,7 @@ def pick(
     config
         How a log is replayed.
     labels
-        In which format the present masks are written for correction: ``png``, or one of
-        `roadeval.logs.truth.picks.WRITTEN`.
+        In which format the present masks are written for correction: ``png`` or ``coco``.
     variant
         Whose masks, and by whose doubt; by default the first one.
     seed
@@ -199,8 +198,7 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
         mask = drive.layer(name, stage, frame)
         assert mask is not None
         masks[frame] = mask == 1
-    shown = {f: as_read(wanted.labels, Proposal("", mask)) for f, mask in masks.items()}
-    digests = {frame: digest_of(mask) for frame, mask in shown.items()}
+    digests = {frame: digest_of(mask) for frame, mask in masks.items()}
     picks, new = _with(known, random, ranked, digests)
     _write(drive, picks, [(each, masks[each.frame]) for each in new], wanted)
     log = drive.facts.log
@@ -247,7 +245,7 @@ def _write(
         files = (
             {each.image: png_of(np.uint8(255) * each.road) for each in proposals}
             if wanted.labels == PNG
-            else proposal_files(wanted.labels, proposals)
+            else as_coco(proposals)
         )
         for name, content in files.items():
             path = folder / PROPOSALS / name

@@ -232,10 +232,6 @@ class Proposal(NamedTuple):
         return lengths
 
 
-PROPOSED: Final = "road"
-"""The class of what is proposed."""
-
-
 @dataclass(frozen=True)
 class LabelFormat:
     """A kind of files that hold labels.
@@ -253,9 +249,6 @@ class LabelFormat:
     """Return the label of each image in a parsed file of this format, given the size of the log's
     images. A `LogError` or `BadMessage` says what cannot be used; a KeyError, TypeError or
     ValueError means that the file, or the image, is not as the format asks."""
-    write: Callable[[Sequence[Proposal]], Mapping[str, bytes]] | None = None
-    """Returns the files of masks for an annotator to correct, by their names; None where it writes
-    none."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -18,13 +18,8 @@ import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
 from roadeval.data import ROAD, Truth
-from roadeval.images import Limits
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import some
-from roadeval.logs.truth.drawn import PROPOSED, Proposal
-from roadeval.logs.truth.formats.coco import COCO
-from roadeval.logs.truth.formats.cvat import CVAT
-from roadeval.logs.truth.formats.labelme import LABELME
 from roadeval.logs.truth.pairing import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
@@ -34,8 +29,6 @@ PROPOSALS: Final = "proposals"
 LABELS: Final = "labels"
 """What the folder of picked frames holds: this file, and these folders."""
 FORMAT: Final = {"name": "roadeval-pick", "version": 1}
-WRITTEN: Final = {"coco": COCO, "labelme": LABELME, "cvat": CVAT}
-"""Formats of annotation tools in which masks to correct are written."""
 
 
 class Why(StrEnum):
@@ -162,24 +155,6 @@ class Picks:
         """Return whether a label is still as it was proposed, so that nobody has corrected it."""
         own = self.by_stamp.get(float(stamp_ns))
         return own is not None and own.proposal == digest_of(truth == ROAD)
-
-
-def proposal_files(format_: str, proposals: Sequence[Proposal]) -> Mapping[str, bytes]:
-    """Return the files of masks to correct, by their names, in one of the formats of `WRITTEN`."""
-    write = WRITTEN[format_].write
-    assert write is not None
-    return write(proposals)
-
-
-def as_read(format_: str, proposal: Proposal) -> npt.NDArray[np.bool_]:
-    """Return the ``(H, W)`` mask as its file is read again: LabelMe's outlines are smoother."""
-    if format_ != "labelme":
-        return proposal.road
-    (content,) = proposal_files(format_, [proposal]).values()
-    (drawn,) = WRITTEN[format_].read(Path(proposal.image), json.loads(content), None)
-    drawn = drawn.whole(None)
-    values = {name: int(name == PROPOSED) for name in drawn.classes}
-    return np.equal(drawn.pixels(values, Limits()), 1)
 
 
 def digest_of(road: npt.NDArray[np.bool_]) -> str:

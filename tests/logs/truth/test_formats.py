@@ -15,7 +15,7 @@ from skimage.draw import polygon2mask
 
 from roadeval.data import ROAD
 from roadeval.images import Limits
-from roadeval.logs import LabelSettings, LogError, Proposal, proposal_files
+from roadeval.logs import LabelSettings, LogError, Proposal, as_coco
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.drawn import Outline, Runs
 from roadeval.logs.truth.labels import of_classes
@@ -223,7 +223,7 @@ def test_long_runs_are_those_of_pycocotools(seed):
 @pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 @given(arrays(bool, (HEIGHT, WIDTH)))
 def test_the_area_and_the_box_of_a_coco_proposal_are_those_of_its_runs(road):
-    (content,) = proposal_files("coco", [Proposal("a.png", road)]).values()
+    (content,) = as_coco([Proposal("a.png", road)]).values()
     (region,) = json.loads(content)["annotations"]
     runs = coco.frPyObjects(region["segmentation"], HEIGHT, WIDTH)
     assert (coco.decode(runs) == road).all()

@@ -101,7 +101,7 @@ def lengths_in(text: str) -> Sequence[int]:
     return lengths
 
 
-def _as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
+def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
     """Return one file, with a region of uncompressed runs for each image."""
     images, annotations = [], []
     for number, each in enumerate(proposals, 1):
@@ -118,9 +118,8 @@ def _as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
             {**about, "area": int(each.road.sum()), "bbox": box, "segmentation": runs}
         )
     content = {"images": images, "annotations": annotations}
-    content["categories"] = [{"id": 1, "name": drawn.PROPOSED}]
+    content["categories"] = [{"id": 1, "name": "road"}]
     return {"instances.json": json.dumps(content).encode()}
 
 
-COCO: Final = drawn.LabelFormat("COCO", ".json", _is_coco, _coco, _as_coco)
-FORMATS: Final = (COCO,)
+FORMATS: Final = (drawn.LabelFormat("COCO", ".json", _is_coco, _coco),)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth import drawn
@@ -55,23 +55,8 @@ def _shape(element: Element) -> drawn.Shape:
             return drawn.Undrawn(label, other)
 
 
-def _as_cvat(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
-    """Return one file, with a mask of runs for each image that shows road."""
-    root = Element("annotations")
-    SubElement(root, "version").text = "1.1"
-    for number, each in enumerate(proposals):
-        size = dict(zip(("width", "height"), map(str, each.size), strict=True))
-        image = SubElement(root, "image", {"id": str(number), "name": each.image, **size})
-        if each.road.any():
-            runs = ", ".join(map(str, each.runs()))
-            about = {"label": drawn.PROPOSED, "source": "auto", "occluded": "0", "z_order": "0"}
-            SubElement(image, "mask", {**about, "rle": runs, "left": "0", "top": "0", **size})
-    content: bytes = tostring(root, "utf-8", xml_declaration=True)
-    return {"annotations.xml": content}
-
-
-CVAT: Final = drawn.LabelFormat(
-    "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _cvat, _as_cvat
+FORMATS: Final = (
+    drawn.LabelFormat(
+        "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _cvat
+    ),
 )
-
-FORMATS: Final = (CVAT,)

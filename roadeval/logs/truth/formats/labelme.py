@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
 from base64 import b64decode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
-
-import numpy as np
 
 from roadeval.images import Limits, to_rgb
 from roadeval.logs.truth import drawn
 
-SMALLEST: Final = 64
-"""Area of an outline that is written, in quarters of a pixel."""
-HOLE: Final = "other"
 _LINES: Final = ("point", "points", "line", "linestrip")
 _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "quadrilateral")
 
@@ -53,38 +47,4 @@ def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
             return drawn.Undrawn(label, f"{other} of {len(points) // 2} points")
 
 
-def _as_labelme(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
-    """Return a file for each image, with its outlines; a hole is an outline of another class."""
-    found = {}
-    for each in proposals:
-        width, height = each.size
-        common: dict[str, Any] = {"shape_type": "polygon", "group_id": None, "flags": {}}
-        shapes = [{"label": label, "points": ring, **common} for label, ring in _outlines(each)]
-        content: dict[str, Any] = {
-            "version": "5.0.0",
-            "flags": {},
-            "shapes": shapes,
-            "imageData": None,
-            "imagePath": f"../images/{each.image}",
-            "imageHeight": height,
-            "imageWidth": width,
-        }
-        found[f"{Path(each.image).stem}.json"] = json.dumps(content).encode()
-    return found
-
-
-def _outlines(proposal: drawn.Proposal) -> Iterator[tuple[str, list[list[float]]]]:
-    """Yield outlines with few points, within a pixel; small holes and islands are left out."""
-    import cv2
-
-    road = np.pad(proposal.road.astype(np.uint8).repeat(2, 0).repeat(2, 1), 1)
-    rings, parents = cv2.findContours(road, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    inner = np.zeros(0) if parents is None else parents[0, :, 3] >= 0
-    for place in np.argsort(inner, kind="stable").tolist():
-        ring = cv2.approxPolyDP(rings[place], 2.0, closed=True)[:, 0, :]
-        if len(ring) > 2 and cv2.contourArea(rings[place]) >= SMALLEST:
-            yield HOLE if inner[place] else drawn.PROPOSED, ((ring - 0.5) / 2).tolist()
-
-
-LABELME: Final = drawn.LabelFormat("LabelMe", ".json", _is_labelme, _labelme, _as_labelme)
-FORMATS: Final = (LABELME,)
+FORMATS: Final = (drawn.LabelFormat("LabelMe", ".json", _is_labelme, _labelme),)
