@@ -113,7 +113,8 @@ def test_dasks_workers_replay_every_drive_and_the_broken_one_is_named(drives, ra
     done = here(*words, cwd=tmp_path / "cwd")
     assert done.returncode == 3, done.stderr
     assert "3 drives: 2 scored, 1 failed; 20 frames evaluated" in done.stdout
-    (said,) = [line for line in done.stderr.splitlines() if "warning" in line]
+    alike, said = [line for line in done.stderr.splitlines() if "warning" in line]
+    assert "labels repeat an earlier one" in alike
     assert said.startswith("roadeval: warning: b: not an MCAP file")
     errors = {row["drive"][0]: row["ERR"] for row in finals(tmp_path / "f")}
     _, _, _, _, *rows = done.stdout.partition("highest ERR")[2].splitlines()[:6]
