@@ -27,7 +27,7 @@ from roadeval.evaluation.score import TRUTH, Finding, FitCheck, Misfit
 Masks = npt.NDArray[np.uint8]
 LAGS = (1, 2, 3, 4, 5, -1, -2, -3)
 MOVES = ((3, 0), (-3, 0), (0, 4), (0, -4), (6, 0), (0, 6), (0, -6), (-8, 3), (12, 0), (0, -12))
-CELL = 8
+CELL = 4
 LEARNT = 10
 
 
@@ -45,17 +45,18 @@ def replayed(drive: Path, road: int | None, ignore: int | None) -> list[FrameRes
 
 
 def network(frames: Sequence[Frame]) -> Masks:
-    """Return masks of a network of one hidden layer on cells of 8x8, learnt on the first frames."""
+    """Return masks of a network of one hidden layer on cells of 4x4, learnt on the first frames."""
     height, width = frames[0].image.shape[:2]
     size = width // CELL, height // CELL
     places = np.stack(np.meshgrid(*(np.linspace(-1, 1, n) for n in size)), axis=2)
 
     def seen(frame: Frame) -> npt.NDArray[np.float64]:
         cells = cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA) / 128 - 1
-        return np.concatenate([cells, places], axis=2).reshape(-1, 5)
+        around = [cv2.blur(cells, (width, width)) for width in (5, 15)]
+        return np.concatenate([cells, *around, places], axis=2).reshape(-1, 11)
 
     truths = [cv2.resize((f.truth == 1) * 1.0, size, interpolation=cv2.INTER_AREA) for f in frames]
-    learnt = MLPClassifier((24,), max_iter=200, random_state=0).fit(
+    learnt = MLPClassifier((24,), max_iter=60, random_state=0).fit(
         np.concatenate([seen(frame) for frame in frames[:LEARNT]]),
         np.concatenate([truth.ravel() > 0.5 for truth in truths[:LEARNT]]),
     )

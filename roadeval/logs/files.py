@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from itertools import takewhile
@@ -180,7 +181,8 @@ def _other(path: Path, head: bytes) -> str:
         if head[skipped:].startswith(magic):
             stem = path.name.split(".")[0]
             clash = path.name == f"{stem}.mcap"
-            return name.format(path=path.name, stem=f"{stem}_converted" if clash else stem)
+            stem = f"{stem}_converted" if clash else stem
+            return name.format(path=shlex.quote(path.name), stem=shlex.quote(stem))
     return "" if any(head) else "zeros: the disk or the copy failed"
 
 

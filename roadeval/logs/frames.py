@@ -412,7 +412,7 @@ class LoggedFrame:
             raise picture
         image = to_rgb(picture, self.selection.camera.images.limits, self.selection.white)
         logged = image.shape[1], image.shape[0]
-        if logged != self.selection.image.size:
+        if self.selection.image.size not in (None, logged):
             self.accounting.odd_sizes[self.number] = logged
         if level := _blank(image):
             self.accounting.blank[self.number] = level
@@ -489,8 +489,8 @@ class FrameStream:
             self.accounting.of_video = self._pictures.notes
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
-        self._contents: set[int] = set()
-        """Hashes of the labels that were read."""
+        self._contents: dict[int, int] = {}
+        """The stamp of the first label of each content that was read, by its hash."""
         read: Iterable[int] = numbers
         if labelled:
             read = with_label(truth, images, numbers) if (truth := selection.truth) else ()
@@ -529,7 +529,8 @@ class FrameStream:
                     "(`topics.sync_tolerance_ms`)"
                 )
             if partners.missed:
-                yield f"{shown}{partners.missed} frames have no label, for it is nearer to another"
+                lost = f"{partners.missed} frames have no label: the one in reach lies nearer to"
+                yield f"{shown}{lost} another frame"
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
@@ -540,10 +541,6 @@ class FrameStream:
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels
         self.accounting.masks.update(labels.keys() - {TRUTH, SHADOW})
-        if (label := labels.get(TRUTH)) and not isinstance(label.picture, FrameError):
-            content = hash(bytes(label.picture.data))
-            self.accounting.labels_repeated += content in self._contents
-            self._contents.add(content)
         # Reading a message corrects its log time where the file's index is wrong.
         picture = read_or_error(self._pictures, number)
         if name := getattr(picture, "frame_id", ""):
@@ -553,6 +550,9 @@ class FrameStream:
         stamp = camera.images.stamp(number) if camera.clock is Clock.STAMP else UNREADABLE
         stamp = log_time if stamp == UNREADABLE else stamp
         self.accounting.repeated += self._repeats(number, stamp)
+        if (label := labels.get(TRUTH)) and not isinstance(label.picture, FrameError):
+            first = self._contents.setdefault(hash(bytes(label.picture.data)), stamp)
+            self.accounting.labels_repeated += first != stamp
         return LoggedFrame(
             number, stamp, log_time, picture, labels, self._selection, self.accounting
         )

@@ -233,6 +233,8 @@ class Log:
             masks = self._beside_log(settings, found)
             if found.truth is not None and masks.where == found.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
+            notes = (*(note.replace("`truth.", f"`masks.{name}.") for note in masks.notes),)
+            masks = replace(masks, notes=notes)
         except LogError as error:
             reason = str(error)
             if "`labels.road`" in reason and not settings.labels.road:

@@ -509,11 +509,15 @@ class Recorder:
         """Return the error with which one more byte is refused, as at a limit or a full quota."""
         if self._is_disk_full():
             return _failure(errno.ENOSPC)
+        with suppress(ImportError):  # elsewhere than on POSIX there is no such limit
+            import resource
+
+            limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+            if limit != resource.RLIM_INFINITY and self._size() >= limit:
+                return _failure(errno.EFBIG)
         probe = own_name(self.partial)
         try:
-            with probe.open("wb") as file:
-                file.seek(self._size())
-                file.write(b"\0")
+            probe.write_bytes(b"\0")
         except OSError as error:
             return error
         finally:

@@ -166,6 +166,19 @@ def test_small_images_and_masks_of_another_size_are_left_alone() -> None:
     assert found(ROADS, mine=[road[::2, ::-2] for road in ROADS]) == []
 
 
+def test_images_of_another_size_than_the_first_are_left_out() -> None:
+    halves = [image[::2, ::2] if number % 2 else image for number, image in enumerate(IMAGES)]
+    truth = [road[::2, ::2] if number % 2 else road for number, road in enumerate(ROADS)]
+    assert found(truth, halves) == []
+
+
+def test_pixels_of_a_wide_image_are_its_own() -> None:
+    wide = [np.kron(image, np.ones((8, 8, 1), np.uint8)) for image in IMAGES]
+    truth = [np.kron(road, np.ones((8, 8), np.uint8)) for road in ROADS]
+    (finding,) = found(truth, wide, mine=moved(truth, 12, 0))
+    assert abs(finding.right - 12) <= 2
+
+
 def test_labels_of_few_frames_are_held_against_each_image_around() -> None:
     labelled = [road if number % 4 == 1 else None for number, road in enumerate(late(ROADS, 2))]
     assert found(labelled) == [Finding(TRUTH, Misfit.LAG, frames=2)]  # type: ignore[arg-type]

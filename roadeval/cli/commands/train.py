@@ -12,7 +12,8 @@ from roadeval.cli.options import Given, takes
 @takes(
     *("preset", "config", "variants", "nets", "masks", "tunes", "training.frames"),
     *("truth", "cameras", "topics.truth", "topics.masks", "labels"),
-    *("topics.sync_tolerance_ms", "topics.resize_truth"),
+    *("topics.sync_tolerance_ms", "topics.sync_offset_ms"),
+    *("topics.resize_truth", "topics.frame_id"),
     *("frames.scale", "frames.max_pixels"),
     *("frames.white", "frames.unturned", "frames.full_range"),
     *("frames.start", "frames.end", "run.patience_s"),

@@ -155,11 +155,16 @@ def _agreement(
     return np.asarray(fit.sum(1) / max(len(edges.x), 1), np.float64)
 
 
+def _times(shape: tuple[int, ...]) -> int:
+    """Return how many columns of an image become one."""
+    return -(-shape[1] // _WIDEST)
+
+
 def _shrinking(shape: tuple[int, ...]) -> Callable[[Plane], Plane]:
     """Return what reduces a plane of a wide image to at most `_WIDEST` columns."""
     import cv2
 
-    times = -(-shape[1] // _WIDEST)
+    times = _times(shape)
     if times == 1:
         return lambda plane: plane
     size = shape[1] // times, shape[0] // times
@@ -195,6 +200,8 @@ class FitCheck:
         self._due = float(numbers[0])
         self._apart = (numbers[-1] - numbers[0]) / spots
         self._stride = stride
+        self._shape: tuple[int, ...] = ()
+        """Of the first image; those of another size are not looked at."""
         self._recent: deque[_Seen] = deque(maxlen=LAST_LAG)
         self._open: list[tuple[int, int, dict[str, _Edges]]] = []
         self._spots = 0
@@ -209,7 +216,8 @@ class FitCheck:
 
     def add(self, frame: Frame, computed: Sequence[Packed] = ()) -> None:
         """Look at the next frame; ``computed`` are the masks that were made of it here."""
-        if min(frame.image.shape[:2]) < _SMALLEST:
+        self._shape = self._shape or frame.image.shape
+        if frame.image.shape != self._shape or min(self._shape[:2]) < _SMALLEST:
             return
         is_spot = frame.number >= self._due and (frame.truth is not None or frame.external)
         reach = LAST_LAG * self._stride
@@ -327,7 +335,8 @@ class FitCheck:
             is_near = math.hypot(right, down) <= _NEAR
             is_sure = is_sure and not is_near and better is not None and better.errors > _RATHER
         if is_sure:
-            return Finding(name, misfit, frames * self._stride, right, down)
+            times = _times(self._shape)
+            return Finding(name, misfit, frames * self._stride, right * times, down * times)
         if np.nanmean(self._upside[name]) > _UPSIDE:
             return Finding(name, Misfit.INVERTED)
         return None

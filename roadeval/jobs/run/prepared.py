@@ -204,7 +204,8 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
     if picks and config.frames.scale != 1:
         raise RoadevalError("`frames.scale` and picked frames do not go together")
     labelled = selection.truth is not None
-    frames = len(again())
+    stream = again()
+    frames = len(stream)
     truths = frames if selection.truth is None else len(selection.truth.pictures)
     if frames > SPARSE * truths and picks is None:
         note = f"at most {truths} of {frames} frames have road truth: "
@@ -233,7 +234,7 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         log,
         config,
         selection,
-        again(),
+        stream,
         variants,
         model,
         schedule,
@@ -241,7 +242,7 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
         layouts,
         {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
-        FitCheck(selection.among_truth(again().numbers), config.frames.every),
+        FitCheck(selection.among_truth(stream.numbers), config.frames.every),
         camera,
     )
 

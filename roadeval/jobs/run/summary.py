@@ -34,6 +34,7 @@ from roadeval.evaluation.score import (
 from roadeval.evaluation.stats import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.logs import PICK, LogConfig, NamedLabels, Picks, Selection
+from roadeval.logs.topics.reader import TopicReader
 from roadeval.results.facts import (
     DriveFacts,
     EstimateFacts,
@@ -194,13 +195,17 @@ def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -
     pictures = None if source is None else source.pictures
     what = "labels" if is_truth else "masks"
     remedy = f"No number is corrected for it: mend the {what} where they are made."
-    is_late = finding.misfit is Misfit.LAG
-    if is_late and isinstance(pictures, NamedLabels) and pictures.by == "number":
+    if finding.misfit is Misfit.LAG and isinstance(pictures, NamedLabels):
+        first = pictures.first + finding.frames
         setting = "truth" if is_truth else f"masks.{finding.subject}"
-        remedy = f"Set `{setting}.first` to {pictures.first + finding.frames}."
-    elif is_late and is_truth and period_ms:
+        if pictures.by == "number" and first >= 0:
+            remedy = f"Set `{setting}.first` to {first}."
+    by_time = source is not None and isinstance(source.pairing.images, TopicReader)
+    if finding.misfit is Misfit.LAG and is_truth and period_ms and by_time:
         offset = config.topics.sync_offset_ms - finding.frames * period_ms
         remedy = f"Set `topics.sync_offset_ms` to {offset:.0f}."
+    pixels = {name: round(getattr(finding, name) / selection.scale) for name in ("right", "down")}
+    finding = replace(finding, **pixels)
     return misfit(finding, period_ms, remedy)
 
 

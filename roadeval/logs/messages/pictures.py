@@ -144,7 +144,7 @@ def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
     try:
         height, width, big_endian, step, letters = _PACKED.unpack_from(data)
         begin = _PACKED.size + letters
-        packed, most = data[begin:], min(4 * step * height, LARGEST)
+        packed, most = data[begin:], max(min(4 * step * height, LARGEST), 1)
         if packed.startswith(_GZIP):
             pixels = zlib.decompressobj(zlib.MAX_WBITS | 16).decompress(packed, most)
         elif zstandard.frame_content_size(packed) <= most:
@@ -440,7 +440,10 @@ class Video:
                 else "the video has B-frames: frames are numbered in the order of decoding, and "
                 "labels that are paired by number in the order of stamps, in which it is shown"
             )
-        if frame.color_range or self._limits.full_range or not frame.format.name.startswith("yuv4"):
+        form = frame.format
+        if frame.color_range or self._limits.full_range or not form.name.startswith("yuv4"):
+            return
+        if form.components[0].bits != 8:
             return
         plane = frame.planes[0]
         luma = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[::4, : frame.width : 4]

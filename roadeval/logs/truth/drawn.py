@@ -288,8 +288,9 @@ def settled(
             f"{len(without)} of {len(drawn)} images have shapes, but none of road, and are "
             f"{counted} ({some([drawing.image for drawing in without])}){advice}"
         )
-        if meant.skip_roadless:
-            whole = [drawing for drawing in whole if drawing not in without]
+        # Where no image has road its class is named wrongly, which is told later.
+        if meant.skip_roadless and len(without) < len(whole):
+            whole = [d for d in whole if not meant.road.isdisjoint(d.classes)]
     notes += _hidden(whole, meant)
     return whole
 

@@ -6,6 +6,7 @@ Values, colours or confidences of label pictures become truth.
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -191,15 +192,8 @@ def seen_in(
     holds colours, and values are looked for; or is compressed in a way that changes values.
     """
     if format_ := lossy_format(picture):
-        levels = to_rgb(picture, limits)[..., 0]
-        if file is None or np.mean((levels > BLURRED) & (levels < 255 - BLURRED)) > RARE:
-            raise LogError(lossy_labels(name, format_))
-        white = "cv2.threshold(cv2.imread(str(f), 0), 127, 255, 0)[1]"
-        files = f"pathlib.Path({name!r}).glob('*{file.suffix}')"
         raise LogError(
-            f"{name} holds masks as {format_}, which blurs their edges; make a new folder of them: "
-            'mkdir png && python -c "import cv2, pathlib; '
-            f"[cv2.imwrite(f'png/{{f.stem}}.png', {white}) for f in {files}]\""
+            _of_lossy(picture, labels, name, limits, file) or lossy_labels(name, format_)
         )
     pixels = to_rgb(picture, limits) if labels.road_colors else to_labels(picture, limits)
     packed = pixels if pixels.ndim == 2 else pack_colors(pixels)
@@ -212,6 +206,27 @@ def seen_in(
             "`labels.road_colors`"
         )
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
+
+
+_MENDING: Final = (
+    'import cv2, pathlib, sys; [cv2.imwrite(f"png/{f.stem}.png", cv2.threshold(cv2.imread(str(f), '
+    '0), 127, 255, 0)[1]) for f in pathlib.Path(sys.argv[1]).rglob("*%s")]'
+)
+
+
+def _of_lossy(
+    picture: Picture, labels: LabelSettings, name: str, limits: Limits, file: Path | None
+) -> str:
+    """Return how a mask of black and white whose edges are blurred is mended; else nothing."""
+    colours = to_rgb(picture, limits)
+    levels = colours[..., 0]
+    is_grey = np.ptp(colours.astype(np.int16), axis=2).max() <= BLURRED
+    is_white = levels >= 255 - BLURRED
+    is_mask = is_grey and is_white.any() and np.mean((levels > BLURRED) & ~is_white) <= RARE
+    if file is None or not is_mask or labels != LabelSettings():
+        return ""
+    command = f"mkdir png && python -c '{_MENDING % file.suffix}' {shlex.quote(name)}"
+    return f"{name} holds masks whose compression blurs their edges; make a new folder: {command}"
 
 
 def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name: str) -> ClassMap:
@@ -426,6 +441,8 @@ def beside_log(
         count = f"{len(labels)} messages"
     else:
         raise LogError("`truth.images` is for labels with names: those of a log have none")
+    if by != "stamp" and offset_ms:
+        raise LogError(f"`topics.sync_offset_ms` is for stamps, and {where} is paired by {by}")
     if by == "stamp":
         pairing = by_time(labels, camera, offset_ms)
         check_times(pairing, labels.name, camera.clock)

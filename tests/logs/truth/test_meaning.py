@@ -154,21 +154,30 @@ def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelS
         understand(labels, [[0, 255]], "/labels").read(picture, LIMITS)
 
 
-def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(
-    tmp_path, monkeypatch
-):
+def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(tmp_path):
     mask = np.zeros((64, 64), np.uint8)
     mask[20:, 11:53] = 255
-    (tmp_path / "7.jpg").write_bytes(jpeg(np.dstack([mask] * 3)))
-    picture = CompressedPicture(0, "jpeg", (tmp_path / "7.jpg").read_bytes())
-    with pytest.raises(LogError, match="which blurs their edges; make a new folder") as caught:
-        seen_in(picture, LabelSettings(), str(tmp_path), LIMITS, tmp_path / "7.jpg")
-    monkeypatch.chdir(tmp_path)
-    program = str(caught.value).partition('python -c "')[2].rstrip('"')
-    (tmp_path / "png").mkdir()
-    subprocess.run([sys.executable, "-c", program], check=True)
+    folder = tmp_path / "it's $(touch here)" / "below"
+    folder.mkdir(parents=True)
+    (folder / "7.jpg").write_bytes(jpeg(np.dstack([mask] * 3)))
+    picture = CompressedPicture(0, "jpeg", (folder / "7.jpg").read_bytes())
+    with pytest.raises(LogError, match="blurs their edges; make a new folder: ") as caught:
+        seen_in(picture, LabelSettings(), str(folder.parent), LIMITS, folder / "7.jpg")
+    command = str(caught.value).partition("folder: ")[2].replace("python", sys.executable, 1)
+    subprocess.run(["bash", "-c", command], check=True, cwd=tmp_path)
     mended = CompressedPicture(0, "png", (tmp_path / "png" / "7.png").read_bytes())
     np.testing.assert_array_equal(to_labels(mended, LIMITS), mask)
+    assert not (tmp_path / "here").exists()
+
+
+@pytest.mark.parametrize("colours", [(255, 0, 255), (7, 7, 7), (11, 7, 3)])
+def test_classes_saved_as_jpeg_are_no_masks_to_mend(tmp_path, colours):
+    pixels = np.zeros((64, 64, 3), np.uint8)
+    pixels[20:] = colours
+    picture = CompressedPicture(0, "jpeg", jpeg(pixels))
+    with pytest.raises(LogError) as caught:
+        seen_in(picture, LabelSettings(), str(tmp_path), LIMITS, tmp_path / "7.jpg")
+    assert "make a new folder" not in str(caught.value)
 
 
 @pytest.mark.parametrize("road", [(7,), ("fence",)])
