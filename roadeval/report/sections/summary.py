@@ -51,7 +51,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
 def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [PARTIAL], "warning")
-    yield Text(findings.facts.verdict, "verdict")
+    yield Text(findings.facts.verdict.replace("`", ""), "verdict")
     yield from _next(findings)
     if findings.totals:
         yield rates_table(findings.facts)
@@ -76,7 +76,7 @@ def _next(findings: Findings) -> Iterator[LinkList]:
 
 def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     facts = findings.facts
-    yield Text(facts.verdict, "verdict")
+    yield Text(facts.verdict.replace("`", ""), "verdict")
     if findings.worst:
         frame = findings.worst[0]
         where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
