@@ -94,8 +94,16 @@ def read_yaml(path: Path) -> Any:
 
     try:
         text = read_bounded(path, YAML_BYTES).decode()
-        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
-            raise ValueError("it has aliases, as *name: write them out")
+        kinds, depth = ("FlowSequence", "FlowMapping", "BlockSequence", "BlockMapping"), 0
+        opening = tuple(getattr(yaml, f"{kind}StartToken") for kind in kinds)
+        closing = yaml.FlowSequenceEndToken, yaml.FlowMappingEndToken, yaml.BlockEndToken
+        for token in yaml.scan(text):
+            if isinstance(token, yaml.AliasToken):
+                raise ValueError("it has aliases, as *name: write them out")
+            # What opens faster than it closes would take PyYAML a minute.
+            depth += isinstance(token, opening) - isinstance(token, closing)
+            if depth > DEPTH:
+                raise RecursionError
         found = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise ValueError("it is damaged") from error
