@@ -49,7 +49,7 @@ class Calibration:
 
     @property
     def problem(self) -> str:
-        """What no camera can have, as "focal length is 0": the setting first; empty if nothing."""
+        """Return the first property that no camera can have, as "focal length is 0"; else ""."""
         fx, skew, x, zero, fy, y, *last = (*self.matrix, *(math.nan,) * 9)[:9]
         short, long = sorted((self.width, self.height))
         pixels = f"{self.width}x{self.height} pixels"
@@ -72,7 +72,7 @@ class Calibration:
 
     @property
     def doubt(self) -> str:
-        """What tells that its matrix is of images of another size: a centre far from theirs."""
+        """Return why its matrix is of images of another size (its centre is far off); else ""."""
         x, y = self.matrix[2], self.matrix[5]
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""

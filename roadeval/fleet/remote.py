@@ -82,7 +82,7 @@ def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path
 
 
 class _Facts(NamedTuple):
-    """What tells one content of a file from another."""
+    """The state of a file, which changes with its content."""
 
     size: int
     tag: str | None

@@ -70,9 +70,9 @@ _HASHED: Final = (
     re.compile(rf"{_HASH}[-_.](?P<name>.+)"),
     re.compile(rf"(?P<name>.+?)(?:_[a-z]+[-_.]rf)?[-_.]{_HASH}"),
 )
-"""What Label Studio puts before names, and Roboflow behind them."""
+"""Hashes that Label Studio puts before names, and Roboflow behind them."""
 NUMBER: Final = "{number}"
-"""What stands for the frame's number in a pattern of names."""
+"""The place of the frame's number in a pattern of names."""
 _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
 
 

@@ -71,7 +71,7 @@ class Selection:
     calibration: Calibration | None = None
     """The camera's, of the size in which it was logged."""
     calibration_why: str = ""
-    """What is to be said of it; if there is none although the log has some, why."""
+    """Remarks on the calibration; or the reason why the log's is not used."""
     ground: Ground | None = None
     """The ground before the camera, for images of the size in which it was logged."""
     ground_why: str = ""
@@ -119,7 +119,7 @@ class Selection:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know of the camera's images, a sentence each."""
+        """Return warnings about the camera's images, a sentence each."""
         notes = []
         if self.white not in (None, 1, WHITE):
             notes.append(f"a sample of {self.white:g} is white; `frames.white` sets another")
@@ -240,7 +240,7 @@ def _of_camera(topic: TopicInfo, reader: TopicReader, frame_id: str | None) -> T
 
 
 BITS: Final = (8, 10, 12, 14, 16)
-"""Of the samples of cameras."""
+"""Numbers of bits that samples of cameras have."""
 WHITE: Final = (1 << BITS[-1]) - 1
 BRIGHT: Final = 2.0
 """Greatest sample, at most, of pictures of fractions, some of which go beyond 1."""
@@ -305,15 +305,15 @@ class Accounting:
     repeated: int = 0
     """Of these, those that repeat an earlier one, by stamp and content."""
     labels_repeated: int = 0
-    """Of the labelled ones, those whose label is an earlier one's, bit for bit."""
+    """Labelled frames whose label equals an earlier one bit for bit."""
     frame_ids: Counter[str] = field(default_factory=Counter)
     """Frames by the ``frame_id`` of their images."""
     undecodable: dict[int, str] = field(default_factory=dict)
     """Of the frames returned, those that could not be decoded, and why."""
     odd_sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """Of the frames returned, those of another width and height than the topic's first."""
+    """Frames that have another width and height than the topic's first image."""
     blank: dict[int, str] = field(default_factory=dict)
-    """Of the frames returned, those that are black or white."""
+    """Frames that are black or white all over."""
     of_video: Mapping[str, str] = field(default_factory=dict)
     """Sentences on a video, by what they are of."""
     in_chunks: set[int] = field(default_factory=set)

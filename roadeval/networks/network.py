@@ -42,7 +42,7 @@ class Network:
     settings: NetSettings
     file: OnnxFile
     shapes: tuple[tuple[int, ...], ...]
-    """Of its outputs, which hold for every frame."""
+    """Notes on its outputs, which hold for every frame."""
 
     @classmethod
     def of(cls, settings: NetSettings) -> Self:
@@ -122,9 +122,9 @@ class Network:
 
 
 HUGE: Final = 3e4
-"""What stands for infinity; float16 has it, and nothing is left of its exponential."""
+"""A score that stands for infinity; float16 holds it, and its exponential is 0."""
 TAKEN_FOR: Final = {"none": "probabilities", "classes": "classes"}
-"""What an output is taken for, by `NetSettings.activation`; by others for logits."""
+"""The kind of an output by `NetSettings.activation`; logits for any other."""
 
 
 def road_probability(
@@ -275,7 +275,7 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
 
 @dataclass(frozen=True)
 class Sample:
-    """What an output was on images for testing."""
+    """An output's values on the test images: its range, and whether they are whole numbers."""
 
     shape: tuple[int, ...]
     kind: str

@@ -100,7 +100,7 @@ def read_yaml(path: Path) -> Any:
         for token in yaml.scan(text):
             if isinstance(token, yaml.AliasToken):
                 raise ValueError("it has aliases, as *name: write them out")
-            # What opens faster than it closes would take PyYAML a minute.
+            # PyYAML would take a minute for brackets that open and never close.
             depth += isinstance(token, opening) - isinstance(token, closing)
             if depth > DEPTH:
                 raise RecursionError

@@ -40,7 +40,7 @@ class TrainingSettings:
     """Upper bound over all frames and both classes: the SVM's training time grows with its square.
     """
     seed: Annotated[int, Interval(ge=0, le=1_000_000_000)] = 0
-    """Of the draw. Another seed draws other pixels, and gives other rates."""
+    """Seed of the draw. Another seed draws other pixels, and gives other rates."""
     patch: ReferencePatch = field(default_factory=ReferencePatch)
     """Self-supervision: the trapezoid in front of the vehicle that is taken for road."""
     horizon: Share = 0.4

@@ -73,16 +73,16 @@ class Misfit(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What does not fit, and how it would."""
+    """A subject that does not fit the images, and the change by which it would."""
 
     subject: str
     """`TRUTH`, or the name of the variant whose masks they are."""
     misfit: Misfit
     frames: int = 0
-    """Of a lag: how many frames late the subject is; below 0 early."""
+    """Frames by which the subject is late; below 0 it is early. 0 unless it lags."""
     right: int = 0
     down: int = 0
-    """Of what is moved: by how many pixels."""
+    """Pixels by which the subject is moved to the right and down. 0 unless it is moved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,13 +173,13 @@ def _shrinking(shape: tuple[int, ...]) -> Callable[[Plane], Plane]:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What is kept of a frame that is near a spot."""
+    """The slopes of a frame that is near a spot."""
 
     number: int
     image: _Slopes
     truth: _Slopes | None
     computed: _Slopes | None
-    """Of the mean of the masks that were computed from the image here."""
+    """Slopes of the mean of the masks that were computed from the image here."""
 
 
 _PLAIN: Final = (Misfit.LAG, 0, 0, 0)
@@ -201,7 +201,7 @@ class FitCheck:
         self._apart = (numbers[-1] - numbers[0]) / spots
         self._stride = stride
         self._shape: tuple[int, ...] = ()
-        """Of the first image; those of another size are not looked at."""
+        """Shape of the first image; images of another size are not looked at."""
         self._recent: deque[_Seen] = deque(maxlen=LAST_LAG)
         self._open: list[tuple[int, int, dict[str, _Edges]]] = []
         self._spots = 0
@@ -211,7 +211,7 @@ class FitCheck:
         """By subject and spot: the same of each of `_MOVES`, ``(2, K)``."""
         self._upside = defaultdict[str, list[float]](list)
         self._truth: Plane | None = None
-        """That of the last spot."""
+        """Truth of the last spot, 255 for road."""
         self._changes: list[float] = []
 
     def add(self, frame: Frame, computed: Sequence[Packed] = ()) -> None:

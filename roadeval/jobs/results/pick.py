@@ -211,7 +211,7 @@ def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Pic
     folder, facts = wanted.folder, drive.facts
     found = Picks.read(folder)
     if found is None:
-        # What a run that was killed has left is written again.
+        # Files that a killed run has left are written again.
         left = {*folder.rglob("*")} if folder.exists() else set()
         begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
         begun |= {file for file in left if re.fullmatch(r"\d{19}\.png", file.name)}

@@ -310,7 +310,7 @@ class Video:
         self._packets = packets
         self._limits = limits
         self.notes: Final = dict[str, str]()
-        """What a user should know of the frames so far, by its kind."""
+        """Warnings about the frames so far, by their kind."""
         self._ready: dict[int, DecodedPicture | FrameError]
         self._begin(0)
 

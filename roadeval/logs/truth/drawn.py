@@ -156,7 +156,7 @@ class Undrawn(NamedTuple):
     what: str
     """Its kind, for a person: what comes after "a" or a number."""
     box: Outline | None = None
-    """What it lies within, if that is known."""
+    """The box that holds it, if that is known."""
 
     def fill(self, size: Size) -> Mask:
         """Return the ``(H, W)`` pixels of its box; none if that is not known."""
@@ -173,7 +173,7 @@ class Drawing:
     image: str
     """The name of the image's file, or a text that ends with the number of its frame."""
     size: Size | None
-    """Of the image; None where the format does not say: then that of the log's images counts."""
+    """Size of the image; None if the format does not say, and the log's images have it."""
     shapes: Iterable[Shape]
     """They are run through once. An error while they are costs this image, and no other."""
 
@@ -253,7 +253,7 @@ class LabelFormat:
 
 @dataclass(frozen=True)
 class Meant:
-    """What the classes of drawn labels mean, as asked for."""
+    """The meaning of the classes of drawn labels, by the settings."""
 
     road: Set[str]
     ignored: Set[str]

@@ -262,7 +262,7 @@ def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name:
 
 
 def _without_negatives(classes: ClassMap, values: Iterable[int]) -> ClassMap:
-    """Say in a meaning that values below 0 are ignored, where some occur that it does not name."""
+    """Return the meaning, with a note that values below 0 are ignored if such occur unnamed."""
     negative = any(value < 0 and value not in classes.meaning for value in values)
     return replace(classes, words=f"{classes.words}; {NO_LABEL}") if negative else classes
 

@@ -376,7 +376,7 @@ class Pairing:
     unused: int = 0
     """Labels that belong to no frame of the log, as far as that is known beforehand."""
     note: str = ""
-    """What is unusual about it, for people."""
+    """Its unusual properties, for people."""
     unsure: int = 0
     """Frames without a label because their number is not certain: an unknown number of images, or
     of the other log's labels, is lost before them."""

@@ -20,9 +20,9 @@ from roadeval.logs.errors import BadMessage
 from roadeval.logs.truth import drawn
 
 _UPLOADED: Final = re.compile(r"^[0-9a-f]{8}-(?=.)")
-"""What an upload puts before an image's name."""
+"""The hash that an upload puts before an image's name."""
 _AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL")
-"""What says which pixels a region has: a key point has none of these, and is left out."""
+"""Keys that say which pixels a region has; a key point has none, and is left out."""
 _TOOLS: Final = [f"{t}labels" for t in ("polygon", "rectangle", "ellipse", "brush", "bitmask")]
 _UNREADABLE: Final = {"points": ()}
 OPAQUE: Final = 127

@@ -11,7 +11,7 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import drawn
 
 _CLASS: Final = ("class", "label", "category", "type", "name", "object")
-"""What the attribute is called that holds the class, where regions have several."""
+"""Names of the attribute that holds the class, where regions have several."""
 _NO_AREAS: Final = ("point", "polyline")
 
 
