@@ -30,14 +30,15 @@ from benchmarks.replaying import (
     whole,
 )
 from benchmarks.timing import Spread, ratios, table, timed
-from roadeval import logs
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.data import Frame, Role
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import frame as runner
 from roadeval.jobs.run.prepared import prepare, process
+from roadeval.logs.log import open_log
 from roadeval.pipeline.stage import View
-from roadeval.recording import RecordRule, recorder_for
+from roadeval.recording.layout import RecordRule
+from roadeval.recording.recorder import recorder_for
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -136,7 +137,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
         times.setdefault(name, []).append(seconds)
 
     config = configure({"run": {"jobs": 1}})
-    with logs.open_log(drive) as log, one_thread_each():
+    with open_log(drive) as log, one_thread_each():
         run = prepare(log, config, ignore)
         recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
@@ -162,7 +163,7 @@ def _plain(
     drive: Path, mine: dict[str, list[float]], folder: Path, options: argparse.Namespace
 ) -> Rows:
     config = configure({"run": {"jobs": 1}})
-    with logs.open_log(drive) as log:
+    with open_log(drive) as log:
         run = prepare(log, config, ignore)
         frames = [each.decode() for each in log.frames(run.selection)]
         step = max(1, len(frames) // options.plain_frames)
@@ -205,7 +206,7 @@ def _reading(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
         path = drives.write_form(folder / "reading.mcap", frames[:30], size, form)
         times = []
         for _ in range(3):
-            with logs.open_log(path) as log, one_thread_each():
+            with open_log(path) as log, one_thread_each():
                 stream = log.frames(log.select())
                 times += [timed(lambda: next(stream).decode())[1] for _ in range(len(stream))]  # noqa: B023
         rows.append({"form": form, "ms": Spread.of([1e3 * t for t in times])})

@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from roadeval import logs
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.data import Frame
-from roadeval.logs import LogWriter
+from roadeval.logs.log import open_log
+from roadeval.logs.writing.writer import LogWriter
 
 PERIOD_NS: Final = 100_000_000
 JPEG_QUALITY: Final = 90
@@ -47,7 +47,7 @@ class Source:
     def frames(self, count: int) -> list[Frame]:
         """Decode the first frames that have a truth."""
         config = configure({"labels": {"road": self.road, "ignore": self.ignore}})
-        with logs.open_log(self.path, config) as log:
+        with open_log(self.path, config) as log:
             readable = (frame for frame in log.frames(log.select()) if frame.labelled)
             return [each.decode() for each in islice(readable, count)]
 

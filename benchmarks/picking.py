@@ -28,7 +28,7 @@ from roadeval.evaluation.score import chosen
 from roadeval.evaluation.score.unlabelled import entropy
 from roadeval.evaluation.stats import Estimate, draw_order, estimate
 from roadeval.pipeline.stage import View
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 DRAWS: Final = 200
 LABELS: Final = (10, 20, 50)

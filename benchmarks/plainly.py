@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from roadeval.config import RunConfig
+from roadeval.config.run import RunConfig
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View

@@ -15,13 +15,16 @@ import numpy as np
 
 import roadeval
 from benchmarks.timing import Cost, Meter
-from roadeval import logs
-from roadeval.config import RunConfig
+from roadeval.config.run import RunConfig
 from roadeval.data import FrameResult, Packed
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import prepare, process
-from roadeval.recording import RecordRule, codecs, recorder_for
+from roadeval.logs.frames import LoggedFrame
+from roadeval.logs.log import open_log
+from roadeval.recording import codecs
+from roadeval.recording.layout import RecordRule
+from roadeval.recording.recorder import recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
 from roadeval.runtime.threads import ordered
@@ -68,7 +71,7 @@ def lines_of(result: FrameResult) -> dict[str, str]:
 
 def hold(drive: Path, config: RunConfig) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
-    with logs.open_log(drive, config) as log:
+    with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
@@ -83,7 +86,7 @@ def hold(drive: Path, config: RunConfig) -> Held:
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 
-def _files(logged: logs.LoggedFrame) -> tuple[bytes, ...]:
+def _files(logged: LoggedFrame) -> tuple[bytes, ...]:
     pictures = [logged.picture, *(label.picture for label in logged.labels.values())]
     return tuple(bytes(each.data) for each in pictures if not isinstance(each, Exception))
 
@@ -147,7 +150,7 @@ def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[No
 
 def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Do what `replay` does, without its training, its summary and its figures."""
-    with logs.open_log(drive, config) as log:
+    with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()

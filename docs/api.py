@@ -33,7 +33,7 @@ in."""
 def prepare(package: ModuleType) -> None:
     """Make public names and sub-modules visible to pdoc.
 
-    It sees neither names that a package imports on first use nor modules that are missing in
+    It sees neither names that the package imports on first use nor modules that are missing in
     ``__all__``.
     """
     names = getattr(package, "__all__", None)

@@ -19,7 +19,7 @@ import typer.main
 import roadeval
 from roadeval.cli.app import app
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.config import PRESETS
+from roadeval.config.variants import PRESETS
 from roadeval.evaluation.metrics import METRICS
 from roadeval.results import schema
 

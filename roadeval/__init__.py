@@ -16,13 +16,13 @@ Nothing here touches the process's own streams: what a C library of a codec writ
 by itself stays there, while the command line drops it.
 """
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.runtime.imports import on_demand
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
-    from roadeval.config import RunConfig, config_toml, configure, load_config
+    from roadeval.config.run import RunConfig, config_toml, configure, load_config
     from roadeval.errors import RoadevalError
     from roadeval.jobs.log_files import demo, info, pack
     from roadeval.jobs.progress import Progress
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from roadeval.jobs.run.frame import run_frame
     from roadeval.jobs.run.replay import Outcome, replay
     from roadeval.jobs.run.train import train
-    from roadeval.recording import Recording
-    from roadeval.training import Model, load_model, save_model
+    from roadeval.recording.recording import Recording
+    from roadeval.training.model import Model, load_model, save_model
 
 __version__ = VERSION
 
@@ -65,8 +65,32 @@ __all__ = [
     "write_report",
 ]
 
+_MODULES: Final = {
+    "config.run": ("RunConfig", "config_toml", "configure", "load_config"),
+    "errors": ("RoadevalError",),
+    "jobs.log_files": ("demo", "info", "pack"),
+    "jobs.progress": ("Progress",),
+    "jobs.results.compare": ("compare",),
+    "jobs.results.pick": ("pick",),
+    "jobs.results.report": ("write_report",),
+    "jobs.results.result": ("Result",),
+    "jobs.run.fleet": ("FleetOutcome", "replay_fleet"),
+    "jobs.run.frame": ("run_frame",),
+    "jobs.run.replay": ("Outcome", "replay"),
+    "jobs.run.train": ("train",),
+    "recording.recording": ("Recording",),
+    "training.model": ("Model", "load_model", "save_model"),
+}
+"""The names of each module, which is imported when one of them is first used."""
+
+
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__)
+
+    def __getattr__(name: str) -> Any:
+        for module, names in _MODULES.items():
+            if name in names:
+                return getattr(import_module(f"{__name__}.{module}"), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

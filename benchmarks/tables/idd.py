@@ -15,13 +15,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from roadeval.config import RunConfig, configure
+from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
 from roadeval.evaluation.score import BlindPrior
 from roadeval.pipeline.beyond.features import GROUPS
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 SOURCE: Final = "https://github.com/Siya26/Semantic-Segmentation-on-IDD_Lite"
 DRAWS: Final = 1000

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.tables import idd
-from roadeval.config import RunConfig, configure
+from roadeval.config.run import RunConfig, configure
 from roadeval.pipeline.chain import Chain
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 SEEDS: Final = 3
 FLAT: Final = 0.03

@@ -21,12 +21,12 @@ from sklearn.metrics import (
 )
 
 import roadeval
-from roadeval.config import RunConfig
+from roadeval.config.run import RunConfig
 from roadeval.data import BASELINE, FINAL_STAGE, UNFILTERED, Frame
 from roadeval.evaluation.metres import plan_of
 from roadeval.geometry.ground import ground_of
 from roadeval.runtime.threads import one_thread_each
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 DEMO: Final = Path(__file__).resolve().parents[2] / "recordings" / "demo.mcap"
 CAMERA: Final = {"height": 1.42, "pitch": 2.9, "focal": [560]}

@@ -14,9 +14,9 @@ import numpy as np
 from benchmarks.tables import idd
 from benchmarks.tables.drives import DRIVES, Sources
 from benchmarks.tables.taught import IDD_LITE, model_of, summary
-from roadeval.config import RunConfig, configure
+from roadeval.config.run import RunConfig, configure
 from roadeval.data import FINAL_STAGE
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 WEIGHTS: Final = (0.0, 0.5, 1.0, 2.0, 4.0)
 """Of `TreesSettings.reach_weight`."""

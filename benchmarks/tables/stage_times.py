@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from benchmarks.world import RenderSettings
 from benchmarks.world.drive import render_drive
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.data import Frame
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
 from roadeval.runtime.threads import one_thread_each
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 TIMED: Final = 30
 """Frames, after those that train."""

@@ -11,10 +11,10 @@ import numpy as np
 
 from benchmarks.world import RenderSettings
 from benchmarks.world.drive import SynthFrame, render_drive
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.data import ROAD, Frame
 from roadeval.pipeline.stage import View
-from roadeval.training import fit
+from roadeval.training.learning import fit
 
 SEEDS: Final = (0, 1, 2)
 TRAINING: Final = 10

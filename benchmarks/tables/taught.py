@@ -10,8 +10,8 @@ import roadeval
 from benchmarks.tables.drives import DRIVES, Drive, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST, read_drives
 from benchmarks.tables.measure import TEACHER, of_others
-from roadeval.training import save_model
 from roadeval.training.learning import fit
+from roadeval.training.model import save_model
 
 IDD_LITE: Final = "idd"
 PUPILS: Final[tuple[tuple[str, str, str | None], ...]] = (

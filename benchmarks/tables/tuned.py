@@ -20,7 +20,8 @@ from benchmarks.tables import idd
 from benchmarks.tables.drives import DRIVES, MissingSourceError, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST
 from benchmarks.tables.measure import DEVELOPED, change_of, rounded
-from roadeval.config import RunConfig, network_variant
+from roadeval.config.run import RunConfig
+from roadeval.config.variants import network_variant
 from roadeval.data import FINAL_STAGE
 
 NAMES: Final = {

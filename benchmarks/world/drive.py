@@ -18,7 +18,7 @@ from benchmarks.world.sensor import Sensor
 from benchmarks.world.traffic import draw_traffic
 from benchmarks.world.view import Moment, see
 from roadeval.data import Mask, Rgb
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 
 IMAGE_TOPIC: Final = "/camera/image"
 ROAD_TOPIC: Final = "/truth/road"

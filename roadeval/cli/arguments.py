@@ -14,9 +14,10 @@ from roadeval.cli.options import FLAGS, Given, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
-    from roadeval.config import RunConfig, Variant
+    from roadeval.config.run import RunConfig
+    from roadeval.config.variants import Variant
     from roadeval.jobs.results.result import Result as Result_
-    from roadeval.logs import LogConfig
+    from roadeval.logs.settings import LogConfig
 
 
 def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
@@ -71,14 +72,10 @@ def configuration(given: Given) -> RunConfig:
     A `typer.BadParameter` for a value that can be seen to be wrong without opening a file, or
     options that do not go together; a `RoadevalError` for a file that cannot be used.
     """
-    from roadeval.config import (
-        ConfigError,
-        configure,
-        in_file,
-        network_variant,
-        read_camera,
-        read_tables,
-    )
+    from roadeval.config.camera_file import read_camera
+    from roadeval.config.run import configure
+    from roadeval.config.tables import ConfigError, in_file, read_tables
+    from roadeval.config.variants import network_variant
 
     preset = {"preset": given["preset"]} if "preset" in given else {}
     with usage():
@@ -116,7 +113,9 @@ def configuration(given: Given) -> RunConfig:
 
 def of_a_log(given: Given) -> LogConfig:
     """Return what options ask of a log; wrong usage as in `configuration`."""
-    from roadeval.config import in_file, log_config, read_camera
+    from roadeval.config.camera_file import read_camera
+    from roadeval.config.run import log_config
+    from roadeval.config.tables import in_file
 
     with usage():
         _check_names(given, "topics.masks")
@@ -130,7 +129,8 @@ def of_a_log(given: Given) -> LogConfig:
 
 def _variant(name: str, path: str | None) -> Variant:
     """Return the variant of a file or of a preset; with neither, of the preset of its name."""
-    from roadeval.config import PRESETS, Variant, read_tables
+    from roadeval.config.tables import read_tables
+    from roadeval.config.variants import PRESETS, Variant
 
     preset = name if path is None else path
     if path is not None and preset not in PRESETS and (Path(path).suffix or Path(path).exists()):
@@ -141,7 +141,8 @@ def _variant(name: str, path: str | None) -> Variant:
 
 def _masks(name: str, path: str) -> dict[str, Any]:
     """Return the table of masks of a folder or log, or of a file that describes them."""
-    from roadeval.config import in_file, read_tables, with_masks
+    from roadeval.config.tables import in_file, read_tables
+    from roadeval.config.variants import with_masks
 
     if not path.endswith(".toml"):
         return {"path": path}
@@ -187,7 +188,7 @@ def one_camera(given: Given) -> None:
 
 
 def _check_names(given: Given, *options: str) -> None:
-    from roadeval.config import check_variant_name
+    from roadeval.config.variants import check_variant_name
     from roadeval.data import FILTERED, UNFILTERED
 
     taken = [FILTERED, UNFILTERED]

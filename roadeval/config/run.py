@@ -56,7 +56,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
-from roadeval.recording import RecordRule
+from roadeval.recording.layout import RecordRule
 from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import visible, visible_lines
 from roadeval.training.settings import TrainingSettings

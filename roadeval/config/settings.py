@@ -15,7 +15,7 @@ SECTIONS: Final = (
     *("run", "fleet"),
 )
 """The tables that hold for the whole run, by the names of the fields of
-`roadeval.config.RunConfig`."""
+`roadeval.config.run.RunConfig`."""
 
 
 def _keep(value: object) -> object:

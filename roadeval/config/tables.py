@@ -71,7 +71,7 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     """Read the tables of a TOML file, or of the ``run.toml`` that a recording holds.
 
     A `ConfigError` if there are none to read, or they name code that may not be loaded: see
-    `roadeval.config.load_config`.
+    `roadeval.config.run.load_config`.
     """
     try:
         tables = read_toml(_text(Path(path)))
@@ -102,7 +102,7 @@ def _text(path: Path) -> str:
     check_input(path)
     if path.suffix != ".rrd":
         return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
-    from roadeval.recording import run_toml_in
+    from roadeval.recording.recording import run_toml_in
 
     text = run_toml_in(path)
     if text is None:

@@ -25,12 +25,13 @@ from pathlib import Path, PurePath
 from typing import Annotated, Any, Final
 from urllib.parse import unquote, urlsplit
 
-from roadeval.config import OF_A_LOG, RunConfig, in_file, override, read_tables
+from roadeval.config.run import OF_A_LOG, RunConfig
+from roadeval.config.tables import in_file, override, read_tables
 from roadeval.data import as_plain, is_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
-from roadeval.logs import METADATA, LogConfig, files_of, natural
-from roadeval.logs.settings import CameraSettings
+from roadeval.logs.files import METADATA, files_of, natural
+from roadeval.logs.settings import CameraSettings, LogConfig
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.settings import Checked
 from roadeval.runtime.text import public_url, visible, without_secrets

@@ -32,7 +32,7 @@ from roadeval.fleet.drives import (
     scheme_of,
     shown,
 )
-from roadeval.logs import RemoteLog
+from roadeval.logs.log import RemoteLog
 from roadeval.runtime.threads import in_thread
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 
 PATIENCE_S: Final = 20.0
-"""How long a server may be silent, see `roadeval.config.ExecutionSettings`."""
+"""How long a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 _PART: Final = 64 << 10
 """Least bytes of a part that is read: a chunk's message indexes, and the next one's head."""
@@ -68,7 +68,7 @@ _REASONS: Final = (
 
 
 def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
-    """Return what `roadeval.logs.open_log` opens of a drive: a path, or the file behind a URL.
+    """Return what `roadeval.logs.log.open_log` opens of a drive: a path, or the file behind a URL.
 
     Of it only the parts that are needed are read. A `FleetError` if the URL cannot be one, nothing
     can be read there, or the server is silent for so many seconds.

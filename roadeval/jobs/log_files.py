@@ -6,11 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from roadeval import logs
 from roadeval.errors import RoadevalError
-from roadeval.fleet import readable
+from roadeval.fleet.remote import readable
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.logs.log import LogDescription, describe, open_log
+from roadeval.logs.settings import LogConfig
+from roadeval.logs.writing.writer import PackResult
+from roadeval.logs.writing.writer import pack as pack_messages
 from roadeval.runtime.files import AnyPath, put, writing
 
 MB: Final = 1_000_000
@@ -18,11 +21,11 @@ MB: Final = 1_000_000
 
 def info(
     drive: str | Path,
-    config: logs.LogConfig | None = None,
+    config: LogConfig | None = None,
     *,
     verify: bool = False,
     on_progress: OnProgress = ignore,
-) -> logs.LogDescription:
+) -> LogDescription:
     """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
 
     Parameters
@@ -46,18 +49,18 @@ def info(
     def step(done: int, total: int) -> None:
         on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
 
-    described = logs.describe(readable(drive), config, verify=verify, on_bytes=step)
+    described = describe(readable(drive), config, verify=verify, on_bytes=step)
     if config is None or not config.truth.path or described.problem:
         return described
     from roadeval.jobs.run.summary import misfits_of_truth
 
-    with logs.open_log(readable(drive), config) as log:
+    with open_log(readable(drive), config) as log:
         return replace(described, misfits=(*misfits_of_truth(log),))
 
 
 def pack(
     images: AnyPath, output: AnyPath, *, truth: AnyPath | None = None, rate_hz: float | None = None
-) -> logs.PackResult:
+) -> PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
     A `RoadevalError` if there is nothing to pack, a file is unreadable, or no mask belongs to an
@@ -85,8 +88,8 @@ def pack(
     "the times in the files' names"
     """
     with holding(output, inputs=(images, truth)):
-        packed = logs.pack(images, output, masks=truth, rate_hz=rate_hz)
-    problem = logs.describe(packed.path).problem if truth is not None else ""
+        packed = pack_messages(images, output, masks=truth, rate_hz=rate_hz)
+    problem = describe(packed.path).problem if truth is not None else ""
     if not problem:
         return packed
     warning = f"packed, but replay needs more settings: {problem}"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roadeval.errors import RoadevalError
-from roadeval.recording import RecordRule
+from roadeval.recording.layout import RecordRule
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FILES
 from roadeval.results.folder import CONTENT, belonging
@@ -24,7 +24,7 @@ from roadeval.runtime.files import (
 )
 
 if TYPE_CHECKING:
-    from roadeval.config import OutputSettings
+    from roadeval.config.settings import OutputSettings
 
 
 @dataclass(frozen=True)

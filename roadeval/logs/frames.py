@@ -17,7 +17,8 @@ from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
 from roadeval.geometry.settings import GroundSettings
-from roadeval.images import format_of, orientation_of
+from roadeval.images.decoding import orientation_of
+from roadeval.images.formats import format_of
 from roadeval.logs.errors import BadMessage, FrameError, LogError, LostMessageError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
@@ -183,7 +184,7 @@ def settle(
 ) -> Selection:
     """Settle what to replay of a log's own topics; ``of_rig`` is that of `choose_truth`.
 
-    A `LogError` as `roadeval.logs.Log.select` says.
+    A `LogError` as `roadeval.logs.log.Log.select` says.
     """
     asked = config.topics
     topics = [_of_camera(topic, readers[topic.name], asked.frame_id) for topic in topics]

@@ -15,7 +15,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from roadeval.images import Limits
+from roadeval.images.formats import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, LogError

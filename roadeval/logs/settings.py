@@ -67,7 +67,7 @@ def _time(moment: object) -> object:
 
 
 Time = Annotated[str, Checked(_time)]
-"""A moment as `roadeval.logs.parse_time` reads it."""
+"""A moment as `roadeval.logs.settings.parse_time` reads it."""
 Count = Interval(ge=1, le=1_000_000_000)
 Value = Annotated[int, Interval(ge=-32768, le=65535)]
 Name = Annotated[str, Len(1, 200)]

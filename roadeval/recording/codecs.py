@@ -42,10 +42,10 @@ import numpy.typing as npt
 from isal import igzip_lib
 from isal.isal_zlib import crc32
 
-from roadeval import images
 from roadeval.data import LayerKind, LayerSpec, Packed
 from roadeval.data.colours import ColourWithOpacity
-from roadeval.images import MAX_PIXELS, Limits
+from roadeval.images.decoding import palette_indices, to_labels, to_rgb
+from roadeval.images.formats import MAX_PIXELS, Limits
 from roadeval.kernels import KERNELS
 from roadeval.recording.layout import CAMERA, GROUND, Layout
 
@@ -120,7 +120,7 @@ class Codec:
 
     def decode(self, payload: bytes) -> Array:
         """Return the array, here ``(H, W, 3)`` uint8 RGB; a ValueError if the bytes are damaged."""
-        return images.to_rgb(payload, limits_for(self.width, self.height))
+        return to_rgb(payload, limits_for(self.width, self.height))
 
 
 class ImageCodec(Codec):
@@ -160,7 +160,7 @@ class MaskCodec(Codec):
 
     def decode(self, payload: bytes) -> Array:
         """Return the same array."""
-        labels = images.palette_indices(payload, limits_for(self.width, self.height))
+        labels = palette_indices(payload, limits_for(self.width, self.height))
         return np.asarray(cv2.LUT(labels, self._tables[1]))
 
 
@@ -222,7 +222,7 @@ class ScalarCodec(Codec):
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W)`` float32 in the layer's own unit, at full resolution."""
-        codes = images.to_labels(payload, limits_for(self.width, self.height))
+        codes = to_labels(payload, limits_for(self.width, self.height))
         low, high = self.spec.value_range
         values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
         return _restore(values, self.width, self.height)

@@ -118,7 +118,7 @@ class EstimateFacts:
 
 @dataclass(frozen=True)
 class LogFacts:
-    """The log's file, and what tells it from another (`roadeval.logs.Log.digest`)."""
+    """The log's file, and what tells it from another (`roadeval.logs.log.Log.digest`)."""
 
     path: str
     digest: str

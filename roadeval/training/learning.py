@@ -14,7 +14,8 @@ import numpy as np
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Role, Truth
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import BlindPrior
-from roadeval.logs import LoggedFrame, Picks, Why
+from roadeval.logs.frames import LoggedFrame
+from roadeval.logs.truth.picks import Picks, Why
 from roadeval.pipeline.beyond.exposure import ExposureSettings, expose, gains
 from roadeval.pipeline.beyond.features import reach
 from roadeval.pipeline.beyond.scene import scene_of, stretched

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from roadeval.cli.app import main
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.fixtures.make import make
 
 SECOND = 1_000_000_000

@@ -6,7 +6,9 @@ from typing import Any
 import pytest
 import yaml
 
-from roadeval.config import ConfigError, log_config, read_camera
+from roadeval.config.camera_file import read_camera
+from roadeval.config.run import log_config
+from roadeval.config.tables import ConfigError
 from roadeval.geometry.settings import GroundSettings
 
 OST = """\

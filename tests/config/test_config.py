@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import ConfigError, RunConfig, configure, load_config, network_variant
+from roadeval.config.run import RunConfig, configure, load_config
 from roadeval.config.settings import SECTIONS
+from roadeval.config.tables import ConfigError
+from roadeval.config.variants import network_variant
 from roadeval.data import RESERVED
 from roadeval.pipeline.stages import STAGES
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from roadeval.config import ConfigError, configure
+from roadeval.config.run import configure
+from roadeval.config.tables import ConfigError
 
 
 def test_masks_are_those_of_the_drive():

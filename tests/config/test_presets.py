@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import PRESETS, configure
+from roadeval.config.run import configure
+from roadeval.config.variants import PRESETS
 
 PINNED = Path(__file__).with_name("presets.json")
 

@@ -5,16 +5,9 @@ from itertools import pairwise
 import pytest
 
 from roadeval.cli.options import OPTIONS
-from roadeval.config import (
-    PRESETS,
-    ConfigError,
-    RunConfig,
-    config_toml,
-    configure,
-    load_config,
-    network_variant,
-    run_toml,
-)
+from roadeval.config.run import RunConfig, config_toml, configure, load_config, run_toml
+from roadeval.config.tables import ConfigError
+from roadeval.config.variants import PRESETS, network_variant
 
 OTHER = {
     "output.save": "out.rrd",

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import pytest
 
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
 from tests.fixtures.browser import browser, watched  # noqa: F401
 from tests.fixtures.figures import drawn, without_figures  # noqa: F401

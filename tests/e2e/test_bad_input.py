@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from roadeval.cli.app import main
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import here
 
 SECOND = 1_000_000_000

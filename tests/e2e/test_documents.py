@@ -17,7 +17,7 @@ import yaml
 
 import roadeval
 from roadeval.cli.app import app
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import DEMO, ROADEVAL, Replayed
 from tests.fixtures.drives import FRAMES, labels, scene, stamp
 from tests.fixtures.make import make

@@ -13,12 +13,12 @@ import pyarrow.parquet as pq
 import pytest
 
 import roadeval
-from roadeval import logs
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
 from roadeval.jobs.results.compare import compare
 from roadeval.jobs.run.fleet_work import train_fold
-from roadeval.logs import LogWriter
+from roadeval.logs.log import open_log
+from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.fleet import record_path
 from tests.e2e.commands import here
 from tests.fixtures.make import make
@@ -256,7 +256,7 @@ class ThreadTasks(ThreadPoolExecutor):
 
 def digests(path):
     config = roadeval.RunConfig()
-    with logs.open_log(path, config) as log:
+    with open_log(path, config) as log:
         selection = log.select()
         return {each.decode().digest() for each in log.frames(selection)}
 

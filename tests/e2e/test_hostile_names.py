@@ -14,7 +14,7 @@ import pytest
 from pypdf import PdfReader
 
 from roadeval import Recording
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.text import as_markdown, visible
 from tests.e2e.commands import here
 from tests.fixtures.figures import drawn

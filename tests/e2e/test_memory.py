@@ -7,7 +7,7 @@ import sys
 import cv2
 import numpy as np
 
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.measuring import PEAK
 
 PERIOD_NS = 100_000_000

@@ -11,9 +11,11 @@ import pytest
 from PIL import Image
 
 import roadeval
-from roadeval import logs
-from roadeval.config import configure
-from roadeval.logs import Picks, Proposal, Why, as_coco
+from roadeval.config.run import configure
+from roadeval.logs.log import open_log
+from roadeval.logs.truth.drawn import Proposal
+from roadeval.logs.truth.formats.coco import as_coco
+from roadeval.logs.truth.picks import Picks, Why
 from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 
@@ -47,7 +49,7 @@ def work(begun, tmp_path):
 @pytest.fixture(scope="module")
 def truths(begun):
     """The truth of each frame by its stamp."""
-    with logs.open_log(begun / "street.mcap", configure({})) as log:
+    with open_log(begun / "street.mcap", configure({})) as log:
         return {each.stamp_ns: each.decode().truth for each in log.frames(log.select())}
 
 

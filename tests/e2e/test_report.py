@@ -14,7 +14,7 @@ import pytest
 from pypdf import PdfReader
 
 from roadeval.jobs.results.result import DriveResult
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import here, roadeval
 
 

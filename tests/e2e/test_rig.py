@@ -11,7 +11,8 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval.logs import LogWriter, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import DEMO, here
 from tests.e2e.test_fleet import Here
 

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from roadeval.jobs.outputs import Outputs
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.folder import CONTENT, ResultsWriter
 from roadeval.runtime.files import NewFile
 from tests.results.making import facts_of

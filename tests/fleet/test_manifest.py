@@ -2,9 +2,9 @@
 
 import pytest
 
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.errors import RoadevalError
-from roadeval.fleet import find_drives
+from roadeval.fleet.drives import find_drives
 
 TOML = """\
 [[drives]]

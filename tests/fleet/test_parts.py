@@ -3,8 +3,10 @@
 import pytest
 
 import roadeval
-from roadeval.fleet import FleetError, readable, remote
-from roadeval.logs import open_log
+from roadeval.fleet import remote
+from roadeval.fleet.drives import FleetError
+from roadeval.fleet.remote import readable
+from roadeval.logs.log import open_log
 from tests.fleet.serving import Server
 from tests.jobs.making import settings, write_log
 from tests.logs.test_digest import FRAMES, flipped, write

@@ -11,7 +11,8 @@ from threading import Timer
 import pytest
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet import readable, remote, stamp
+from roadeval.fleet import remote
+from roadeval.fleet.remote import readable, stamp
 from tests.fleet.serving import CONTENT, SLOW, Server, s3_is_at
 
 

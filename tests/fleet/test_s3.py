@@ -6,8 +6,9 @@ from urllib.request import Request, urlopen
 import pytest
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet import find_drives, readable, stamp
-from roadeval.logs import open_log
+from roadeval.fleet.drives import find_drives
+from roadeval.fleet.remote import readable, stamp
+from roadeval.logs.log import open_log
 from tests.fixtures.elsewhere import talker
 from tests.fleet.serving import s3_is_at
 

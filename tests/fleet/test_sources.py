@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import RunConfig
+from roadeval.config.run import RunConfig
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
-from roadeval.fleet import find_drives
-from roadeval.fleet.drives import DriveEntry, identity
+from roadeval.fleet.drives import DriveEntry, find_drives, identity
 from roadeval.geometry.settings import GroundSettings
 from roadeval.logs.settings import CameraSettings
 from tests.fixtures.elsewhere import split_bag, talker

@@ -17,7 +17,9 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 from mcap.writer import CompressionType, IndexType
 
-from roadeval.logs import FrameError, LabelSettings, LogConfig, LogError, open_log
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LabelSettings, LogConfig
 from tests.fixtures import broken, drives
 from tests.fixtures.flavours import file_of, png, protobuf
 from tests.fixtures.writing import Logged, Topic, Written

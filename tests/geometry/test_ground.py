@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.world.camera import Camera, Pose
-from roadeval.config import ConfigError, log_config
+from roadeval.config.run import log_config
+from roadeval.config.tables import ConfigError
 from roadeval.data import Calibration, Mounting
 from roadeval.geometry.ground import Ground, GroundError, ground_of
 from roadeval.geometry.plan import OUTSIDE, Plan

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 
 FRAMES = 56
 WIDTH, HEIGHT = 64, 48

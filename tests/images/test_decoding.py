@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from roadeval import images
-from roadeval.images import ImageError, Limits
+from roadeval.images.decoding import palette_indices, size_of, to_labels, to_rgb
+from roadeval.images.formats import ImageError, Limits, format_of
 from tests.images.making import (
     EXACT,
     HEIGHT,
@@ -37,22 +37,22 @@ def turned() -> bytes:
 
 @pytest.mark.parametrize("name", EXACT)
 def test_a_format_without_loss_gives_the_same_pixels(name: str) -> None:
-    np.testing.assert_array_equal(images.to_rgb(EXACT[name], LIMITS), scene())
+    np.testing.assert_array_equal(to_rgb(EXACT[name], LIMITS), scene())
 
 
 @pytest.mark.parametrize("name", LOSSY)
 def test_a_format_with_loss_gives_pixels_near_by(name: str) -> None:
-    found = images.to_rgb(LOSSY[name], LIMITS)
+    found = to_rgb(LOSSY[name], LIMITS)
     assert np.abs(found[40:].astype(int) - scene()[40:]).mean() < 4
 
 
 @pytest.mark.parametrize("name", [*EXACT, *LOSSY])
 def test_the_format_is_told_by_the_first_bytes_and_the_size_by_the_head(name: str) -> None:
     data = (EXACT | LOSSY)[name]
-    format_ = images.format_of(data)
+    format_ = format_of(data)
     assert format_ is not None
     assert (format_.name, format_.exact) == (name, name in EXACT)
-    assert images.size_of(data, LIMITS) == (WIDTH, HEIGHT)
+    assert size_of(data, LIMITS) == (WIDTH, HEIGHT)
 
 
 @pytest.mark.parametrize(
@@ -69,50 +69,50 @@ def test_the_format_is_told_by_the_first_bytes_and_the_size_by_the_head(name: st
     ids=["444", "422", "420", "progressive", "restart", "grey", "rgb", "turned", "padded"],
 )
 def test_a_jpegs_pixels_are_those_of_opencv(data: bytes) -> None:
-    np.testing.assert_array_equal(images.to_rgb(data, LIMITS), by_opencv(data))
+    np.testing.assert_array_equal(to_rgb(data, LIMITS), by_opencv(data))
 
 
 def test_sixteen_bits_keep_the_upper_half() -> None:
     samples = np.array([[0x1234, 0xFFFF]], np.uint16)
     for format_ in ("PNG", "TIFF", "PPM"):
         data = file(format_, samples)
-        assert images.to_rgb(data, LIMITS).tolist() == [[[0x12] * 3, [0xFF] * 3]]
-        assert images.to_labels(data, LIMITS).tolist() == samples.tolist()
+        assert to_rgb(data, LIMITS).tolist() == [[[0x12] * 3, [0xFF] * 3]]
+        assert to_labels(data, LIMITS).tolist() == samples.tolist()
 
 
 def test_whole_numbers_of_thirty_two_bits_keep_their_sign_and_size() -> None:
     data = file("TIFF", np.array([[70_000, -1]], np.int32))
-    assert images.to_labels(data, LIMITS).tolist() == [[70_000, -1]]
+    assert to_labels(data, LIMITS).tolist() == [[70_000, -1]]
 
 
 def test_a_mask_of_one_bit_is_black_and_white() -> None:
     mask = np.array([[True, False]])
-    assert images.to_labels(file("PNG", mask), LIMITS).tolist() == [[255, 0]]
+    assert to_labels(file("PNG", mask), LIMITS).tolist() == [[255, 0]]
 
 
 @pytest.mark.parametrize("name", [*EXACT, *LOSSY])
 def test_half_a_file_is_damaged(name: str) -> None:
     data = (EXACT | LOSSY)[name]
     with pytest.raises(ImageError, match=f"a damaged {name}"):
-        images.to_rgb(data[: len(data) // 2], LIMITS)
+        to_rgb(data[: len(data) // 2], LIMITS)
 
 
 def test_a_jpeg_of_twelve_bits_is_called_so() -> None:
     data = bytearray(LOSSY["JPEG"])
     data[data.index(b"\xff\xc0") + 4] = 12
     with pytest.raises(ImageError, match="a JPEG of 12 bits a sample, which is not read"):
-        images.to_rgb(bytes(data), LIMITS)
+        to_rgb(bytes(data), LIMITS)
 
 
 def test_a_jpeg_without_its_end_is_damaged() -> None:
     with pytest.raises(ImageError, match="Premature end"):
-        images.to_rgb(JPEG[:-2], LIMITS)
+        to_rgb(JPEG[:-2], LIMITS)
 
 
 def test_a_jpeg_damaged_inside_is_told() -> None:
     data = zeroed(JPEG, 1500)
     with pytest.raises(ImageError, match=r"a damaged JPEG \(Corrupt JPEG data"):
-        images.to_rgb(data, LIMITS)
+        to_rgb(data, LIMITS)
 
 
 @pytest.mark.parametrize("at", [20, 50, len(PNG) // 2, len(PNG) - 14])
@@ -120,7 +120,7 @@ def test_a_flipped_bit_of_a_png_is_told_wherever_it_lies(at: int) -> None:
     data = bytearray(PNG)
     data[at] ^= 8
     with pytest.raises(ImageError, match="a damaged PNG"):
-        images.to_rgb(bytes(data), LIMITS)
+        to_rgb(bytes(data), LIMITS)
 
 
 def test_a_jpeg_of_a_subsampling_that_is_not_read_is_refused() -> None:
@@ -129,41 +129,41 @@ def test_a_jpeg_of_a_subsampling_that_is_not_read_is_refused() -> None:
     assert data[factors] == 0x22
     data[factors] = 0x31
     with pytest.raises(ImageError, match="rare chroma subsampling"):
-        images.to_rgb(bytes(data), LIMITS)
+        to_rgb(bytes(data), LIMITS)
 
 
 @pytest.mark.parametrize("data", [b"", b"no image", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"])
 def test_what_is_no_image_is_refused(data: bytes) -> None:
-    for read in (images.to_rgb, images.to_labels, images.palette_indices):
+    for read in (to_rgb, to_labels, palette_indices):
         with pytest.raises(ImageError):
             read(data, LIMITS)
 
 
 @pytest.mark.parametrize("data", [jpeg_of_size(30_000, 30_000), png_of_size(30_000, 30_000)])
 def test_a_size_is_refused_before_anything_is_decoded(data: bytes) -> None:
-    for read in (images.to_rgb, images.to_labels):
+    for read in (to_rgb, to_labels):
         with pytest.raises(ImageError, match=r"30000x30000, more than the 33554432 pixels"):
             read(data, LIMITS)
 
 
 def test_the_limit_on_pixels_is_inclusive() -> None:
-    assert images.to_rgb(JPEG, Limits(WIDTH * HEIGHT)).shape == (HEIGHT, WIDTH, 3)
+    assert to_rgb(JPEG, Limits(WIDTH * HEIGHT)).shape == (HEIGHT, WIDTH, 3)
     with pytest.raises(ImageError, match=r"`frames\.max_pixels`"):
-        images.to_rgb(JPEG, Limits(WIDTH * HEIGHT - 1))
+        to_rgb(JPEG, Limits(WIDTH * HEIGHT - 1))
 
 
 def test_libraries_print_nothing(capfd: pytest.CaptureFixture[str]) -> None:
     for name, data in (EXACT | LOSSY).items():
         for broken in (data[: len(data) // 2], zeroed(data, len(data) // 3, 100)):
             with suppress(ImageError):
-                images.to_rgb(broken, LIMITS)
+                to_rgb(broken, LIMITS)
         assert capfd.readouterr() == ("", ""), name
 
 
 def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded() -> None:
     scan = bytes([0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0])  # refines luma by nothing
     progressive = file("JPEG", progressive=True)
-    for read in (images.to_rgb, images.to_labels):
+    for read in (to_rgb, to_labels):
         with pytest.raises(ImageError, match="a JPEG of more than 100 scans"):
             read(memoryview(progressive[:-2] + 100 * scan + progressive[-2:]), LIMITS)
 
@@ -176,15 +176,15 @@ def rgba(rows: list[list[tuple[int, int, int, int]]]) -> bytes:
 
 def test_a_label_image_of_one_colour_is_the_mask_of_its_opacity() -> None:
     data = rgba([[(255, 255, 255, 0), (255, 255, 255, 255)]])
-    assert images.to_labels(data, Limits()).tolist() == [[0, 255]]
+    assert to_labels(data, Limits()).tolist() == [[0, 255]]
 
 
 def test_colours_of_a_label_image_count_where_opacity_says_the_same() -> None:
     data = rgba([[(0, 0, 0, 0), (255, 255, 255, 255)]])
-    assert images.to_labels(data, Limits()).tolist() == [[0, 255]]
+    assert to_labels(data, Limits()).tolist() == [[0, 255]]
 
 
 def test_a_label_image_whose_opacity_says_more_than_its_colours_is_refused() -> None:
     data = rgba([[(0, 0, 0, 0), (255, 255, 255, 255), (255, 255, 255, 0)]])
     with pytest.raises(ImageError, match="one colour is transparent in parts: save it without"):
-        images.to_labels(data, Limits())
+        to_labels(data, Limits())

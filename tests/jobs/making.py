@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from roadeval import RunConfig, configure
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.training.making import frame
 
 FRAMES: Final = 26

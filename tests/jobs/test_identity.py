@@ -6,7 +6,7 @@ import pytest
 
 import roadeval
 from roadeval.jobs.run import prepared
-from roadeval.logs import open_log
+from roadeval.logs.log import open_log
 from tests.jobs.making import settings, write_log
 
 

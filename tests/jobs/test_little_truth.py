@@ -13,8 +13,10 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
-from roadeval.training import TrainingError
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
+from roadeval.logs.writing.writer import LogWriter
+from roadeval.training.learning import TrainingError
 from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, write_log

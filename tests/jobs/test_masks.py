@@ -10,7 +10,9 @@ from sklearn.metrics import average_precision_score
 import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.run.prepared import identity
-from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
+from roadeval.logs.writing.writer import LogWriter
 from tests.jobs.making import FRAMES, settings, write_log
 
 IN_LOG = "/net/road_mask_prediction"

@@ -11,7 +11,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.logs import LogWriter
+from roadeval.logs.writing.writer import LogWriter
 from tests.evaluation.test_fit import IMAGES, ROADS
 from tests.jobs.making import settings
 

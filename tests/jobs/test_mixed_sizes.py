@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import roadeval
-from roadeval.logs import LogWriter, describe
+from roadeval.logs.log import describe
+from roadeval.logs.writing.writer import LogWriter
 from tests.jobs.making import NS, settings
 
 SIZES = ((64, 48), (80, 40), (40, 60))

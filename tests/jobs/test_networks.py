@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval.config import network_variant
+from roadeval.config.variants import network_variant
 from roadeval.jobs.run import prepared
-from roadeval.logs import open_log
+from roadeval.logs.log import open_log
 from tests.jobs.making import settings, write_log
 from tests.networks.making import network, red_network
 

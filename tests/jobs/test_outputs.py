@@ -9,12 +9,12 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.config import OutputSettings
+from roadeval.config.settings import OutputSettings
 from roadeval.jobs.outputs import Outputs, holding
 from roadeval.jobs.results import inspect
 from roadeval.jobs.results.report import write_report
 from roadeval.jobs.results.result import DriveResult
-from roadeval.logs import Log
+from roadeval.logs.log import Log
 from tests.faults import making
 from tests.jobs.making import write_log
 from tests.recording.making import record, result
@@ -161,7 +161,7 @@ def attempted(drive, made, monkeypatch):
 
     monkeypatch.setattr(Log, "select", computed)
     monkeypatch.setattr("roadeval.jobs.results.report.collect", computed)
-    monkeypatch.setattr("roadeval.logs.pack", computed)
+    monkeypatch.setattr("roadeval.jobs.log_files.pack_messages", computed)
     monkeypatch.setattr("roadeval.jobs.log_files.put", computed)
     monkeypatch.setattr("roadeval.recording.viewer.screenshot", computed)
     return lambda command, place: COMMANDS[command](drive, made, place)

@@ -8,7 +8,8 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.logs import LogConfig, TopicSettings, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
 from roadeval.report import figures as drawn
 from roadeval.results import schema
 from roadeval.results.folder import ResultsFolder

@@ -10,9 +10,12 @@ import pytest
 from onnx import helper
 
 import roadeval
-from roadeval.config import ConfigError, configure, network_variant
+from roadeval.config.run import configure
+from roadeval.config.tables import ConfigError
+from roadeval.config.variants import network_variant
 from roadeval.jobs.run.prepared import prepare
-from roadeval.logs import LogWriter, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.writing.writer import LogWriter
 from roadeval.networks import network as networks
 from roadeval.training.model import arrays_of
 from tests.networks.making import IMAGE, ROAD, red_network, written

@@ -6,15 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roadeval.logs import (
-    FrameError,
-    FrameSettings,
-    FrameStream,
-    LogConfig,
-    LogError,
-    TopicSettings,
-    open_log,
-)
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.frames import FrameStream
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings
 from tests.images.making import EXACT, LOSSY, zeroed
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 

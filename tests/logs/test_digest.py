@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from roadeval.logs import describe, log, open_log
+from roadeval.logs import log
 from roadeval.logs.container.records import FileBytes
+from roadeval.logs.log import describe, open_log
 
 CHUNK = 100_000
 FRAMES = 40

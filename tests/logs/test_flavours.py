@@ -8,7 +8,8 @@ import numpy.typing as npt
 import pytest
 
 from roadeval.data import Frame
-from roadeval.logs import FrameError, LogError, open_log
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.log import open_log
 from tests.fixtures.flavours import FLAVOURS, scenes
 from tests.fixtures.shared import both, shared
 

@@ -7,18 +7,13 @@ from typing import Any
 import pytest
 from mcap.writer import CompressionType
 
-from roadeval.logs import (
-    FrameSettings,
-    Log,
-    LogConfig,
-    LogError,
-    LogWriter,
-    TopicSettings,
-    open_log,
-)
 from roadeval.logs.container import records
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import Log, open_log
+from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
+from roadeval.logs.writing.writer import LogWriter
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789

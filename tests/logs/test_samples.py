@@ -11,16 +11,10 @@ import numpy as np
 import pytest
 import zstandard
 
-from roadeval.logs import (
-    FrameSettings,
-    LabelSettings,
-    LogConfig,
-    TopicSettings,
-    describe,
-    open_log,
-)
 from roadeval.logs.errors import BadMessage
+from roadeval.logs.log import describe, open_log
 from roadeval.logs.messages.pictures import picture_in
+from roadeval.logs.settings import FrameSettings, LabelSettings, LogConfig, TopicSettings
 from tests.logs.making import SECOND, compressed, grey, jpeg, png, raw, ros2_log
 
 STAMPS = [1_700_000_000 * SECOND + i * SECOND // 10 for i in range(20)]

@@ -2,7 +2,8 @@
 
 import pytest
 
-from roadeval.logs import LogError, parse_time
+from roadeval.logs.errors import LogError
+from roadeval.logs.settings import parse_time
 
 SECOND = 1_000_000_000
 

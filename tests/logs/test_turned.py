@@ -13,18 +13,13 @@ import numpy as np
 import pytest
 from PIL import Image, ImageOps
 
-from roadeval import images
-from roadeval.images import Limits
-from roadeval.logs import (
-    FrameSettings,
-    LogConfig,
-    LogError,
-    TopicSettings,
-    describe,
-    open_log,
-    pack,
-)
+from roadeval.images.decoding import size_of, to_rgb, upright
+from roadeval.images.formats import Limits
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import describe, open_log
 from roadeval.logs.messages.pictures import turn_of
+from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings
+from roadeval.logs.writing.writer import pack
 from tests.fixtures.shared import shared
 from tests.images.making import scene
 from tests.logs.making import compressed, png, ros2_log
@@ -43,17 +38,17 @@ def turned(orientation: int, name: str = "JPEG", **options: bool) -> bytes:
 @pytest.mark.parametrize("name", ["JPEG", "PNG", "TIFF", "WEBP", "AVIF"])
 def test_an_orientation_turns_an_image_as_exif_defines_it(name: str, orientation: int) -> None:
     data = turned(orientation, name)
-    stored = images.to_rgb(data, Limits())
+    stored = to_rgb(data, Limits())
     assert stored.shape == scene().shape
     exif = Image.Exif()
     exif[ORIENTATION] = orientation
     expected = Image.fromarray(stored)
     expected.info["exif"] = exif.tobytes()
     shown = np.array(ImageOps.exif_transpose(expected))
-    found = images.to_rgb(data, Limits(turn=True))
+    found = to_rgb(data, Limits(turn=True))
     np.testing.assert_array_equal(found, shown)
-    assert images.size_of(data, Limits(turn=True)) == found.shape[1::-1]
-    assert images.size_of(data, Limits()) == stored.shape[1::-1]
+    assert size_of(data, Limits(turn=True)) == found.shape[1::-1]
+    assert size_of(data, Limits()) == stored.shape[1::-1]
 
 
 @pytest.mark.parametrize("flip", [1, -1])
@@ -75,7 +70,7 @@ def test_a_display_matrix_turns_each_pixel_to_its_place(quarters: int, flip: int
     shown = np.zeros((np.ptp(rows) + 1, np.ptp(columns) + 1), int)
     shown[rows - rows.min(), columns - columns.min()] = [*expected]
     orientation = turn_of(SimpleNamespace(side_data=[Side(matrix)]))
-    np.testing.assert_array_equal(images.upright(pixels, orientation), shown)
+    np.testing.assert_array_equal(upright(pixels, orientation), shown)
 
 
 @pytest.mark.parametrize("videos", shared("failures", "reality", "turned_video"))

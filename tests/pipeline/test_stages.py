@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from roadeval.config import ConfigError, configure
+from roadeval.config.run import configure
+from roadeval.config.tables import ConfigError
 from roadeval.data import Moment, Packed
 from roadeval.pipeline.stage import Output, StageError, View
 from roadeval.pipeline.stages import UnknownStageError, stages_of

@@ -29,7 +29,10 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.evaluation.metrics import METRICS
-from roadeval.recording import Layout, Recorder, Recording, rrd_file
+from roadeval.recording import rrd_file
+from roadeval.recording.layout import Layout
+from roadeval.recording.recorder import Recorder
+from roadeval.recording.recording import Recording
 from roadeval.recording.rrd_file import RrdFile
 from roadeval.results.schema import TABLES
 from tests.results.making import facts_of, lines

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from roadeval import images
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec, Packed
-from roadeval.images import Limits, to_labels
+from roadeval.images.decoding import palette_indices, to_labels
+from roadeval.images.formats import Limits
 from roadeval.recording import codecs as pngs
 from roadeval.recording.codecs import codec
 from roadeval.recording.layout import SHADOW_TRUTH
@@ -94,7 +94,7 @@ ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]
 
 
 def decode(png):
-    return images.palette_indices(png, images.Limits())
+    return palette_indices(png, Limits())
 
 
 @pytest.mark.parametrize("classes", [2, 3, 4, 5, 16, 17, 256])

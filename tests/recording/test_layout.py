@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from roadeval.data import RESERVED
-from roadeval.recording import Layout, RecordingError, RecordRule
+from roadeval.recording.layout import Layout, RecordingError, RecordRule
 from tests.recording.making import VARIANT, layout, paths_of
 
 
@@ -36,7 +36,7 @@ def test_a_rule_is_its_kind_and_number(text):
 
 def test_a_rule_is_checked_without_rerun():
     code = (
-        "import sys; from roadeval.recording import RecordRule; RecordRule.parse('all'); "
+        "import sys; from roadeval.recording.layout import RecordRule; RecordRule.parse('all'); "
         "sys.exit('rerun' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
-from roadeval.recording.recorder import LEAST_FREE
+from roadeval.recording.layout import RecordingError, RecordRule
+from roadeval.recording.recorder import LEAST_FREE, Recorder
+from roadeval.recording.recording import Recording
 from tests.recording.making import (
     layout,
     rerun,
@@ -54,7 +55,7 @@ def _record_and_stop(recorder, results, stop):
 
 KILLED = """
     import os, pathlib, signal, sys
-    from roadeval.recording import Recorder
+    from roadeval.recording.recorder import Recorder
     from tests.recording.making import layout, result
     from tests.results.making import lines
     with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
@@ -146,7 +147,7 @@ def leave_free(monkeypatch, size):
 TOO_LARGE = """
 import resource, signal, sys
 from pathlib import Path
-from roadeval.recording import RecordingError
+from roadeval.recording.layout import RecordingError
 from roadeval.recording import recorder
 from tests.recording.making import record, some_frames
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording.layout import RecordingError, RecordRule
+from roadeval.recording.recorder import Recorder
+from roadeval.recording.recording import Recording
 from tests.recording.making import (
     RESULTS,
     frame,

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from roadeval.data import Doubt
-from roadeval.recording import Recorder, Recording, RecordRule
 from roadeval.recording import recorder as recorder_module
+from roadeval.recording.layout import RecordRule
+from roadeval.recording.recorder import Recorder
+from roadeval.recording.recording import Recording
 from tests.recording.making import RESULTS, layout, result
 from tests.results.making import lines
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.errors import RoadevalError
-from roadeval.training import TrainingSettings, fit, save_model
-from roadeval.training.learning import from_file
+from roadeval.training.learning import fit, from_file
+from roadeval.training.model import save_model
+from roadeval.training.settings import TrainingSettings
 from tests.training.making import frame
 
 SMALL = {"preset": "robust", "trees": {"trees": 10, "features": ["place"]}}

@@ -6,8 +6,8 @@ import pytest
 from roadeval.data import NON_ROAD, ROAD
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import View
-from roadeval.training import TrainingError, TrainingSettings, fit
-from roadeval.training.learning import WIDTH, patch_truth, sample
+from roadeval.training.learning import WIDTH, TrainingError, fit, patch_truth, sample
+from roadeval.training.settings import TrainingSettings
 from tests.training.making import frame, pipelines
 
 FRAMES = [frame(n) for n in range(3)]

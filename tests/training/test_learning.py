@@ -5,11 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
-from roadeval.training import TrainingError, TrainingSettings, learning, save_model
-from roadeval.training.learning import Schedule, fit, from_drives, from_file, from_log
+from roadeval.training import learning
+from roadeval.training.learning import (
+    Schedule,
+    TrainingError,
+    fit,
+    from_drives,
+    from_file,
+    from_log,
+)
+from roadeval.training.model import save_model
+from roadeval.training.settings import TrainingSettings
 from tests.training.making import frame, pipelines
 
 PIPELINES = {

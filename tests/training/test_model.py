@@ -9,10 +9,11 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 import pytest
 
-from roadeval.config import configure
+from roadeval.config.run import configure
 from roadeval.errors import RoadevalError
-from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
-from roadeval.training.model import GREATEST_SIZE
+from roadeval.training.learning import fit
+from roadeval.training.model import GREATEST_SIZE, Model, load_model, save_model
+from roadeval.training.settings import TrainingSettings
 from tests.training.making import frame, pipelines
 
 FEW = {"trees": {"trees": 10, "features": ["place"]}}

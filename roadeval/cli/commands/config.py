@@ -18,7 +18,7 @@ def config(*, given: Given) -> int:
     --config.
     """
     settings = arguments.configuration(given)
-    from roadeval.config import config_toml
+    from roadeval.config.run import config_toml
 
     console.emit(config_toml(settings).rstrip())
     return ExitCode.DONE

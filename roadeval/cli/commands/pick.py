@@ -58,7 +58,7 @@ def pick(
     config = arguments.configuration(given)
     from roadeval.data.words import counted
     from roadeval.jobs.results.pick import pick as run
-    from roadeval.logs import Why
+    from roadeval.logs.truth.picks import Why
 
     with progress.watched(quiet) as watch:
         found = run(

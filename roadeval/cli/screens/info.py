@@ -18,7 +18,7 @@ NS = 1_000_000_000
 
 
 def show(found: Mapping[str, Any], out: Console) -> None:
-    """Print what `roadeval.logs.describe` found, as plain data."""
+    """Print what `roadeval.logs.log.describe` found, as plain data."""
     start, end = found["start_ns"], found["end_ns"]
     size = f"{found['bytes'] / 1e6:.1f} MB"
     known = "" if found["verified"] else "; not read whole, --verify looks for all damage"

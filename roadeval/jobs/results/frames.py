@@ -36,7 +36,7 @@ from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
 from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
-    from roadeval.recording import Recording
+    from roadeval.recording.recording import Recording
 
 
 WORST: Final = 4

@@ -14,15 +14,16 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.config import RunConfig, run_toml
+from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
-from roadeval.images import png_of
+from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.logs import Picked, Picks, Proposal, Why, as_coco, digest_of
-from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS
+from roadeval.logs.truth.drawn import Proposal
+from roadeval.logs.truth.formats.coco import as_coco
+from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, Picked, Picks, Why, digest_of
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
-    from roadeval.recording import Recording
+    from roadeval.recording.recording import Recording
 
 OF_ALL: Final = ("code of ", "network ")
 """What `contents` calls files that all drives of a fleet share."""
@@ -61,7 +61,7 @@ class DriveResult:
         self.recording: Recording | None = None
         if not self.path.is_dir():
             # Only here: a folder is read without what reads a recording.
-            from roadeval.recording import Recording
+            from roadeval.recording.recording import Recording
 
             self.recording = Recording(self.path, camera)
         self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path, camera)
@@ -300,7 +300,7 @@ class Result:
             return first
         if path.is_dir():
             return Facts.read(path / SUMMARY)
-        from roadeval.recording import rig_facts
+        from roadeval.recording.recording import rig_facts
 
         return rig_facts(path) or first
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from roadeval.config import RunConfig, run_toml
+from roadeval.config.run import RunConfig, run_toml
 from roadeval.errors import RoadevalError
 from roadeval.fleet.drives import (
     DriveEntry,

@@ -18,8 +18,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval import logs
-from roadeval.config import FleetSettings, OutputSettings, RunConfig
+from roadeval.config.run import RunConfig
+from roadeval.config.settings import FleetSettings, OutputSettings
 from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import final_stages
@@ -28,7 +28,8 @@ from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import asked, software
 from roadeval.jobs.run.replay import replay
 from roadeval.jobs.run.train import draw
-from roadeval.recording import RecordingError
+from roadeval.logs.truth.labels import label_files
+from roadeval.recording.layout import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
 from roadeval.results.facts import json_text
 from roadeval.results.fleet import (
@@ -50,8 +51,9 @@ from roadeval.results.tables import TableFile
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, own_names, put, sha256_of
-from roadeval.training import TrainingError, learning, save_model
-from roadeval.training.learning import HeldFrames
+from roadeval.training import learning
+from roadeval.training.learning import HeldFrames, TrainingError
+from roadeval.training.model import save_model
 
 MODELS: Final = "models"
 TRAINING_DRIVES: Final = 20
@@ -165,7 +167,7 @@ def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
     """
     beside = [own for own in (config.truth, *config.masks.values()) if own.path]
     try:
-        files = [file for own in beside for file in logs.label_files(own)]
+        files = [file for own in beside for file in label_files(own)]
         found: dict[str, Any] = {}
         if entry.path is None:
             size, tag = stamp(entry.source, config.run.patience_s)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from time import perf_counter
 from typing import Any, Final
 
-from roadeval.config import RunConfig, Variant
+from roadeval.config.run import RunConfig
+from roadeval.config.variants import Variant
 from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
@@ -25,10 +26,10 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.errors import RoadevalError
-from roadeval.images import eight_bits
+from roadeval.images.decoding import eight_bits
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
-from roadeval.training import Model
+from roadeval.training.model import Model
 
 EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask by another method")
 PROBABILITY: Final = LayerSpec(

@@ -16,8 +16,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from roadeval import logs
-from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig, Variant
+from roadeval.config.run import RunConfig
+from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
+from roadeval.config.variants import Variant
 from roadeval.data import Calibration, FrameResult, Role, VariantLayout
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
@@ -25,19 +26,24 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import BlindPrior, FitCheck, Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
+from roadeval.logs.errors import FrameError
+from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, in_step
+from roadeval.logs.log import Log
+from roadeval.logs.truth.pairing import NamedLabels
+from roadeval.logs.truth.picks import Picks
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
-from roadeval.recording import Layout
-from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME
+from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME, Layout
 from roadeval.results.rows import Key, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, reuse, trim
 from roadeval.runtime.threads import ordered
-from roadeval.training import Model, TrainingSettings, learning
+from roadeval.training import learning
 from roadeval.training.learning import Schedule
-from roadeval.training.model import ModelError
+from roadeval.training.model import Model, ModelError
+from roadeval.training.settings import TrainingSettings
 from roadeval.version import VERSION
 
 KEPT: Final = 5
@@ -102,11 +108,11 @@ SPARSE: Final = 5
 class Run:
     """A prepared run: its frames, the chains that run on them, and the score so far."""
 
-    log: logs.Log
+    log: Log
     config: RunConfig
-    selection: logs.Selection
+    selection: Selection
     """The topics that are replayed, and why."""
-    frames: logs.FrameStream
+    frames: FrameStream
     """The frames that are read, and the account of them."""
     variants: tuple[Variant, ...]
     model: Model
@@ -189,7 +195,7 @@ class Run:
         )
 
 
-def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: str = "") -> Run:
+def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = "") -> Run:
     """Select the topics of a log, train or read the model, and bind the variants' chains.
 
     A `RoadevalError` if the log, the configuration or the training leave nothing to run. ``camera``
@@ -198,8 +204,8 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
     selection = log.select()
     again = partial(log.frames, selection)
     variants = config.variants()
-    picks = logs.Picks.of_labels(Path(config.truth.path)) if config.truth.path else None
-    if picks and selection.truth and isinstance(selection.truth.pictures, logs.NamedLabels):
+    picks = Picks.of_labels(Path(config.truth.path)) if config.truth.path else None
+    if picks and selection.truth and isinstance(selection.truth.pictures, NamedLabels):
         picks.check(selection.truth.pictures)
     if picks and config.frames.scale != 1:
         raise RoadevalError("`frames.scale` and picked frames do not go together")
@@ -248,13 +254,13 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress, camera: s
 
 
 def _learn(
-    frames: Callable[[], logs.FrameStream],
+    frames: Callable[[], FrameStream],
     variants: tuple[Variant, ...],
     settings: TrainingSettings,
     on_progress: OnProgress,
     *,
     labelled: bool,
-    picks: logs.Picks | None,
+    picks: Picks | None,
 ) -> tuple[Model, Schedule]:
     pipelines = {variant.name: variant.pipeline for variant in variants}
     base = None
@@ -306,7 +312,7 @@ def software(config: RunConfig) -> dict[str, str]:
     return {"roadeval": VERSION, "python": python, **computing(), **config.others_code()}
 
 
-def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
+def identity(log: Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
     """Return a digest of the log, the settings, the model file and the software, in hexadecimal.
 
     Equal for the same input, in any place of log, model and masks. ``masks`` are the digests of
@@ -359,9 +365,9 @@ def process(
     reuse()
     total, read = sum(len(run.frames) for run in runs), Counter[int]()
 
-    def numbered() -> Iterator[tuple[Run, int, logs.LoggedFrame]]:
+    def numbered() -> Iterator[tuple[Run, int, LoggedFrame]]:
         """Yield the frames, each with its position among its camera's."""
-        for place, logged in logs.in_step([run.frames for run in runs]):
+        for place, logged in in_step([run.frames for run in runs]):
             read[place] += 1
             yield runs[place], read[place], logged
 
@@ -396,12 +402,12 @@ def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:
 
 
 def _process(
-    encoder: Encoder, item: tuple[Run, int, logs.LoggedFrame]
+    encoder: Encoder, item: tuple[Run, int, LoggedFrame]
 ) -> tuple[Run, ProcessedFrame | Failure | None]:
     run, position, logged = item
     try:
         frame = replace(logged.decode(), camera=run.key.camera)
-    except logs.FrameError:
+    except FrameError:
         return run, None  # the log's accounting has it, with the reason
     role = run.schedule.role(frame)
     if role is Role.UNLABELLED and frame.truth is not None:

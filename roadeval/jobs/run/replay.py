@@ -7,16 +7,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval import logs
-from roadeval.config import RunConfig, run_toml
+from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
-from roadeval.fleet import readable
+from roadeval.fleet.remote import readable
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
-from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
+from roadeval.logs.log import Log, open_log
+from roadeval.logs.writing.writer import NoSidecar, SidecarWriter
+from roadeval.recording.layout import RecordRule
+from roadeval.recording.recorder import NullRecorder, Recorder, recorder_for
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
@@ -90,7 +92,7 @@ def replay(
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
-    with logs.open_log(readable(drive, config.run.patience_s), config) as log:
+    with open_log(readable(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
             outcome = _written(log, config, to, on_progress, on_frame)
@@ -101,7 +103,7 @@ def replay(
 
 
 def _written(
-    log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
+    log: Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
 ) -> Outcome:
     """Run over the log. All outputs are whole before the first of them takes its name."""
     cameras = config.by_camera()
@@ -112,7 +114,7 @@ def _written(
     layouts = {run.camera: run.layout() for run in runs}
     rule = RecordRule.parse(config.output.record)
     with (
-        logs.SidecarWriter(to.mcap) if to.mcap else logs.NoSidecar() as sidecar,
+        SidecarWriter(to.mcap) if to.mcap else NoSidecar() as sidecar,
         recorder_for(to.recording, layouts, rule) as recorder,
         ResultsWriter(to.reports) as results,
     ):
@@ -200,7 +202,7 @@ def _record(
     runs: Sequence[Run],
     recorder: Recorder | NullRecorder,
     results: ResultsWriter,
-    sidecar: logs.SidecarWriter | logs.NoSidecar,
+    sidecar: SidecarWriter | NoSidecar,
     *,
     on_progress: OnProgress,
     on_frame: OnFrame,

@@ -12,8 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval import logs
-from roadeval.config import AS_IT_IS
+from roadeval.config.variants import AS_IT_IS
 from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score import (
@@ -33,8 +32,13 @@ from roadeval.evaluation.score import (
 )
 from roadeval.evaluation.stats import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
-from roadeval.logs import PICK, LogConfig, NamedLabels, Picks, Selection
+from roadeval.logs.errors import FrameError
+from roadeval.logs.frames import Selection
+from roadeval.logs.log import Log
+from roadeval.logs.settings import LogConfig
 from roadeval.logs.topics.reader import TopicReader
+from roadeval.logs.truth.pairing import NamedLabels
+from roadeval.logs.truth.picks import PICK, Picks
 from roadeval.results.facts import (
     DriveFacts,
     EstimateFacts,
@@ -169,7 +173,7 @@ def _misfits(run: Run) -> Iterator[str]:
         yield misfit_in_words(finding, run.selection, run.config)
 
 
-def misfits_of_truth(log: logs.Log) -> Iterator[str]:
+def misfits_of_truth(log: Log) -> Iterator[str]:
     """Yield how the truth of a log does not fit its images, by a few frames and neighbours."""
     selection = log.select()
     numbers = selection.among_truth(log.frames(selection).numbers)
@@ -177,7 +181,7 @@ def misfits_of_truth(log: logs.Log) -> Iterator[str]:
     near = {each for place in places for each in _around(numbers[place], log.config.frames.every)}
     fit = FitCheck(numbers, log.config.frames.every, FEW)
     for logged in log.frames(selection, near):
-        with suppress(logs.FrameError):
+        with suppress(FrameError):
             fit.add(logged.decode())
     for finding in fit.findings():
         yield misfit_in_words(finding, selection, log.config)

@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from roadeval import logs
-from roadeval.config import RunConfig
+from roadeval.config.run import RunConfig
 from roadeval.data import Frame
-from roadeval.fleet import DriveEntry, find_drives, readable
+from roadeval.fleet.drives import DriveEntry, find_drives
+from roadeval.fleet.remote import readable
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.logs.frames import FrameStream
+from roadeval.logs.log import open_log
 from roadeval.runtime.files import AnyPath, Paths, listed
-from roadeval.training import Model, TrainingError, learning, save_model
-from roadeval.training.learning import HeldFrames
+from roadeval.training import learning
+from roadeval.training.learning import HeldFrames, TrainingError
+from roadeval.training.model import Model, save_model
 
 
 def train(
@@ -61,13 +64,13 @@ def draw(
 
     Where they must be ``labelled``, a drive without road truth gives none.
     """
-    frames, streams = list[Frame](), list[logs.FrameStream]()
-    with logs.open_log(readable(drive.source, own.run.patience_s), own.for_training()) as log:
+    frames, streams = list[Frame](), list[FrameStream]()
+    with open_log(readable(drive.source, own.run.patience_s), own.for_training()) as log:
         selection = log.select()
         if labelled and selection.truth is None:
             return [], []
 
-        def begin() -> logs.FrameStream:
+        def begin() -> FrameStream:
             streams.append(log.frames(selection))
             return streams[-1]
 

@@ -20,7 +20,8 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from roadeval.data import Rgb
-from roadeval.images import ORIENTATIONS, ImageError, Limits, upright
+from roadeval.images.decoding import ORIENTATIONS, upright
+from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.container.records import LARGEST, Buffer, Message
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages import encodings

@@ -10,9 +10,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval import images
 from roadeval.data import Rgb
-from roadeval.images import ImageError, Limits, eight_bits, without_colours
+from roadeval.images import decoding, formats
+from roadeval.images.decoding import eight_bits, without_colours
+from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.container.records import Buffer
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import (
@@ -161,7 +162,7 @@ def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
         if _is_depth(picture):
             raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
         with _bad_message():
-            return images.to_rgb(picture.data, limits, white)
+            return decoding.to_rgb(picture.data, limits, white)
     return picture.pixels
 
 
@@ -194,7 +195,7 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
             return rows.astype(np.int16) if layout.dtype == "i1" else rows
     elif isinstance(picture, CompressedPicture):
         with _bad_message():
-            return images.to_labels(file_of(picture), limits)
+            return decoding.to_labels(file_of(picture), limits)
     return without_colours(to_rgb(picture, limits))
 
 
@@ -208,7 +209,7 @@ def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return None
     with _bad_message():
-        return images.size_of(file_of(picture), limits)
+        return decoding.size_of(file_of(picture), limits)
 
 
 def lossy_format(picture: Picture) -> str:
@@ -217,7 +218,7 @@ def lossy_format(picture: Picture) -> str:
         return ""
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return "video"
-    format_ = images.format_of(file_of(picture))
+    format_ = formats.format_of(file_of(picture))
     return "" if format_ is None or format_.exact else format_.name
 
 

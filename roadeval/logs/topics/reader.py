@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
-from roadeval.images import Limits, orientation_of
+from roadeval.images.decoding import orientation_of
+from roadeval.images.formats import Limits
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.images import ImageError, Limits
+from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, listed, of_ids, some
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture

@@ -21,7 +21,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.images import Limits
+from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.files import some
 

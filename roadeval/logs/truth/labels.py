@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Truth
 from roadeval.data.words import counted
-from roadeval.images import Limits
+from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture

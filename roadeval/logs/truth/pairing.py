@@ -21,7 +21,7 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.images import ImageError, Limits
+from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import (
     IMAGES,

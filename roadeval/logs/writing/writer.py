@@ -22,15 +22,8 @@ from mcap.writer import Writer
 
 from roadeval.data import Frame, FrameResult, Layer, Tally
 from roadeval.data.arrays import Image
-from roadeval.images import (
-    ImageError,
-    Limits,
-    format_of,
-    orientation_of,
-    png_of,
-    size_of,
-    upright,
-)
+from roadeval.images.decoding import orientation_of, png_of, size_of, upright
+from roadeval.images.formats import ImageError, Limits, format_of
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
 from roadeval.logs.messages.pictures import turn_of

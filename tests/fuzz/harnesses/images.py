@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from mcap.records import Channel, Schema
 
-from roadeval.images import Limits
+from roadeval.images.formats import Limits
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import (

@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from roadeval.logs import LogError, describe
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import describe
 from tests.fixtures import broken
 from tests.fixtures.flavours import FLAVOURS, NoEncoderError
 from tests.fixtures.writing import Written

@@ -6,9 +6,10 @@ import io
 import zipfile
 from functools import cache
 
-from roadeval.config import configure
-from roadeval.training import TrainingSettings, fit, save_model
-from roadeval.training.learning import from_file
+from roadeval.config.run import configure
+from roadeval.training.learning import fit, from_file
+from roadeval.training.model import save_model
+from roadeval.training.settings import TrainingSettings
 from tests.compatibility.make import MODEL, unpack, versions
 from tests.fuzz.harness import Harness, scratch
 from tests.training.making import frame

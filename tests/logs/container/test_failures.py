@@ -8,7 +8,8 @@ from time import process_time
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from roadeval.logs import LogError, open_log
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import open_log
 from tests.fixtures.shared import SHARED, shared
 
 FAILURES = SHARED / "failures" if SHARED else None

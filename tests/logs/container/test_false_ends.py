@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from mcap.opcode import Opcode
 
-from roadeval.logs import Log, open_log
+from roadeval.logs.log import Log, open_log
 from tests.fixtures import broken
 from tests.fixtures.broken import HEAD, chunk, data_end, good, length_of, mended, over, records
 

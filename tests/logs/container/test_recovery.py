@@ -11,7 +11,8 @@ from time import process_time
 
 import pytest
 
-from roadeval.logs import FrameError, Log, LogError, open_log
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.log import Log, open_log
 from tests.fixtures.broken import BROKEN as BROKEN_HERE
 from tests.fixtures.elsewhere import SPLIT, WITH_IMAGES, WITHOUT_IMAGES, split_bag
 from tests.fixtures.make import LOGS, make
@@ -355,7 +356,8 @@ def test_a_note_that_says_nothing_of_files_is_no_loss(tmp_path: Path, note: byte
 MEASURE = f"""
 {PEAK}
 import sys
-from roadeval.logs import FrameError, LogError, open_log
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.log import open_log
 import cv2, mcap_ros1.decoder, mcap_ros2.decoder, mcap_protobuf.decoder
 baseline = peak()
 for path in sys.argv[1:]:

@@ -7,7 +7,8 @@ import lz4.frame
 import pytest
 import zstandard
 
-from roadeval.logs import LogConfig, TopicSettings, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
 from tests.fixtures.broken import mended
 from tests.logs.making import CAMERA, FRAMES, START, small_log
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from roadeval.images import Limits
+from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import RawPicture
 from roadeval.logs.messages.pixels import to_labels, to_rgb

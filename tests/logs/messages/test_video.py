@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 
 from roadeval.data import Frame
-from roadeval.images import Limits
-from roadeval.logs import (
-    FrameError,
-    FrameSettings,
-    LabelPlace,
-    LabelSettings,
-    LogConfig,
-    TopicKind,
-    open_log,
-)
+from roadeval.images.formats import Limits
+from roadeval.logs.errors import FrameError
+from roadeval.logs.log import open_log
+from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, Video, is_keyframe
+from roadeval.logs.settings import FrameSettings, LabelPlace, LabelSettings, LogConfig
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar, packets
 from tests.fixtures.shared import both
 from tests.logs.making import compressed, png, ros2_log

@@ -15,7 +15,8 @@ from mcap_ros2.writer import Writer as Ros2Writer
 from scipy.spatial.transform import Rotation
 
 from roadeval.data import Calibration
-from roadeval.logs import LogConfig, TopicSettings, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
 
 LINE = "=" * 80
 STAMP = {"sec": 5, "nanosec": 0}

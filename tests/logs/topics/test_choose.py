@@ -4,8 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.logs import LabelSettings, LogError, TopicInfo, TopicKind
+from roadeval.logs.errors import LogError
+from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth
+from roadeval.logs.topics.reader import TopicInfo
 
 
 def camera(name: str) -> TopicInfo:

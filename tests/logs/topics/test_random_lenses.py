@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from roadeval.geometry.settings import GroundSettings
-from roadeval.logs import LogConfig, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig
 from tests.logs.topics.test_calibration import SIZE, info, ros2
 
 HEIGHT, PITCH = 1.4, 9.0

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from roadeval.geometry.settings import GroundSettings
-from roadeval.logs import LogConfig, TopicSettings, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
 from tests.fixtures.shared import shared
 
 FOLDER = shared("failures", "reality")

@@ -5,7 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.logs import LogConfig, LogError, Selection, TopicSettings, open_log
+from roadeval.logs.errors import LogError
+from roadeval.logs.frames import Selection
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, TopicSettings
 from tests.logs.making import SECOND, compressed, grey, jpeg, raw, ros2_log
 
 FRONT = "/camera/front/image_raw/compressed"

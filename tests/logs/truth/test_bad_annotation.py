@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from roadeval.logs import LabelSettings, MaskSettings
+from roadeval.logs.settings import LabelSettings, MaskSettings
 from tests.logs.truth.test_formats import HEIGHT, WIDTH
 from tests.logs.truth.test_shapes import labels_of, percent
 

@@ -12,19 +12,13 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.logs import (
-    LabelPlace,
-    LabelSettings,
-    LogConfig,
-    LogError,
-    LogWriter,
-    TopicSettings,
-    label_files,
-    open_log,
-)
-from roadeval.logs.errors import FrameError
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LabelPlace, LabelSettings, LogConfig, TopicSettings
 from roadeval.logs.truth.beside import GREATEST, labels_in
 from roadeval.logs.truth.formats.coco import lengths_in
+from roadeval.logs.truth.labels import label_files
+from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import here
 from tests.fixtures.shared import shared
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log

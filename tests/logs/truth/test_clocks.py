@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from roadeval.logs import LabelPlace, LogConfig, LogError, LogWriter, TopicSettings, open_log
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LabelPlace, LogConfig, TopicSettings
+from roadeval.logs.writing.writer import LogWriter
 from tests.logs.making import grey, png
 
 START, STEP, FRAMES, NS = 1_700_000_000 * 10**9, 10**8, 40, 10**9

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roadeval.images import ImageError, Limits
-from roadeval.logs import LogError, MaskSettings
-from roadeval.logs.errors import BadMessage
+from roadeval.images.formats import ImageError, Limits
+from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
+from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth.beside import labels_in, npy_picture
 from roadeval.logs.truth.labels import Confidence, log_and_topic
 from roadeval.logs.truth.pairing import NamedLabels, with_keys

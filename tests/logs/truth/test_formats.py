@@ -14,10 +14,12 @@ from pycocotools import mask as coco
 from skimage.draw import polygon2mask
 
 from roadeval.data import ROAD
-from roadeval.images import Limits
-from roadeval.logs import LabelSettings, LogError, Proposal, as_coco
+from roadeval.images.formats import Limits
+from roadeval.logs.errors import LogError
+from roadeval.logs.settings import LabelSettings
 from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.drawn import Outline, Runs
+from roadeval.logs.truth.drawn import Outline, Proposal, Runs
+from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.labels import of_classes
 from tests.logs.truth.test_folder import opened
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from roadeval.data import Frame
-from roadeval.logs import FrameError, LogConfig, LogError, MaskSettings, open_log
+from roadeval.logs.errors import FrameError, LogError
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LogConfig, MaskSettings
 from tests.fixtures import broken
 from tests.fixtures.broken import (
     FRAMES,

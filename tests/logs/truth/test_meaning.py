@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from roadeval.images import Limits
-from roadeval.logs import LabelSettings, LogError, MaskSettings
-from roadeval.logs.errors import BadMessage
+from roadeval.images.formats import Limits
+from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
+from roadeval.logs.settings import LabelSettings, MaskSettings
 from roadeval.logs.truth.beside import file_label
 from roadeval.logs.truth.labels import meaning_of, seen_in, understand
 from roadeval.logs.truth.pairing import LabelSet, with_keys

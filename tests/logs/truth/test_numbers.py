@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.images import Limits
-from roadeval.logs import LabelPlace, LogError
+from roadeval.images.formats import Limits
+from roadeval.logs.errors import LogError
 from roadeval.logs.files import images_of
 from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.settings import LabelPlace
 from roadeval.logs.topics.choose import check_names
 from roadeval.logs.topics.reader import TopicInfo
 from roadeval.logs.truth.pairing import LabelSet, NamedLabel, with_keys

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.logs import LogError, Picked, Picks, Why
+from roadeval.logs.errors import LogError
+from roadeval.logs.truth.picks import Picked, Picks, Why
 
 FRAMES = [*range(10, 20)]
 STAMPS = [1_700_000_000_123_456_789 + number * 10**8 for number in FRAMES]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from roadeval.images import Limits
-from roadeval.logs import LabelSettings, LogError, MaskSettings
-from roadeval.logs.errors import BadMessage
+from roadeval.images.formats import Limits
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.settings import LabelSettings, MaskSettings
 from roadeval.logs.truth.beside import labels_in
 from tests.logs.truth.test_beside import coco, written
 from tests.logs.truth.test_formats import HEIGHT, SIZE, WIDTH, inside

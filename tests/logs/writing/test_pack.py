@@ -8,7 +8,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from roadeval.logs import LabelSettings, LogConfig, LogError, open_log, pack
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LabelSettings, LogConfig
+from roadeval.logs.writing.writer import pack
 from tests.fixtures.shared import shared
 from tests.logs.making import grey, jpeg, png
 

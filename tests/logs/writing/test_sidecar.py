@@ -23,7 +23,7 @@ from roadeval.data import (
     Tally,
     VariantResult,
 )
-from roadeval.logs import SidecarWriter
+from roadeval.logs.writing.writer import SidecarWriter
 
 MASK = np.array([[0, 1]], np.uint8)
 RATES = {"ERR": 0.5, "TNR": math.nan}

@@ -8,7 +8,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 
-from roadeval.logs import LogError, LogWriter
+from roadeval.logs.errors import LogError
+from roadeval.logs.writing.writer import LogWriter
 from tests.logs.making import grey, jpeg
 
 

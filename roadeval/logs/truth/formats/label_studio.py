@@ -15,7 +15,8 @@ from urllib.parse import SplitResult, parse_qs, unquote, urlsplit
 
 import numpy as np
 
-from roadeval.images import Limits, to_labels
+from roadeval.images.decoding import to_labels
+from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.truth import drawn
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.images import Limits, to_rgb
+from roadeval.images.decoding import to_rgb
+from roadeval.images.formats import Limits
 from roadeval.logs.truth import drawn
 
 _LINES: Final = ("point", "points", "line", "linestrip")
