@@ -15,10 +15,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.results.pick import Outcome
 
 
-@takes(
-    *("preset", "config", "variants", "nets", "masks", "tunes", "only"),
-    *("training", "truth", "topics", "cameras", "labels", "frames", "run"),
-)
+@takes("preset", "config", "nets", "training.model", "cameras", "run.jobs")
 def pick(
     sources: Annotated[
         list[Path],
@@ -52,7 +49,8 @@ def pick(
     Half of them are drawn at random along the drive: of these 'replay --truth FOLDER' makes a
     number for the whole drive, with its interval. The others are those most in doubt, apart from
     each other: to learn from. FOLDER/images has the images, FOLDER/proposals the present masks;
-    corrected ones belong into FOLDER/labels. Picking again into the same folder goes on.
+    corrected ones belong into FOLDER/labels. Picking again into the same folder goes on. How a log
+    is replayed first is told by a --config of 'replay'; a result is taken as it is.
     """
     arguments.one_camera(given)
     config = arguments.configuration(given)
