@@ -351,10 +351,7 @@ def test_a_comparison_is_a_page_with_the_changes_and_the_frames_that_changed(
     assert seen.tab.locator(".verdict").inner_text() == told["verdict"]
     rows = seen.tab.locator("#what-changed table").first.locator("tbody tr")
     assert rows.count() == sum(3 if row["final"] else 1 for row in told["changes"])
-    assert seen.tab.locator("select.left").input_value() == "unfiltered: errors"
-    assert seen.tab.locator("select.right").input_value() == "filtered: errors"
-    moved = {row["frame"] for row in told["moved"]}
-    strips = seen.tab.locator(".strip")
-    assert moved <= {int(each.get_attribute("data-frame")) for each in strips.all()}
+    moved = {str(row["frame"]) for row in told["moved"]}
     assert len(moved) > 1
+    assert moved <= {*seen.tab.locator("tbody th, tbody td").all_inner_texts()}
     assert violations(seen.tab) == []

@@ -79,11 +79,6 @@ class Side:
         names = [self.variants[name] for name in own["variant"].tolist()]
         return own.replace(variant=np.array(names, str))
 
-    def own_name(self, variant: str) -> str:
-        """Return what the result itself calls a variant."""
-        named = {name: own for own, name in (self.variants or {}).items()}
-        return named.get(variant, variant)
-
     @property
     def scored(self) -> list[Part]:
         """The drives of which any frame was scored."""

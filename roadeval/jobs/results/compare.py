@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, ERRORS, Rows
+from roadeval.data import BASELINE, Rows
 from roadeval.data.result import joined
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
@@ -22,17 +22,11 @@ from roadeval.evaluation.comparison import (
     judge,
     one_drive,
 )
-from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import TESTED
-from roadeval.evaluation.settings import NOTEWORTHY
-from roadeval.jobs.results.frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.report.blocks import Strip
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
-from roadeval.report.charts.standard import over_frames, over_windows
-from roadeval.report.findings import NotableFrame
+from roadeval.report.charts.standard import over_windows
 from roadeval.report.pdf.typeset import pdf, write_file
-from roadeval.report.sections.frames import FrameBrowser, browser, strip
 from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.rows import window_table
@@ -183,13 +177,7 @@ def as_page(compared: Compared) -> bytes:
     """Return a comparison as a page that is whole by itself."""
     from roadeval.report.page.render import page
 
-    made = _document(compared)
-
-    def rendered(frames: FrameBrowser) -> bytes:
-        return page(replace(made, blocks=[*made.blocks, *browser(frames)]))
-
-    frames = browsed(compared, lambda frames: len(rendered(frames)))
-    return page(made) if frames is None else rendered(frames)
+    return page(_document(compared))
 
 
 def _document(compared: Compared) -> Document:
@@ -231,8 +219,6 @@ class ComparedMask:
     name: str
     result: str
     variant: str
-    own: str
-    """What the result itself calls the variant."""
 
 
 def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], Rows] | None:
@@ -254,7 +240,7 @@ def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], Rows] | N
         for side, rows in zip(own, found, strict=True) if common else ():
             name = side.label if alone else f"{side.label}: {variant}"
             kept = rows.take(np.isin(rows["frame"], common))
-            masks.append(ComparedMask(name, side.label, variant, side.own_name(variant)))
+            masks.append(ComparedMask(name, side.label, variant))
             columns = (np.full(len(kept), text) for text in (name, "final"))
             parts.append(kept.replace(**dict(zip(("variant", "stage"), columns, strict=True))))
     if not parts:
@@ -280,69 +266,3 @@ def over_drive(compared: Compared) -> list[Chart]:
     size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
     windows = window_table(score.camera_masks(rows), size)
     return over_windows(windows, [TESTED], _looks_of(masks) | looks([BASELINE]))
-
-
-def browsed(compared: Compared, taken: Callable[[FrameBrowser], int]) -> FrameBrowser | None:
-    """Collect the frames that all results have of a variant, all their masks side by side.
-
-    None where no variant is in all of them, or several drives are compared. ``taken`` returns the
-    bytes of a page with these frames and none of their pictures: of those as many are there as keep
-    it below `roadeval.jobs.results.frames.BYTES`.
-    """
-    if (found := compared_masks(compared.sides)) is None:
-        return None
-    masks, rows = found
-    facts = {each.frame: each for each in _facts(rows, masks)}
-    opened = compared.recordings
-    newest = opened.get(masks[-1].result)
-    without = FrameBrowser(
-        rows=[*facts.values()],
-        variants=[mask.name for mask in masks],
-        charts=over_frames(rows, [*SHORT], _looks_of(masks)),
-        command=newest.inspect("{}") if newest else "",
-    )
-    masks = [mask for mask in masks if mask.result in opened]
-    numbers = [each.frame for each in compared.comparison.moved]
-    numbers += [each.frame for each in compared.comparison.disagreements]
-    pictured = [
-        facts[frame]
-        for frame in dict.fromkeys(numbers)
-        if opened and frame in facts and all(frame in each.pictured for each in opened.values())
-    ]
-    made = (_strip(each, masks, opened, without.command) for each in pictured[:PICTURED])
-    strips = sorted(fitting(made, BYTES - taken(without)), key=lambda each: each.frame)
-    return replace(without, strips=strips)
-
-
-def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[NotableFrame]:
-    """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
-    base, new = masks[0].name, masks[1].name
-    for frame, stamp, rates in rates_by_frame(rows, [*SHORT]):
-        conditions = []
-        if base in rates and new in rates:
-            change = rates[new]["ERR"] - rates[base]["ERR"]
-            if abs(change) >= NOTEWORTHY:
-                conditions = [f"{new} {'worse' if change > 0 else 'better'}"]
-        yield NotableFrame(frame, stamp, "", rates, conditions=conditions)
-
-
-def _strip(
-    facts: NotableFrame,
-    masks: Sequence[ComparedMask],
-    opened: Mapping[str, DriveResult],
-    command: str,
-) -> Strip:
-    """Return a frame with its pictures."""
-    *_, last = (mask.name for mask in masks if mask.name in facts.rates)
-    first, frame = opened[masks[0].result].recording, facts.frame
-    assert first is not None
-    errors = (
-        (
-            m.name,
-            opened[m.result].layer(m.own, ERRORS.name, frame) if m.name in facts.rates else None,
-        )
-        for m in masks
-    )
-    images = [*outcomes(first, frame, errors)]
-    found = NotableFrame(frame, facts.stamp_ns, last, facts.rates, images=images)
-    return strip(found, [*facts.rates], command.replace("{}", str(frame)))
