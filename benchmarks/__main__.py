@@ -19,16 +19,7 @@ from typing import Any
 from benchmarks import drives, processes
 from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
-from benchmarks.replaying import (
-    Held,
-    Whole,
-    floor,
-    hold,
-    library_codecs,
-    lines_of,
-    loop,
-    whole,
-)
+from benchmarks.replaying import Held, Whole, floor, hold, library_codecs, lines_of, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
 from roadeval.config.run import configure
 from roadeval.data import Frame, Role

@@ -32,13 +32,7 @@ from benchmarks.tables import (
     tuned,
 )
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
-from benchmarks.tables.measure import (
-    REPLAYS,
-    SEEDS,
-    STRANGERS,
-    replayed,
-    rounded,
-)
+from benchmarks.tables.measure import REPLAYS, SEEDS, STRANGERS, replayed, rounded
 from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 

@@ -22,11 +22,7 @@ NONE: Final = "-"
 ERR_AT_MOST: Final = {"camvid_0016E5_15hz": 0.04, "camvid_0006R0_1hz": 0.025}
 """What `robust` was to reach on the drives that it was developed on."""
 IDD_ERR_AT_MOST: Final = 0.045
-ADAPTED: Final = {
-    None: "no",
-    "truth": "its first ten frames",
-    "patch": "the same, without labels",
-}
+ADAPTED: Final = {None: "no", "truth": "its first ten frames", "patch": "the same, without labels"}
 NOT_BELOW: Final = 4
 """Of IDD's drives, on which `blind` may be as good."""
 
@@ -255,10 +251,7 @@ def order(numbers: Numbers) -> str:
     return _table(
         ["ERR of the filtered mask, %", *(drive.title for drive in others)],
         (
-            [
-                title,
-                *(_percent(median(_err(numbers, d.name, "paper", variant))) for d in others),
-            ]
+            [title, *(_percent(median(_err(numbers, d.name, "paper", variant))) for d in others)]
             for title, variant in variants.items()
         ),
     )
@@ -345,13 +338,7 @@ def placement(numbers: Numbers) -> str:
     on = REPLAYS["spread"].drives
     found = {name: numbers["drives"][name] for name in on}
     return _table(
-        [
-            "`robust`: ERR, %",
-            "frames",
-            "first ten train",
-            "frames",
-            "ten along the drive train",
-        ],
+        ["`robust`: ERR, %", "frames", "first ten train", "frames", "ten along the drive train"],
         (
             [
                 DRIVES[name].title,

@@ -136,20 +136,9 @@ DRIVES: Final = {
         Drive("synthetic_0", "synthetic, seed 0", synthetic(0), tuned=True),
         Drive("synthetic_1", "synthetic, seed 1", synthetic(1)),
         Drive("synthetic_2", "synthetic, seed 2", synthetic(2)),
-        Drive(
-            "camvid_0016E5_15hz",
-            "CamVid 0016E5, 15 Hz",
-            log,
-            CLASSES,
-            tuned=True,
-        ),
+        Drive("camvid_0016E5_15hz", "CamVid 0016E5, 15 Hz", log, CLASSES, tuned=True),
         Drive("camvid_0006R0_1hz", "CamVid 0006R0, 1 Hz", log, tuned=True),
-        Drive(
-            "camvid_0016E5_1hz",
-            "CamVid 0016E5, 1 Hz",
-            packed("0016E5", 390, 7920),
-            CLASSES,
-        ),
+        Drive("camvid_0016E5_1hz", "CamVid 0016E5, 1 Hz", packed("0016E5", 390, 7920), CLASSES),
         Drive("camvid_Seq05VD", "CamVid Seq05VD, 1 Hz", packed("Seq05VD"), CLASSES),
         Drive("camvid_0001TP", "CamVid 0001TP, 1 Hz", packed("0001TP"), CLASSES),
     )

@@ -24,12 +24,7 @@ from roadeval.config.run import RunConfig
 from roadeval.config.variants import network_variant
 from roadeval.data import FINAL_STAGE
 
-NAMES: Final = {
-    "robust": "unfiltered",
-    "network": "net",
-    "threshold": "at",
-    "tuned": "net_tuned",
-}
+NAMES: Final = {"robust": "unfiltered", "network": "net", "threshold": "at", "tuned": "net_tuned"}
 """What is compared, and its variant."""
 
 

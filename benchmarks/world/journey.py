@@ -77,9 +77,7 @@ class Journey:
             lateral=sways((0.45, 7.0), (0.08, 2.2)),
             yaw=sways((np.radians(1.3), 4.6), (np.radians(0.15), 0.9)),
             pitch=sways((np.radians(0.9), 6.2), (np.radians(0.16), 0.7)),
-            roll=sways(
-                (np.radians(0.5), 3.7),
-            ),
+            roll=sways((np.radians(0.5), 3.7)),
         )
 
     def stretch(self, time: float) -> Stretch:

@@ -45,11 +45,7 @@ class Sun:
         """``(3,)`` unit vector that points at the sun."""
         level = np.cos(self.elevation)
         return np.array(
-            [
-                level * np.sin(self.azimuth),
-                np.sin(self.elevation),
-                level * np.cos(self.azimuth),
-            ]
+            [level * np.sin(self.azimuth), np.sin(self.elevation), level * np.cos(self.azimuth)]
         )
 
     def shadow_of(self, points: Matrix) -> Matrix:

@@ -114,11 +114,7 @@ def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (
-            ["--frame", 123456],
-            1,
-            "no frame 123456; the recording holds frames 0 to 99",
-        ),
+        (["--frame", 123456], 1, "no frame 123456; the recording holds frames 0 to 99"),
         (["--worst", 500], 1, "there is no worst frame number 500: "),
         (["--worst", 1, "--variant", "net"], 1, "no variant net; there are filtered, unfiltered"),
     ],

@@ -253,12 +253,7 @@ def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_n
     touching, apart = (fast.components(pack(mask), 4, connectivity)[0] for connectivity in (8, 4))
     assert plain.paint(touching, 2, 4).tolist() == [[0, 1, 0, 2], [1, 0, 0, 2]]
     assert plain.paint(apart, 2, 4).tolist() == [[0, 1, 0, 2], [3, 0, 0, 2]]
-    assert touching.tolist() == [
-        [0, 1, 2, 1],
-        [0, 3, 4, 2],
-        [1, 0, 1, 1],
-        [1, 3, 4, 2],
-    ]
+    assert touching.tolist() == [[0, 1, 2, 1], [0, 3, 4, 2], [1, 0, 1, 1], [1, 3, 4, 2]]
 
 
 @pytest.mark.parametrize("view", [np.asfortranarray, lambda m: m[::-1], lambda m: m[:, ::2]])

@@ -85,10 +85,7 @@ def components(mask, width=1, connectivity=2):
     labels = label(mask, connectivity=connectivity)
     for region in regionprops(labels):
         top, left, bottom, right = region.bbox
-        box = np.s_[
-            max(top - width, 0) : bottom + width,
-            max(left - width, 0) : right + width,
-        ]
+        box = np.s_[max(top - width, 0) : bottom + width, max(left - width, 0) : right + width]
         own = labels[box] == region.label
         yield box, own, dilate(own, 2 * width + 1) & ~mask[box]
 

@@ -94,15 +94,7 @@ def bind(_settings, level):
     return run
 
 
-LEARNS = Stage(
-    "bright",
-    "Brightness",
-    Share,
-    bind,
-    (LEVEL, BRIGHT),
-    fit=fit,
-    parameters=Level,
-)
+LEARNS = Stage("bright", "Brightness", Share, bind, (LEVEL, BRIGHT), fit=fit, parameters=Level)
 
 
 def _unfit(_sample, _settings):

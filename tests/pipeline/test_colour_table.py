@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.colour_table import (
-    FEW,
-    LEVELS,
-    sums_of_products,
-    sums_of_terms,
-    table_of,
-)
+from roadeval.pipeline.colour_table import FEW, LEVELS, sums_of_products, sums_of_terms, table_of
 from tests.pipeline.images import noise
 
 GREEN, BLUE = np.indices((256, 256))

@@ -11,14 +11,7 @@ from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions, reach
 from roadeval.pipeline.beyond.scene import scene_of
-from roadeval.pipeline.beyond.trees import (
-    ALL,
-    NODES,
-    Blend,
-    TreesSettings,
-    balanced_back,
-    grow,
-)
+from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, balanced_back, grow
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)

@@ -163,10 +163,7 @@ def test_diagonal_neighbours_are_one_component():
 
 def test_the_region_rule_is_a_setting():
     road = mask(*["############"] * 6, *["............"] * 5, *["....####...."] * 5)
-    for region, kept in (
-        ("largest", road * (np.arange(16) < 6)[:, None]),
-        ("all", road),
-    ):
+    for region, kept in (("largest", road * (np.arange(16) < 6)[:, None]), ("all", road)):
         np.testing.assert_array_equal(post_process(road, region=region), kept)
 
 
@@ -245,10 +242,7 @@ def test_every_step_can_be_left_out():
         ({"operations": ("close", "open")}, opening(closed, square)),
         ({"region": "largest"}, keep_region(road)),
         ({"fill": True}, fill_holes(road)),
-        (
-            {"operations": ("close",), "element": 5},
-            closing(road, post.structuring_element(5)),
-        ),
+        ({"operations": ("close",), "element": 5}, closing(road, post.structuring_element(5))),
     ):
         np.testing.assert_array_equal(post_process(road, **nothing | step), expected)
 

@@ -195,12 +195,7 @@ def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shado
 
 
 def test_a_ring_by_hand():
-    shadowed = mask(
-        "......",
-        ".##...",
-        "...#..",
-        "......",
-    )
+    shadowed = mask("......", ".##...", "...#..", "......")
     assert (buffer_ring(shadowed, 1) == mask("####..", "#..##.", "###.#.", "..###.")).all()
 
 
