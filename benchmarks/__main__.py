@@ -36,7 +36,7 @@ Rows = list[dict[str, Any]]
 TURNS = 3
 """Of loop and floors, for each `--repeat`: they take seconds, and a machine slows down for as long.
 """
-PARTS = ("replay", "stages", "plain", "reading", "process")
+PARTS = ("replay", "stages", "plain", "process")
 
 
 def main() -> None:
@@ -75,8 +75,6 @@ def _at_size(
         ]
         if "plain" in options.parts:
             found["against the plain way, ms a frame"] = _plain(drive, mine, folder, options)
-    if "reading" in options.parts:
-        found["reading and decoding alone, ms a frame"] = _reading(frames, size, folder)
     if "process" in options.parts:
         found["processes"] = _process(frames, size, folder, options)
         found["commands"] = _commands(frames, size, folder)
@@ -189,19 +187,6 @@ def _against(name: str, theirs: float, ours: float) -> dict[str, Any]:
         "roadeval": f"{1e3 * ours:.4g}",
         "times faster": f"{theirs / ours:.4g}",
     }
-
-
-def _reading(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
-    rows = []
-    for form in drives.FORMS:
-        path = drives.write_form(folder / "reading.mcap", frames[:30], size, form)
-        times = []
-        for _ in range(3):
-            with open_log(path) as log, one_thread_each():
-                stream = log.frames(log.select())
-                times += [timed(lambda: next(stream).decode())[1] for _ in range(len(stream))]  # noqa: B023
-        rows.append({"form": form, "ms": Spread.of([1e3 * t for t in times])})
-    return rows
 
 
 def _process(

@@ -65,19 +65,21 @@ def shadow_mask(codes, printed=False):
     """Eq. 7 and 8."""
     if codes.min() == codes.max():
         return np.zeros(codes.shape, bool)
-    return codes >= printed_threshold(codes) if printed else codes > threshold_otsu(codes)
+    return codes >= threshold(codes, printed) if printed else codes > threshold_otsu(codes)
 
 
-def printed_threshold(codes):
-    """Eq. 7 with its own definitions, in fractions, so that equals are equal."""
-    p = [Fraction(int(n), codes.size) for n in np.bincount(codes.ravel(), minlength=256)]
-    mean = sum(j * p[j] for j in range(256))
+def threshold(codes, printed=False):
+    """Eq. 7 in fractions, so that equals are equal: its first maximum, or None of one level."""
+    levels, counts = np.unique(codes, return_counts=True)
+    p = {int(j): Fraction(int(n), codes.size) for j, n in zip(levels, counts, strict=True)}
+    mean = sum(j * p[j] for j in p)
     criterion = {}
     for t in range(256):
-        w, mu = sum(p[: t + 1]), sum(p[t + 1 :])
-        if w * mu > 0:
-            criterion[t] = (mean * w - mu) ** 2 / (w * mu)
-    return max(criterion, key=criterion.get)
+        w = sum(p[j] for j in p if j <= t)
+        mu = 1 - w if printed else sum(j * p[j] for j in p if j <= t)
+        if 0 < w < 1:
+            criterion[t] = (mean * w - mu) ** 2 / (w * (1 - w))
+    return max(criterion, key=criterion.get, default=None)
 
 
 def components(mask, width=1, connectivity=2):
@@ -98,15 +100,16 @@ def rings(mask, width=1):
     return union
 
 
-def transfer(values, mask, width=1, printed=False):
+def transfer(values, mask, width=1, printed=False, *, connectivity=2, most=None):
     """Eq. 11 on the channels of an ``(H, W, C)`` array."""
     values = values.astype(float)
     result = values.copy()
-    for box, own, ring in components(mask, width):
+    for box, own, ring in components(mask, width, connectivity):
         if ring.any():
             inside, around = values[box][own], values[box][ring]
             sigma, sigma_ring = _std(inside), _std(around)
             gain = _ratio(sigma**2, sigma_ring**2) if printed else _ratio(sigma_ring, sigma)
+            gain = gain if most is None else np.minimum(gain, most)
             result[box][own] = around.mean(axis=0) + (inside - inside.mean(axis=0)) * gain
     return result
 

@@ -1,15 +1,14 @@
-"""Eq. 6-11, each against a literal reading of it."""
+"""Eq. 6-11, each against a literal reading of it: `tests.pipeline.reference`."""
 
 import tracemalloc
-from fractions import Fraction
 
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import ndimage
 from skimage.filters import threshold_otsu
+from skimage.measure import label
 
 from roadeval.data import Packed
 from roadeval.kernels import KERNELS, plain
@@ -83,39 +82,17 @@ def test_codes_equal_the_formula_on_every_pixel(image):
 histograms = st.dictionaries(st.integers(0, 255), st.integers(1, 40), min_size=1, max_size=12)
 
 
-def first_maximum(histogram, lower_term):
-    """Eq. 7 in fractions: the first maximum of (mean w - lower_term)^2 / (w (1 - w))."""
-    total = sum(histogram.values())
-    p = {level: Fraction(count, total) for level, count in histogram.items()}
-    mean = sum(level * share for level, share in p.items())
-    criterion = {}
-    for t in range(256):
-        w = sum(share for level, share in p.items() if level <= t)
-        if 0 < w < 1:
-            criterion[t] = (mean * w - lower_term(p, t)) ** 2 / (w * (1 - w))
-    return max(criterion, key=criterion.get, default=None)
-
-
 def as_array(histogram):
     counts = np.zeros(256, np.int64)
     counts[list(histogram)] = list(histogram.values())
     return counts
 
 
-@given(histograms)
-def test_otsu_is_the_first_maximum_of_the_between_class_variance(histogram):
-    def moment(p, t):
-        return sum(level * share for level, share in p.items() if level <= t)
-
-    assert shadow.otsu_threshold(as_array(histogram)) == first_maximum(histogram, moment)
-
-
-@given(histograms)
-def test_the_printed_threshold_takes_the_upper_weight_for_mu(histogram):
-    def weight(p, t):
-        return sum(share for level, share in p.items() if level > t)
-
-    assert shadow.printed_threshold(as_array(histogram)) == first_maximum(histogram, weight)
+@given(histograms, st.booleans())
+def test_a_threshold_is_the_first_maximum_of_eq_7_in_fractions(histogram, printed):
+    ours = shadow.printed_threshold if printed else shadow.otsu_threshold
+    codes = np.repeat(list(histogram), list(histogram.values()))
+    assert ours(as_array(histogram)) == reference.threshold(codes, printed)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -128,12 +105,9 @@ def test_otsu_equals_opencv_and_scikit_image(seed):
     assert ours == cv2.threshold(codes, 0, 255, cv2.THRESH_OTSU)[0]
 
 
-def test_otsu_takes_the_lower_of_two_equal_maxima():
-    assert shadow.otsu_threshold(as_array({10: 5, 20: 5, 30: 5})) == 10
-
-
-def test_otsu_ties_on_codes_that_no_pixel_has_go_to_the_lowest():
-    assert shadow.otsu_threshold(as_array({3: 7, 200: 9})) == 3
+@pytest.mark.parametrize("tied", [{10: 5, 20: 5, 30: 5}, {10: 7, 200: 9}])
+def test_otsu_takes_the_lowest_of_equal_maxima_also_of_codes_that_no_pixel_has(tied):
+    assert shadow.otsu_threshold(as_array(tied)) == 10
 
 
 @pytest.mark.parametrize("pixels", [10**4, 3 * 10**7])
@@ -172,26 +146,15 @@ def test_the_threshold_itself_is_shadow_only_as_printed():
 
 # --- Eq. 9 and 10 ---------------------------------------------------------------------------------
 
-CROSS, SQUARE = ndimage.generate_binary_structure(2, 1), ndimage.generate_binary_structure(2, 2)
 
-
-@pytest.mark.parametrize(("connectivity", "b"), [(4, CROSS), (8, SQUARE)])
+@pytest.mark.parametrize("connectivity", [4, 8])
 @given(shadowed=masks)
 @settings(max_examples=60)
-def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shadowed):
+def test_components_are_those_of_scikit_image(connectivity, shadowed):
     found = shadow.connected_components(Packed.of(shadowed), connectivity)
-    labels, count = found.labels(), found.count
-    assert set(np.unique(labels)) - {0} == set(range(1, count + 1))
-    assert ((labels > 0) == shadowed).all()
-    for seed in zip(*np.nonzero(shadowed), strict=True):
-        reached = np.zeros(shadowed.shape, bool)
-        reached[seed] = True
-        while True:
-            grown = ndimage.binary_dilation(reached, b) & (shadowed > 0)
-            if (grown == reached).all():
-                break
-            reached = grown
-        assert (reached == (labels == labels[seed])).all()
+    expected, count = label(shadowed, connectivity=connectivity // 4, return_num=True)
+    np.testing.assert_array_equal(found.labels(), expected)
+    assert found.count == count
 
 
 def test_a_ring_by_hand():
@@ -203,26 +166,22 @@ def buffer_ring(shadowed, width):
     return shadow.buffer_ring(Packed.of(shadowed), width).pixels()
 
 
-def literal_rings(shadowed, labels, width):
-    """Eq. 10 by components: dilate one alone, take away itself and all other shadow."""
-    for k in range(1, labels.max() + 1):
-        own = labels == k
-        dilated = ndimage.binary_dilation(own, SQUARE, iterations=width)
-        yield k, own, dilated & ~own & (shadowed == 0)
-
-
 @pytest.mark.parametrize("connectivity", [4, 8])
 @given(shadowed=masks, width=st.integers(1, 3))
 @settings(max_examples=60)
 def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed, width):
     labels = shadow.connected_components(Packed.of(shadowed), connectivity).labels()
     union = buffer_ring(shadowed, width)
-    label, pixel = shadow.ring_pairs(labels, union, width)
-    expected = list(literal_rings(shadowed, labels, width))
-    assert (union == sum([ring for *_, ring in expected], np.zeros(shadowed.shape, bool))).all()
-    for k, _, ring in expected:
-        assert pixel[label == k].tolist() == np.flatnonzero(ring).tolist()
-    assert len(label) == sum(ring.sum() for *_, ring in expected)
+    owner, pixel = shadow.ring_pairs(labels, union, width)
+    np.testing.assert_array_equal(union, reference.rings(shadowed > 0, width))
+    pairs = 0
+    for box, own, ring in reference.components(shadowed > 0, width, connectivity // 4):
+        alone = np.zeros(shadowed.shape, bool)
+        alone[box] = ring
+        ours = owner == labels[box][own][0]
+        assert pixel[ours].tolist() == np.flatnonzero(alone).tolist()
+        pairs += ring.sum()
+    assert len(owner) == pairs
 
 
 def test_a_wide_ring_does_not_take_the_memory_of_all_its_neighbours_at_once():
@@ -265,27 +224,6 @@ def test_compensation_by_hand():
     assert result[..., 0].tolist() == [[94, 100, 106], [94, 100, 106]]
 
 
-def literal_eq_11(values, shadowed, options, connectivity=2):
-    """Eq. 11 on float channels, by loops over components and channels."""
-    labels, _ = ndimage.label(shadowed, ndimage.generate_binary_structure(2, connectivity))
-    result = values.astype(float)
-    for _, own, ring in literal_rings(shadowed, labels, options.ring_width):
-        if not ring.any():
-            continue
-        for c in range(values.shape[2]):
-            inside, around = values[own, c].astype(float), values[ring, c].astype(float)
-            sigma, sigma_ring = inside.std(), around.std()
-            above, below = (
-                (sigma_ring, sigma)
-                if options.statistic == "deviation"
-                else (sigma**2, sigma_ring**2)
-            )
-            gain = above / below if below > 1e-9 else 1.0
-            gain = gain if options.max_gain is None else min(gain, options.max_gain)
-            result[own, c] = around.mean() + (inside - inside.mean()) * gain
-    return result
-
-
 def assert_rounded(image, exact):
     """Hold an image to float values, rounded and clipped; a half may fall to either side."""
     assert image.dtype == np.uint8
@@ -307,9 +245,10 @@ def check_rgb(image, chosen):
     found = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
     ring = shadow.buffer_ring(Packed.of(shadowed), chosen.ring_width)
     result = shadow.compensate(View.of(image), found, ring, chosen)
-    connectivity = 2 if chosen.connectivity == 8 else 1
-    assert_rounded(result, literal_eq_11(image, shadowed, chosen, connectivity))
-    np.testing.assert_array_equal(result[shadowed == 0], image[shadowed == 0])
+    printed, connectivity = chosen.statistic == "printed", chosen.connectivity // 4
+    more = {"connectivity": connectivity, "most": chosen.max_gain}
+    exact = reference.transfer(image, shadowed > 0, chosen.ring_width, printed, **more)
+    assert_rounded(result, exact)
 
 
 @given(images(), options)
@@ -331,7 +270,8 @@ def test_compensation_in_hsi_equals_the_loop_over_components(statistic, image, w
     _, layers = run(image, chosen)
     shadowed = layers["shadow"]
     values = np.stack([reference.saturation(image), reference.value(image)], axis=-1)
-    s, v = np.moveaxis(np.clip(literal_eq_11(values, shadowed, chosen), 0, 1), -1, 0)
+    moved = reference.transfer(values, shadowed > 0, width, statistic == "printed")
+    s, v = np.moveaxis(np.clip(moved, 0, 1), -1, 0)
     exact = reference.from_hsi(reference.hue(image), s, v)
     assert_rounded(layers["compensated"], np.where(shadowed[..., None] > 0, exact, image))
 

@@ -54,15 +54,6 @@ def test_distance_equals_scipys_on_every_pixel(image):
     np.testing.assert_array_equal(mask.ravel(), expected**2 <= chi2.ppf(0.95, 3))
 
 
-def test_distance_equals_scikit_learns():
-    model = EmpiricalCovariance().fit(grey_road())
-    expected = model.mahalanobis(noise(20, 20).reshape(-1, 3))
-    distance, _ = similarity.KERNELS.mahalanobis(
-        cv2.split(noise(20, 20)), model.location_, similarity.whitening(model.covariance_), 7.8
-    )
-    np.testing.assert_allclose(distance.ravel(), np.sqrt(expected), rtol=1e-6)
-
-
 @pytest.mark.parametrize("quantile", [0.5, 0.95, 0.999])
 def test_a_pixel_on_the_limit_is_road(quantile):
     # Isotropic with variance 1 + ridge: d^2 = |x - m|^2 / 2, a colour 5 levels away.
@@ -86,15 +77,6 @@ def test_a_pixel_is_decided_in_double_precision_however_close_to_the_limit(ridge
             _, near = similarity.KERNELS.mahalanobis(cv2.split(image), mean, factors, limit)
             np.testing.assert_array_equal(near, squares <= limit)
             assert near[row, column] == (part > 1)
-
-
-def test_the_quantile_is_the_share_of_normal_road_colours_kept():
-    rng = np.random.default_rng(3)
-    image = np.rint(rng.normal(128, 20, (300, 300, 3))).astype(np.uint8)
-    road = RoadColour(np.full(3, 128.0), (400 - RIDGE) * np.eye(3))
-    for quantile in (0.5, 0.9, 0.95):
-        kept = run(image, road, SimilaritySettings(quantile=quantile))[1].mean()
-        assert kept == pytest.approx(quantile, abs=0.005)
 
 
 @pytest.mark.parametrize("colours", [np.full((9, 3), 80, np.uint8), np.full((1, 3), 80, np.uint8)])

@@ -14,7 +14,7 @@ from sklearn.svm import SVC
 from roadeval.pipeline.paper import svm
 from roadeval.pipeline.paper.svm import SvmSettings
 from roadeval.pipeline.stage import TrainingSet, View
-from tests.pipeline.images import IMAGES, noise
+from tests.pipeline.images import noise
 
 ROOT = Path(__file__).resolve().parents[3]
 ROUNDING = 1e-9
@@ -156,14 +156,6 @@ def test_the_machine_is_scikit_learns(case):
     assert machine.weights.sum() == pytest.approx(0, abs=1e-6)
 
 
-def test_features_are_standardised_over_the_training_set():
-    training = sample()
-    colours = training.colours()
-    machine = svm.fit(training, SvmSettings())
-    np.testing.assert_allclose(machine.mean, colours.mean(axis=0))
-    np.testing.assert_allclose(machine.scale, colours.std(axis=0))
-
-
 def test_a_channel_that_never_varies_does_not_divide_by_zero():
     training = sample()
     training.images[0][..., 2] = 77
@@ -181,18 +173,3 @@ def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
         accuracy[kernel] = ((values > 0) == training.road).mean()
     assert accuracy["linear"] < 0.8
     assert accuracy["rbf"] > 0.9
-
-
-def test_the_mask_is_the_machine_at_every_pixel(case):
-    settings, machine, stage, _ = case
-    for image in IMAGES.values():
-        output = stage(View.of(image))
-        (layer,) = output.layers
-        assert layer.array.dtype == np.uint8
-        assert layer.array.shape == image.shape[:2]
-        values = svm.decision(image.reshape(-1, 3), machine, settings)
-        clear = np.abs(values - settings.threshold) > ROUNDING
-        expected = values > settings.threshold
-        np.testing.assert_array_equal(layer.array.ravel()[clear], expected[clear])
-        np.testing.assert_array_equal(layer.array, output.mask.pixels())
-        assert layer.spec == svm.SVM
