@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
@@ -283,14 +283,21 @@ class DifferentNumberError(Exception):
     """A library computes another value than roadeval."""
 
 
-def measured(frames: int | None = None) -> dict[str, Any]:
-    """Return each number by its name: ``roadeval``'s value, and the ``library``'s.
+def measured() -> dict[str, Any]:
+    """Return each number of the whole drive by its name, as `compared` does."""
+    return compared(*replayed())
 
-    ``frames`` are read of the demo drive; all by default. A `DifferentNumberError` where the two
-    are not equal.
+
+def replayed(
+    frames: int | None = None, trees: Mapping[str, Any] | None = None
+) -> tuple[int, dict[str, float], Pixels]:
+    """Return how many frames were evaluated, roadeval's numbers of them, and their pixels.
+
+    ``frames`` are read of the demo drive, all by default; ``trees`` are settings of that stage.
     """
     tables = {"preset": "robust", "ground": CAMERA, "output": {"record": "masks"}}
-    config = roadeval.configure({**tables, "frames": {"max_frames": frames}})
+    tables |= {"frames": {"max_frames": frames}, STAGE: dict(trees or {})}
+    config = roadeval.configure(tables)
     with TemporaryDirectory() as folder:
         path = Path(folder)
         outcome = roadeval.replay(DEMO, config, save=path / "it.rrd", reports=path / "it")
@@ -298,13 +305,21 @@ def measured(frames: int | None = None) -> dict[str, Any]:
         ours = dict(_printed(outcome.summary, metres))
         with one_thread_each():  # as a replay does: OpenCV rounds by the number of threads
             pixels = _pixels(roadeval.Recording(path / "it.rrd"), config)
+    return outcome.summary["frames"]["evaluated"], ours, pixels
+
+
+def compared(evaluated: int, ours: Mapping[str, float], pixels: Pixels) -> dict[str, Any]:
+    """Return each number by its name: ``roadeval``'s value, and the ``library``'s.
+
+    A `DifferentNumberError` where the two are not equal.
+    """
     found = {}
     for number in NUMBERS:
         own, other = ours[number.key], number.again(pixels)
         if not abs(own - other) <= CLOSE:
             raise DifferentNumberError(f"{number.name}: {own} by roadeval, {other} by a library")
         found[number.name] = {"roadeval": own, "library": other}
-    return {"evaluated": outcome.summary["frames"]["evaluated"], "values": found}
+    return {"evaluated": evaluated, "values": found}
 
 
 def _printed(summary: dict[str, Any], metres: pd.DataFrame) -> Iterator[tuple[str, float]]:

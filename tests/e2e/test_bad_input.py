@@ -1,126 +1,94 @@
 """Bad input is one line on stderr that says what, where and what to do, and exit code 1."""
 
 import os
-import shutil
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
-from roadeval.cli.app import main
-from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import here
+from tests.jobs.making import write_log
 
-SECOND = 1_000_000_000
-
-
-@pytest.fixture
-def write(tmp_path):
-    """Write a log of 8x6 images under these topics and, with a size, masks under /road_mask."""
-
-    def write(*cameras, mask_size=None):
-        image = np.tile(np.uint8([60, 120]), (6, 4))
-        jpeg = cv2.imencode(".jpg", image)[1].tobytes()
-        with LogWriter(tmp_path / "drive.mcap") as log:
-            for stamp in range(SECOND, 5 * SECOND, SECOND):
-                for topic in cameras:
-                    log.image(topic, stamp, jpeg, "jpeg")
-                if mask_size:
-                    log.mask("/road_mask", stamp, np.tile(np.uint8([0, 255]), mask_size))
-        return tmp_path / "drive.mcap"
-
-    return write
+POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a2146\nsize 12345\n"
+NESTED = "a = " + "[" * 1_000 + "]" * 1_000
 
 
 @pytest.fixture
-def refused(tmp_path, capsys):
-    """Replay what cannot be replayed; returns the one line. Nothing may be left behind."""
+def refused(tmp_path, monkeypatch):
+    """Run a command beside a sound log; returns the one line. Nothing may be left behind."""
+    monkeypatch.chdir(tmp_path)
+    write_log(tmp_path / "drive.mcap")
 
-    def refused(*words):
-        outputs = ("--save", tmp_path / "out.rrd", "--reports", tmp_path / "reports")
-        assert main(["replay", "--quiet", *map(str, (*outputs, *words))]) == 1
-        said = capsys.readouterr()
-        assert said.out == ""
-        assert said.err.startswith("roadeval: error: ")
-        assert said.err.count("\n") == 1
-        assert not (tmp_path / "out.rrd").exists()
-        assert not list(tmp_path.glob("reports/*"))
-        assert not list(tmp_path.rglob("*partial*"))
-        return said.err
+    def refused(words):
+        before = {*tmp_path.rglob("*")}
+        done = here(*words.split(), cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.startswith("roadeval: error: ")
+        assert done.stderr.count("\n") == 1
+        assert {*tmp_path.rglob("*")} == before
+        return done.stderr
 
     return refused
-
-
-def test_two_cameras_to_choose_from(refused, write):
-    line = refused(write("/left", "/right"))
-    assert "/left, /right" in line
-    assert "--image-topic" in line
-
-
-def test_truth_of_another_size(refused, write):
-    line = refused(write("/camera", mask_size=(12, 8)))
-    assert "/road_mask is 16x12, but /camera is 8x6" in line
-    assert "--resize-truth" in line
-
-
-def test_nothing_left_to_evaluate(refused, write):
-    line = refused(write("/camera", mask_size=(6, 4)))
-    assert "--train-frames" in line
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("compare", "cut"),
-        ("compare", "cut", "cut"),
-        ("inspect", "cut", "--list"),
-        ("report", "cut", "-o", "x.pdf"),
-    ],
-)
-def test_a_table_cut_at_the_end_of_a_line_gives_one_line_and_no_numbers(words, street, tmp_path):
-    shutil.copytree(street.reports, tmp_path / "cut")
-    lines = (tmp_path / "cut" / "frames.csv").read_text().splitlines(keepends=True)
-    (tmp_path / "cut" / "frames.csv").write_text("".join(lines[:-7]))
-    run = here(*words, cwd=tmp_path)
-    assert (run.returncode, run.stdout) == (1, "")
-    assert run.stderr == (
-        "roadeval: error: cut/frames.csv: does not agree with its summary (133 of 140 rows); "
-        "make the results again with roadeval replay\n"
-    )
 
 
 @pytest.mark.timeout(20)
 @pytest.mark.parametrize(
     "words",
     [
-        "replay pipe",
-        "info pipe",
-        "train pipe -o m.model",
-        "replay drive.mcap --model pipe",
-        "replay drive.mcap --config pipe",
-        "replay drive.mcap --variant other=pipe",
-        "config --config pipe",
-        "report pipe -o out.pdf",
-        "report folder -o out.pdf",
-        "inspect pipe --list",
-        "compare pipe pipe",
-        "pack images -o new.mcap",
+        *("replay pipe", "info pipe", "train pipe -o m.model", "replay drive.mcap --model pipe"),
+        *("replay drive.mcap --config pipe", "replay drive.mcap --variant other=pipe"),
+        *("config --config pipe", "report pipe -o out.pdf", "report folder -o out.pdf"),
+        *("inspect pipe --list", "compare pipe pipe", "pack images -o new.mcap"),
     ],
 )
-def test_a_pipe_is_refused_and_never_waited_for(words, write, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    write("/camera")
+def test_a_pipe_is_refused_and_never_waited_for(words, refused):
     for folder in ("folder", "images"):
         Path(folder).mkdir()
     for pipe in ("pipe", "folder/summary.json", "images/0.png"):
         os.mkfifo(pipe)
-    assert main(words.split()) == 1
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "is a pipe, not a file" in said
+    assert "is a pipe, not a file" in refused(words)
 
 
-def test_a_device_is_refused_before_it_is_read(refused, write):
-    line = refused(write("/camera"), "--config", "/dev/null")
+def test_a_device_is_refused_before_it_is_read(refused):
+    line = refused("replay drive.mcap --config /dev/null")
     assert "/dev/null: cannot be read: is a device" in line
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("config --config it.toml", "config --variant v=it.toml", "config --net n=it.toml"),
+        *("config --masks m=it.toml", "fleet it.toml -o f"),
+    ],
+)
+def test_toml_that_nests_too_deep_is_one_line(words, refused):
+    Path("it.toml").write_text(NESTED)
+    assert "it.toml: cannot be read as TOML: " in refused(words)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a.mcap", "replay a.mcap"),
+        ("labels/0000.png", "replay drive.mcap --truth labels"),
+        ("labels/0000.txt", "replay drive.mcap --truth labels --road-label road"),
+        ("coco.json", "replay drive.mcap --truth coco.json --road-label road"),
+        ("cvat.xml", "replay drive.mcap --truth cvat.xml --road-label road"),
+        ("masks/0000.png", "replay drive.mcap --masks mine=masks"),
+        ("masks/0000.npy", "replay drive.mcap --masks mine=masks"),
+        ("net.onnx", "replay drive.mcap --net mine=net.onnx"),
+        ("net.toml", "replay drive.mcap --net mine=net.toml"),
+        ("run.toml", "replay drive.mcap --config run.toml"),
+        ("camera.toml", "replay drive.mcap --camera camera.toml"),
+        ("city.model", "replay drive.mcap --model city.model"),
+        ("fleet.toml", "fleet fleet.toml -o out"),
+        ("out.rrd", "report out.rrd"),
+        ("results/summary.json", "report results"),
+        ("images/0000.jpg", "pack images -o new.mcap"),
+    ],
+)
+def test_a_pointer_of_git_lfs_is_told_with_the_command_that_fetches_its_file(name, words, refused):
+    Path(name).parent.mkdir(exist_ok=True)
+    Path(name).write_text(POINTER)
+    line = refused(words)
+    assert f"{Path(name).name}: " in line
+    assert "a pointer to a file in Git LFS: git lfs pull" in line

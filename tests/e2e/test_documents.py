@@ -6,7 +6,7 @@ import re
 import shlex
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -32,34 +32,26 @@ BY_CI = "python3 -m venv .venv"
 """Begins the two commands of README.md, which `.ci/run` runs."""
 
 
-def write_drive(path: Path, first: int = 0) -> None:
-    """Write a drive whose truth explains itself, from this scene on."""
+def write_drive(
+    path: Path, first: int = 0, cameras: Sequence[str] = ("front",), truth: str = "road_mask"
+) -> None:
+    """Write a drive from this scene on, whose truth, if it has a name, explains itself."""
     path.parent.mkdir(exist_ok=True)
     with LogWriter(path) as log:
         for number in range(FRAMES):
-            image, _ = scene(first + number)
-            at, truth = stamp(first + number), labels(first + number, 255, 0, 128)
-            log.image("/front/image", at, encoded(image[..., ::-1]), "png")
-            log.mask("/front/road_mask", at, truth)
-
-
-def write_rig(path: Path) -> None:
-    """Write a drive of two cameras whose truths explain themselves."""
-    with LogWriter(path) as log:
-        for number in range(FRAMES):
-            for place, name in enumerate(("front", "left")):
-                image, _ = scene(number + 7 * place)
-                at, truth = stamp(number), labels(number + 7 * place, 255, 0, 128)
-                log.image(f"/{name}/image", at, encoded(image[..., ::-1]), "png")
-                log.mask(f"/{name}/labels", at, truth)
+            for place, name in enumerate(cameras):
+                at, shown = stamp(first + number), first + number + 7 * place
+                log.image(f"/{name}/image", at, encoded(scene(shown)[0][..., ::-1]), "png")
+                if truth:
+                    log.mask(f"/{name}/{truth}", at, labels(shown, 255, 0, 128))
 
 
 def encoded(pixels: np.ndarray) -> bytes:
     return cv2.imencode(".png", pixels)[1].tobytes()
 
 
-def write_bare_drive(path: Path) -> None:
-    """Write a drive without labels, and its labels as COCO has them."""
+def write_coco(path: Path) -> None:
+    """Write the labels of a drive as COCO has them."""
     road, car = (4, 29, 12, 12, 35, 12, 44, 29), (20, 20, 28, 20, 28, 26, 20, 26)
     found = [
         {"image_id": number, "category_id": kind, "segmentation": [ring]}
@@ -73,10 +65,7 @@ def write_bare_drive(path: Path) -> None:
     ]
     names = [{"id": 1, "name": "road"}, {"id": 2, "name": "car"}]
     coco = {"images": images, "annotations": found, "categories": names}
-    path.with_name("coco.json").write_text(json.dumps(coco))
-    with LogWriter(path) as log:
-        for number in range(FRAMES):
-            log.image("/front/image", stamp(number), encoded(scene(number)[0][..., ::-1]), "png")
+    path.write_text(json.dumps(coco))
 
 
 def write_images(folder: Path) -> None:
@@ -106,20 +95,15 @@ def world(tmp_path_factory) -> Path:
     (folder / "tuesday").mkdir()
     shutil.copy(folder / "street.mcap", folder / "tuesday")
     write_images(folder)
-    write_bare_drive(folder / "bare.mcap")
-    write_rig(folder / "rig.mcap")
+    write_drive(folder / "bare.mcap", truth="")
+    write_coco(folder / "coco.json")
+    write_drive(folder / "rig.mcap", cameras=("front", "left"), truth="labels")
     red_network(folder / "road.onnx")
     reports = folder / "reports" / "drive"
     roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
     for name in ("old", "new"):
         shutil.copy(folder / "out.rrd", folder / f"{name}.rrd")
     return folder
-
-
-def copy_of_the_demo(folder: Path) -> None:
-    """Put what README.md and the tutorial begin with into a folder."""
-    (folder / "recordings").mkdir()
-    shutil.copy(DEMO, folder / "recordings")
 
 
 def results_of_the_demo(folder: Path, done: Replayed) -> None:
@@ -144,7 +128,8 @@ def results_of_the_demo(folder: Path, done: Replayed) -> None:
 def here(page, request, tmp_path) -> Path:
     """A folder to follow a page in."""
     if page in ("README.md", "docs/tutorial.md"):
-        copy_of_the_demo(tmp_path)
+        (tmp_path / "recordings").mkdir()
+        shutil.copy(DEMO, tmp_path / "recordings")
         if page == "README.md":
             results_of_the_demo(tmp_path, request.getfixturevalue("demo"))
         return tmp_path

@@ -155,23 +155,15 @@ def test_the_numbers_are_those_of_single_replays(drives, ran, tmp_path):
                 assert row[key] == total[key], (name, key)
 
 
-def test_the_same_command_again_tries_what_failed_alone(drives, ran, tmp_path):
+@pytest.mark.parametrize("gone", [[], ["c"]])
+def test_the_same_command_again_tries_what_failed_or_has_gone_alone(gone, drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     before = tables(folder)
+    for name in gone:
+        shutil.rmtree(next((folder / "results").glob(f"{name}-*")))
     again, submitted = run(drives, folder, keep="worst:1")
-    assert (again.replayed, submitted) == (1, ["b"])
-    assert again.counts == ran.counts
-    assert again.problems == ran.problems
-    assert tables(folder) == before
-
-
-def test_a_drive_whose_results_have_gone_is_replayed_alone(drives, ran, tmp_path):
-    folder = copied(ran, tmp_path)
-    before = tables(folder)
-    (gone,) = (folder / "results").glob("c-*")
-    shutil.rmtree(gone)
-    again, submitted = run(drives, folder, keep="worst:1")
-    assert (again.replayed, submitted) == (2, ["b", "c"])
+    assert (again.replayed, submitted) == (1 + len(gone), ["b", *gone])
+    assert (again.counts, again.problems) == (ran.counts, ran.problems)
     assert tables(folder) == before
 
 
@@ -202,18 +194,6 @@ def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
         assert not own & {*model["training_frames"]}
         others = [digests(Path(r["source"])) for r in rows if r is not row]
         assert {*model["training_frames"]} <= set.union(*others)
-
-
-def test_no_copy_of_a_drive_is_scored_by_a_model_that_saw_the_drive(tmp_path):
-    folder = tmp_path / "logs"
-    write(folder / "a.mcap", 0)
-    for name in ("b", "c"):
-        (folder / f"{name}.mcap").write_bytes((folder / "a.mcap").read_bytes())
-    write(folder / "d.mcap", 100)
-    found, _ = run(folder, tmp_path / "f", executor=ThreadTasks(), folds=2)
-    *copies, other = pq.read_table(found.folder / "drives.parquet").to_pylist()
-    assert {row["fold"] for row in copies} == {1 - other["fold"]}
-    assert [row["evaluated"] for row in copies] == 3 * [FRAMES]
 
 
 class KilledWorker(Exception):  # noqa: N818 - as Dask calls it

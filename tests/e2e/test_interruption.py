@@ -1,4 +1,4 @@
-"""A run that is stopped closes its recording and says where; till then its outputs are its own."""
+"""A run that is stopped closes its recording and says where."""
 
 import re
 import signal
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from roadeval import Recording
-from tests.e2e.commands import DEMO, ROADEVAL, here
+from tests.e2e.commands import DEMO, ROADEVAL
 from tests.networks.making import without_end, written
 
 ENOUGH = 1_000_000
@@ -17,37 +17,30 @@ ENOUGH = 1_000_000
 
 
 def stop(folder, number):
-    """Replay the demo drive until some frames are recorded, then send a signal.
-
-    Before that, a second run asks for the same recording.
-    """
+    """Replay the demo drive until some frames are recorded, then send a signal."""
     words = ["replay", DEMO, "--save", folder / "out.rrd", "--reports", folder / "reports"]
     with subprocess.Popen([ROADEVAL, *words], stderr=subprocess.PIPE, text=True) as run:
         while sum(file.stat().st_size for file in folder.glob("*.rrd")) < ENOUGH:
             assert run.poll() is None, run.stderr.read()
             time.sleep(0.05)
-        second = here("replay", DEMO, "--save", folder / "out.rrd", "--reports", folder / "other")
         run.send_signal(number)
         said = run.stderr.read()
-    return run.returncode, said, run.pid, second
+    return run.returncode, said
 
 
 @pytest.fixture(
     scope="module", params=[(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["SIGINT", "SIGTERM"]
 )
 def stopped(request, tmp_path_factory):
-    """A stopped run: its folder, its exit code and the one it should have, what it said.
-
-    And its process, and how a second run ended meanwhile.
-    """
+    """A stopped run: its folder, its exit code and the one it should have, and what it said."""
     number, code = request.param
     folder = tmp_path_factory.mktemp("stopped")
-    returned, *rest = stop(folder, number)
-    return folder, (returned, code), *rest
+    returned, said = stop(folder, number)
+    return folder, (returned, code), said
 
 
 def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told(stopped):
-    folder, (returned, code), said, *_ = stopped
+    folder, (returned, code), said = stopped
     assert returned == code
     assert "Traceback" not in said
     (path,) = re.findall(r"roadeval: interrupted: .*?(\S+\.rrd)", said)
@@ -63,17 +56,6 @@ def test_a_signal_leaves_no_output_under_its_final_name(stopped):
     assert not list(folder.rglob("*.csv*"))
     assert not list(folder.rglob("summary.json"))
     assert not list(folder.rglob(".*"))
-
-
-def test_a_second_run_on_its_recording_is_refused_at_once_and_told_who_writes_it(stopped):
-    folder, *_, process, second = stopped
-    assert second.returncode == 1
-    assert re.fullmatch(
-        rf"roadeval: error: {folder}/out\.rrd: another run is writing it \(process {process} on "
-        r"\S+, since [-\d]+ [:\d]+[-+][:\d]+\); wait until it has ended, or write elsewhere\n",
-        second.stderr,
-    )
-    assert not (folder / "other").exists()
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -1,7 +1,6 @@
 """From no truth to a number: pick frames, label them, replay with them, pick on."""
 
 import json
-import re
 import shlex
 import shutil
 
@@ -135,25 +134,6 @@ def test_labels_in_coco_give_the_numbers_of_the_images(work, truths, labelled):
     others, _ = scored(work, "--record", "none")
     assert others["estimate"] == images["estimate"]
     assert others["totals"] == images["totals"]
-
-
-def test_the_folder_of_labels_alone_is_taken_for_the_picks_whose_labels_it_holds(labelled):
-    work, summary, _ = labelled
-    words = ("--truth", "to_label/labels", "--record", "none", *HIDDEN)
-    done = here("replay", "street.mcap", "--reports", "alone", *words, cwd=work)
-    assert done.returncode == 0, done.stderr
-    found = json.loads((work / "alone" / "summary.json").read_text())
-    assert found["estimate"] == summary["estimate"]
-
-
-def test_stamps_that_a_program_has_rounded_are_found_nevertheless(work, truths, labelled):
-    """JavaScript and jq 1.6 keep numbers as floats of 64 bits."""
-    _, summary, _ = labelled
-    label(work / "to_label", truths)
-    path = work / "to_label" / "pick.json"
-    rounded = re.sub(r"\d{19}", lambda digits: f"{float(digits[0]):.17g}", path.read_text())
-    path.write_text(rounded)
-    assert scored(work, "--record", "none")[0]["estimate"] == summary["estimate"]
 
 
 def test_labels_that_were_renumbered_are_refused(work, truths):

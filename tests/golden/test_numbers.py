@@ -241,40 +241,6 @@ def test_the_report_s_key_table_and_its_best_in_bold(run, told, lines):
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_the_windows_over_the_drive(run, told):
-    table, names = finals(told, run), variants(told, run)
-    windows = told.table("windows", run).query("stage == 'post'")
-    rows = [table.iloc[begin : begin + 10] for begin in range(0, len(table), 10)]
-    assert windows["window"].nunique() == len(rows)
-    for row in rows:
-        for name in names:
-            own = windows.query("first_frame == @row.index[0] and variant == @name").iloc[0]
-            assert own.last_frame == row.index[-1]
-            for rate in ("ERR", "FPR", "FNR", "ACC"):
-                assert own[rate] == pytest.approx(row[rate, name].mean(), nan_ok=True)
-
-
-@pytest.mark.parametrize("run", RUNS)
-def test_error_episodes(run, told):
-    table = told.table("frames", run).query("stage == 'post'")
-    for name in variants(told, run):
-        own, times = table.query("variant == @name").sort_values("frame"), []
-        bad, stamps = [*(own["ERR"] >= 0.15)], [*own["stamp_ns"]]
-        # No two frames that follow each other are a second apart: there is no gap.
-        assert max(np.diff(stamps)) < 10**9
-        for place, now in enumerate(bad[:-1]):
-            if now and (place == 0 or not bad[place - 1]):
-                times.append(0)
-            if now:
-                times[-1] += stamps[place + 1] - stamps[place]
-        times += [0] * (bad[-1] and not bad[-2])
-        found = told.summary(run)["beyond"][name]["episodes"]
-        assert (found["episodes"], found["recovered"]) == (len(times), len(times) - bad[-1])
-        assert found["seconds"] == pytest.approx(sum(times) / 1e9)
-        assert found["share"] == pytest.approx(sum(times) / (stamps[-1] - stamps[0]))
-
-
-@pytest.mark.parametrize("run", RUNS)
 def test_the_report_s_differences(run, told, lines):
     table, text = finals(told, run), " ".join(lines[run])
     names = variants(told, run)[:-1]
@@ -299,11 +265,6 @@ def test_the_report_s_differences(run, told, lines):
     net = wrong.filtered - wrong.unfiltered
     word = "more" if net > 0 else "fewer"
     assert f"that leaves {abs(net):,} {word} wrong pixels in all." in text
-
-
-def test_the_two_reports_tell_of_more_and_of_fewer_wrong_pixels_beyond_a_thousand(lines):
-    assert "1,268 more wrong pixels" in " ".join(lines["paper"])
-    assert " fewer wrong pixels" in " ".join(lines["printed"])
 
 
 REGIONS: Final = {

@@ -1,10 +1,12 @@
-"""Geodesic distances: the length of the cheapest path, as Dijkstra and scikit-image find it."""
+"""Geodesic distances: the length of the cheapest path, as Dijkstra finds it.
+
+`tests/pipeline/beyond/test_features.py` holds them against scikit-image's.
+"""
 
 import heapq
 
 import numpy as np
 import pytest
-from skimage.graph import MCP_Geometric
 
 from roadeval.kernels import KERNELS, plain
 
@@ -56,15 +58,6 @@ def test_rounds_enough_find_the_cheapest_paths(seed):
     seeds[10, 10] = 1
     found = KERNELS.geodesics(cost, seeds, AMPLE)
     np.testing.assert_array_equal(found, dijkstra(cost.astype(np.int64), seeds))
-
-
-def test_distances_are_scikit_images_but_for_the_root_of_two():
-    cost = np.random.default_rng(0).integers(1, 200, (40, 60), np.uint16)
-    seeds = seeds_of(cost.shape, (39, 30), (39, 31))
-    expected, _ = MCP_Geometric(cost.astype(float)).find_costs(np.argwhere(seeds))
-    found = KERNELS.geodesics(cost, seeds, AMPLE) / (2 * plain.STRAIGHT)
-    assert (found <= expected + 1e-6).all()
-    assert (found >= expected * (7 / 5 / np.sqrt(2)) - 1e-6).all()
 
 
 def test_fewer_rounds_never_make_a_path_cheaper():

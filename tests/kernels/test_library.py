@@ -28,10 +28,12 @@ def unbuilt(monkeypatch):
 
 
 @pytest.mark.skipif(not find_spec("roadeval.kernels._loops"), reason="the loops were not compiled")
-def test_a_library_that_was_built_is_used(monkeypatch):
+def test_a_library_that_was_built_is_used_unless_the_twins_are_asked_for(monkeypatch):
     monkeypatch.delenv("ROADEVAL_PLAIN", raising=False)
     assert pick().__name__ == "roadeval.kernels.compiled"
     assert not kernels.missing()
+    monkeypatch.setenv("ROADEVAL_PLAIN", "1")
+    assert pick() is plain
 
 
 def test_without_the_library_the_twins_are_used(unbuilt):

@@ -33,18 +33,16 @@ TREE = [(0, 0.5, ALL & ~0b011), (1, 2.0, ALL & ~0b001)], [10.0, 20.0, 30.0]
 STUMP = [(1, 3.0, ALL & ~1)], [1.0, 2.0]
 
 
-def test_a_pixel_gets_the_value_of_the_leaf_that_a_walk_ends_at():
-    features = np.array([[0.0, 0.0, 1.0, 1.0], [2.0, 2.5, 0.0, 9.0]], np.float32)
-    assert KERNELS.tree_sum(features, *forest(TREE)).tolist() == [10, 20, 30, 30]
-
-
-def test_trees_add_up():
-    features = np.array([[0.0, 1.0], [4.0, 0.0]], np.float32)
-    assert KERNELS.tree_sum(features, *forest(TREE, STUMP)).tolist() == [20 + 2, 30 + 1]
-
-
-def test_a_value_at_the_threshold_is_not_above_it():
-    assert KERNELS.tree_sum(np.array([[0.5], [0.0]], np.float32), *forest(TREE)).tolist() == [10]
+@pytest.mark.parametrize(
+    ("trees", "features", "expected"),
+    [
+        ([TREE], [[0.0, 0.0, 1.0, 1.0], [2.0, 2.5, 0.0, 9.0]], [10, 20, 30, 30]),
+        ([TREE], [[0.5], [0.0]], [10]),  # a value at the threshold is not above it
+        ([TREE, STUMP], [[0.0, 1.0], [4.0, 0.0]], [20 + 2, 30 + 1]),
+    ],
+)
+def test_a_pixel_gets_the_sum_of_the_leaves_that_walks_end_at(trees, features, expected):
+    assert KERNELS.tree_sum(np.array(features, np.float32), *forest(*trees)).tolist() == expected
 
 
 def test_the_last_of_32_leaves_can_be_reached():

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roadeval import kernels
 from roadeval.data import Packed, pack, unpack
 from roadeval.kernels import plain
 from roadeval.pipeline.paper import shadow, similarity
@@ -184,13 +183,6 @@ def test_every_kernel_has_a_twin():
         assert [*loop] == [*twin]
 
 
-def test_the_twins_can_be_chosen(monkeypatch):
-    monkeypatch.delenv("ROADEVAL_PLAIN", raising=False)
-    assert kernels.pick() is fast
-    monkeypatch.setenv("ROADEVAL_PLAIN", "1")
-    assert kernels.pick() is plain
-
-
 # --- Masks ----------------------------------------------------------------------------------------
 
 
@@ -248,14 +240,6 @@ def test_rings_are_summed_up_alike_across_words(width, reach):
     assert_same(sums, plain.ring_sums(*given), "ring_sums")
 
 
-def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_not():
-    mask = np.array([[0, 1, 0, 1], [1, 0, 0, 1]], np.uint8)
-    touching, apart = (fast.components(pack(mask), 4, connectivity)[0] for connectivity in (8, 4))
-    assert plain.paint(touching, 2, 4).tolist() == [[0, 1, 0, 2], [1, 0, 0, 2]]
-    assert plain.paint(apart, 2, 4).tolist() == [[0, 1, 0, 2], [3, 0, 0, 2]]
-    assert touching.tolist() == [[0, 1, 2, 1], [0, 3, 4, 2], [1, 0, 1, 1], [1, 3, 4, 2]]
-
-
 @pytest.mark.parametrize("view", [np.asfortranarray, lambda m: m[::-1], lambda m: m[:, ::2]])
 def test_masks_may_have_any_layout(view):
     mask = view((noise(40, 90)[..., 0] > 120).astype(np.uint8))
@@ -286,23 +270,6 @@ def test_paths_are_measured_alike(seeds, greatest, rounds, seed):
     cost = np.random.default_rng(seed).integers(0, greatest, seeds.shape, np.uint16, endpoint=True)
     given = cost, seeds, rounds
     assert_same(fast.geodesics(*given), plain.geodesics(*given))
-
-
-def test_a_pixel_is_dilated_to_the_element_and_its_complement_eroded_by_it():
-    mask = np.zeros((9, 130), np.uint8)
-    mask[4, 63] = 1
-    element = np.array([3, 1])
-    grown = unpack(fast.dilate(pack(mask), element, 130), 130)
-    assert np.argwhere(grown).tolist() == [
-        *([3, x] for x in range(62, 65)),
-        *([4, x] for x in range(60, 67)),
-        *([5, x] for x in range(62, 65)),
-    ]
-    left = unpack(fast.erode(pack(1 - mask), element, 130), 130)
-    # Nothing lies around the image, so that its border goes, too.
-    np.testing.assert_array_equal(left[1:-1, 3:-3], 1 - grown[1:-1, 3:-3])
-    assert not left[[0, -1]].any()
-    assert not left[:, [0, 1, 2, -3, -2, -1]].any()
 
 
 @given(st.integers(0, 3), st.integers(1, 3), st.integers(1, 4), st.integers(1, 200))

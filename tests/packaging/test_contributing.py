@@ -161,44 +161,30 @@ def recording(workshop) -> roadeval.Recording:
 
 
 def test_the_page_adds_one_of_each():
-    rooms = {str(Path(path).parent) for path in FILES}
-    assert rooms == {
-        ".",
-        "roadeval/pipeline/beyond",
-        "roadeval/evaluation/metrics",
-        "roadeval/evaluation/regions",
-        "roadeval/logs/messages/encodings",
-        "roadeval/logs/truth/formats",
-        "roadeval/report/charts",
-        "roadeval/jobs",
-        "roadeval/cli/commands",
+    package = {str(Path(path).parent) for path in FILES} - {"."}
+    assert package == {
+        f"roadeval/{room}"
+        for room in (
+            *("pipeline/beyond", "evaluation/metrics", "evaluation/regions", "report/charts"),
+            *("logs/messages/encodings", "logs/truth/formats", "jobs", "cli/commands"),
+        )
     }
 
 
-def test_the_stage_has_rows_in_the_table(workshop):
+def test_the_stage_has_rows_a_mask_in_the_recording_and_documented_settings(workshop, recording):
     frames = workshop.table("frames").query("variant == 'bright'")
     assert list(frames["stage"].unique()) == ["brightness", "post"]
     assert frames["ERR"].max() < 0.05
-
-
-def test_the_stage_has_its_mask_in_the_recording(recording):
     mask = recording.layer("bright", "brightness", FRAMES - 1)
     np.testing.assert_array_equal(mask, frame(FRAMES - 1)[1] == 255)
-
-
-def test_the_stage_has_documented_settings(workshop):
     assert "tolerance = 50" in workshop.done("config")
 
 
-def test_the_metric_is_a_column_of_frames(workshop):
+def test_the_metric_is_a_column_of_frames_and_in_the_recording(recording, workshop):
     frames = workshop.table("frames")
     np.testing.assert_allclose(frames["BACC"], (frames["TPR"] + frames["TNR"]) / 2)
-
-
-def test_the_metric_is_in_the_recording(recording, workshop):
     series = recording.scalars("/metrics/bright/post/BACC")
-    frames = workshop.table("frames").query("variant == 'bright' and stage == 'post'")
-    np.testing.assert_allclose(series, frames["BACC"])
+    np.testing.assert_allclose(series, frames.query("variant == 'bright' and stage == 'post'").BACC)
     assert "BACC" in recording.frames
 
 
@@ -223,25 +209,16 @@ def test_the_metric_is_compared_by_its_direction(workshop):
     assert code == 4, said
 
 
-def test_the_region_is_counted(workshop):
+def test_the_region_is_counted_and_in_the_report_by_its_title(workshop, report):
     regions = workshop.table("regions").query("region == 'ahead' and stage == 'post'")
     assert set(regions["variant"]) == {"filtered", "unfiltered", "bright", "blind"}
     assert set(regions[["TP", "TN", "FP", "FN"]].sum(axis=1)) == {48 * 22}
-
-
-def test_the_region_is_in_the_report_by_its_title(report):
     assert report.count("ahead of the vehicle") == 1
 
 
-def test_the_encoding_is_described(workshop):
-    found = json.loads(workshop.done("info"))
-    assert {topic["name"]: topic["count"] for topic in found["topics"]} == {
-        "/camera": FRAMES,
-        "/truth": FRAMES,
-    }
-
-
-def test_the_encoding_is_read(recording):
+def test_the_encoding_is_described_and_read(workshop, recording):
+    topics = json.loads(workshop.done("info"))["topics"]
+    assert {each["name"]: each["count"] for each in topics} == {"/camera": FRAMES, "/truth": FRAMES}
     image, truth = frame(FRAMES - 1)
     assert recording.image(FRAMES - 1).shape == image.shape
     np.testing.assert_array_equal(recording.truth(FRAMES - 1), truth == 255)

@@ -11,13 +11,14 @@ import pytest
 from pypdf import PdfReader
 
 import roadeval
+from tests.golden import drive
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_tour_of_the_api_runs(tmp_path):
     (tmp_path / "recordings").mkdir()
-    shutil.copy(ROOT / "recordings" / "demo.mcap", tmp_path / "recordings")
+    drive.write(tmp_path / "recordings" / "demo.mcap")
     run = subprocess.run(
         [sys.executable, ROOT / "examples" / "api.py"],
         cwd=tmp_path,
@@ -40,15 +41,14 @@ def test_the_example_method_is_installed_and_replayed_by_its_entry_point(tmp_pat
     _run("-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index",
          "--target", tmp_path / "site", tmp_path / "method")  # fmt: skip
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
-    drive = ROOT / "recordings" / "demo.mcap"
-    _run("-m", "roadeval", "replay", drive, "--variant", f"mine={tmp_path / 'method/smooth.toml'}",
-         "--max-frames", "12", "--save", "out.rrd", "--reports", "reports",
+    log = drive.write(tmp_path / "drive.mcap", frames=14)
+    _run("-m", "roadeval", "replay", log, "--variant", f"mine={tmp_path / 'method/smooth.toml'}",
+         "--train-frames", "4", "--save", "out.rrd", "--reports", "reports",
          cwd=tmp_path, env=environment)  # fmt: skip
     rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
     assert set(rows.stage) == {"smooth", "post"}
     assert roadeval.Recording(tmp_path / "out.rrd").layer("mine", "texture", 11).any()
-    _run("-m", "roadeval", "report", "out.rrd", "-o", "report.pdf", cwd=tmp_path)
-    pages = PdfReader(tmp_path / "report.pdf").pages
+    pages = PdfReader(roadeval.write_report(tmp_path / "out.rrd", tmp_path / "report.pdf")).pages
     assert any("smooth" in page.extract_text() for page in pages)
 
 

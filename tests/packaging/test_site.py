@@ -31,6 +31,11 @@ def test_a_page_says_what_the_code_says(page):
     assert GENERATED["written"](old) == text
 
 
+def test_no_other_name_is_public():
+    with pytest.raises(AttributeError, match="module 'roadeval' has no attribute 'nothing'"):
+        roadeval.nothing  # noqa: B018
+
+
 def test_the_site_links_every_public_name_to_its_api_page():
     text = GENERATED["page"]("reference/python", MADE["reference/python.md"])
     assert re.findall(r'"../api/roadeval.html#(\w+)"', text) == [*roadeval.__all__]

@@ -74,15 +74,21 @@ def test_every_drive_has_every_replay_with_every_seed():
     assert {*numbers["drives"]} == {*DRIVES}
 
 
-def test_libraries_of_others_compute_the_overlap_numbers_that_are_printed():
-    """`measured` refuses two values that are not equal."""
-    found = overlap.measured(frames=12)
+@pytest.fixture(scope="module")
+def demo():
+    """Numbers of two frames and their pixels; some trees are enough to be counted."""
+    return overlap.replayed(12, {"trees": 15, "hidden": 8})
+
+
+def test_libraries_of_others_compute_the_overlap_numbers_that_are_printed(demo):
+    """`compared` refuses two values that are not equal."""
+    found = overlap.compared(*demo)
     assert found["evaluated"] == 2
     assert {*found["values"]} == {*load()["overlap"]["values"]}
 
 
-def test_a_library_that_computes_another_number_is_told(monkeypatch):
+def test_a_library_that_computes_another_number_is_told(demo, monkeypatch):
     wrong = overlap.NUMBERS[0]._replace(again=lambda _: 0.5)
     monkeypatch.setattr(overlap, "NUMBERS", (wrong,))
     with pytest.raises(overlap.DifferentNumberError, match=r"0\.5 by a library"):
-        overlap.measured(frames=12)
+        overlap.compared(*demo)
