@@ -5,9 +5,12 @@ import os
 from collections.abc import Iterator
 from contextlib import chdir
 from importlib.util import find_spec
+from unittest import mock
 
 import pytest
 from hypothesis import settings
+
+from tests.fixtures.figures import without_figures  # noqa: F401
 
 # The machine may be busy with something else.
 settings.register_profile("roadeval", deadline=None)
@@ -22,8 +25,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # loops themselves are skipped.
 if find_spec("roadeval.kernels._loops") is None:
     os.environ["ROADEVAL_PLAIN"] = "1"
-
-# On GitHub the comparisons of the tests would stand on the page of the job.
 
 
 # What is imported and collected stays to the end: nothing of it is searched for again and again.
@@ -50,4 +51,25 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     A run that is not told where to write writes below the folder it is started in.
     """
     with chdir(tmp_path_factory.mktemp("elsewhere")):
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def tables_of_colours() -> Iterator[None]:
+    """Make the table of all colours once for each machine: replays of small logs train alike."""
+    from roadeval.pipeline.paper import svm
+
+    make = svm.colour_table.__wrapped__
+    made: dict[object, svm.Words] = {}
+
+    def colour_table(machine: svm.SupportVectors, settings: svm.SvmSettings) -> svm.Words:
+        arrays = machine.mean, machine.scale, machine.vectors, machine.weights
+        key = (settings, machine.offset, *(each.tobytes() for each in arrays))
+        if key not in made:
+            if len(made) == 32:  # of 2 MiB each
+                made.pop(next(iter(made)))
+            made[key] = make(machine, settings)
+        return made[key]
+
+    with mock.patch.object(svm, "colour_table", colour_table):
         yield

@@ -288,16 +288,13 @@ def measured() -> dict[str, Any]:
     return compared(*replayed())
 
 
-def replayed(
-    frames: int | None = None, trees: Mapping[str, Any] | None = None
-) -> tuple[int, dict[str, float], Pixels]:
+def replayed(**more: Mapping[str, Any]) -> tuple[int, dict[str, float], Pixels]:
     """Return how many frames were evaluated, roadeval's numbers of them, and their pixels.
 
-    ``frames`` are read of the demo drive, all by default; ``trees`` are settings of that stage.
+    All frames of the demo drive are read unless ``more`` tables of the configuration say otherwise.
     """
-    tables = {"preset": "robust", "ground": CAMERA, "output": {"record": "masks"}}
-    tables |= {"frames": {"max_frames": frames}, STAGE: dict(trees or {})}
-    config = roadeval.configure(tables)
+    tables = {"preset": "robust", "ground": CAMERA, "output": {"record": "masks", "figures": False}}
+    config = roadeval.configure({**tables, **more})
     with TemporaryDirectory() as folder:
         path = Path(folder)
         outcome = roadeval.replay(DEMO, config, save=path / "it.rrd", reports=path / "it")

@@ -29,13 +29,12 @@ import os
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import TypeAdapter
-
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
-from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
+from roadeval.config.tables import ConfigError, adapter, either, in_file, override, read_tables
 from roadeval.config.variants import (
     PRESETS,
     TRAINED,
@@ -478,19 +477,25 @@ def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
 
 def _table(name: str, settings: Any) -> str:
     """Write the table of a settings dataclass; dataclasses in it follow as tables."""
-    texts = meanings(type(settings))
-    schemas = TypeAdapter(type(settings)).json_schema()["properties"]
-    title = (inspect.getdoc(type(settings)) or "").partition("\n\n")[0]
-    lines, inner = [*_comment(title), f"[{name}]"], []
+    title, comments = _comments(settings.__class__)
+    lines, inner = [*title, f"[{name}]"], []
     for each in dataclasses.fields(settings):
         value = getattr(settings, each.name)
         if dataclasses.is_dataclass(value):
             inner.append(_table(f"{name}.{each.name}", value))
             continue
-        allowed = _allowed(schemas[each.name])
-        lines += ["", *_comment(" ".join(filter(None, (texts.get(each.name), allowed))))]
-        lines.append(_assignment(each.name, value))
+        lines += ["", *comments[each.name], _assignment(each.name, value)]
     return "\n\n".join(["\n".join(lines), *inner])
+
+
+@cache
+def _comments(kind: type) -> tuple[list[str], dict[str, list[str]]]:
+    """Return the comments of a settings dataclass, and of each setting: meaning and range."""
+    texts, title = meanings(kind), (inspect.getdoc(kind) or "").partition("\n\n")[0]
+    return _comment(title), {
+        name: _comment(" ".join(filter(None, (texts.get(name), _allowed(schema)))))
+        for name, schema in adapter(kind).json_schema()["properties"].items()
+    }
 
 
 def _assignment(name: str, value: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from itertools import takewhile
 from json import dumps
 from pathlib import Path
@@ -128,10 +129,16 @@ def override(settings: Any, values: Any, table: str) -> Any:
     try:
         # In JSON a strict check accepts a list for a tuple, but no text for a number, and no true.
         json = _JSON.dump_json(merged, fallback=str)
-        return TypeAdapter(type(settings)).validate_json(json, strict=True)
+        return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise ConfigError(_named(table, first["loc"], _plainly(first))) from error
+
+
+@cache
+def adapter(kind: type) -> TypeAdapter[Any]:
+    """Return what validates a settings dataclass and has its schema: to make it takes a while."""
+    return TypeAdapter(kind)
 
 
 def either(names: Iterable[str]) -> str:

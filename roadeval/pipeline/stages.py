@@ -49,7 +49,13 @@ class UnknownStageError(RoadevalError, LookupError):
 
 def names() -> list[str]:
     """List the names that a chain may hold, besides ``module:name``."""
-    return [*STAGES, *sorted({each.name for each in entry_points(group=GROUP)} - STAGES.keys())]
+    return [*STAGES, *sorted(_added() - STAGES.keys())]
+
+
+@cache
+def _added() -> frozenset[str]:
+    """Return the names of the stages that packages add: to look through all packages takes long."""
+    return frozenset(each.name for each in entry_points(group=GROUP))
 
 
 def stages_of(chain: Iterable[str]) -> tuple[Stage, ...]:

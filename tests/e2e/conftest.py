@@ -4,6 +4,7 @@ import fcntl
 import os
 import pickle
 from collections.abc import Callable
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import pytest
 
 from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
+from tests.e2e.test_fleet import Here
 from tests.fixtures.browser import browser, watched  # noqa: F401
-from tests.fixtures.figures import drawn, without_figures  # noqa: F401
+from tests.fixtures.figures import drawn
 from tests.fixtures.make import make
 from tests.training.making import frame
 
@@ -34,6 +36,17 @@ def once(tmp_path_factory):
         return Replayed(pickle.loads(result.read_bytes()), folder)
 
     return once
+
+
+@pytest.fixture
+def without_workers(monkeypatch):
+    """Let ``fleet`` do its tasks in this process: Dask's workers take seconds to begin."""
+
+    @contextmanager
+    def started(*_):
+        yield Here(), 1
+
+    monkeypatch.setattr("roadeval.jobs.run.fleet.started", started)
 
 
 @pytest.fixture(scope="session")

@@ -137,12 +137,9 @@ def here(page, request, tmp_path) -> Path:
     return Path(shutil.copytree(world, tmp_path / "world", copy_function=os.link))
 
 
-# The site's pages take two minutes; `.ci/run` asks for them by their mark.
-OF_THE_SITE = [pytest.param(page, marks=pytest.mark.site) for page in PAGES if page != "README.md"]
-
-
 @pytest.mark.timeout(600)  # a page of many commands, on a machine that is busy
-@pytest.mark.parametrize("page", ["README.md", *OF_THE_SITE])
+@pytest.mark.site  # all pages take two minutes; `.ci/run` asks for them by their mark
+@pytest.mark.parametrize("page", PAGES)
 def test_a_page_does_what_it_says(page, here, pytestconfig):
     text, said, end = (ROOT / page).read_text(), None, 0
     written = text

@@ -249,7 +249,9 @@ def test_a_password_is_told_nowhere(fleet, source):
 
 
 @pytest.mark.parametrize("word", ["http://me:geheim@127.0.0.1:9/a.mcap", "no://me:geheim@host/a"])
-def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word, monkeypatch):
+def test_a_password_on_the_command_line_is_told_nowhere(
+    tmp_path, word, monkeypatch, without_workers
+):
     monkeypatch.setitem(remote.RETRIES, "max_retries", 0)
     manifest = tmp_path / "drives.toml"
     manifest.write_text(f'[[drives]]\npath = "{word}"\nlabels = {{ road = [3] }}\n')
@@ -258,8 +260,8 @@ def test_a_password_on_the_command_line_is_told_nowhere(tmp_path, word, monkeypa
         ("replay", word),
         ("info", word),
         ("report", word),
-        ("fleet", word, "-o", folder, "--jobs", 1),
-        ("fleet", manifest, "-o", folder, "--jobs", 1),
+        ("fleet", word, "-o", folder),
+        ("fleet", manifest, "-o", folder),
     ):
         done = here(*words, cwd=tmp_path)
         assert done.returncode in (1, 3)

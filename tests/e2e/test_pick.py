@@ -19,7 +19,10 @@ from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 
 HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
-QUICK = 'preset = "robust"\n[trees]\ntrees = 15\nhidden = 8\n[training]\npixels_per_class = 50\n'
+QUICK = (
+    'preset = "robust"\n[trees]\nwidth = 80\ntrees = 15\nhidden = 8\n'
+    "[training]\npixels_per_class = 50\n"
+)
 """Some trees are enough: what is picked and counted is tested here, not how good it is."""
 
 
@@ -212,7 +215,9 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert stamps_of(Picks.read(work / "at_once"), Why.RANDOM) == stamps_of(after, Why.RANDOM)
 
 
-def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
+def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
+    work, truths, without_workers
+):
     shutil.copy(work / "street.mcap", work / "second.mcap")
     (work / "first.toml").write_text('topics.truth = ""\nframes.max_frames = 20\n')
     words = ("-n", 6, "-o", "both", "--config", "first.toml")

@@ -20,6 +20,7 @@ def run(logs: Path, folder: Path) -> None:
     """Replay a fleet in this process, each drive with the model of the other one's fold."""
     config = {
         "only": ["unfiltered"],
+        "chain": ["similarity", "post"],  # which learns as the SVM does, in a tenth of its time
         "training": {"frames": 3, "pixels_per_class": 20},
         "frames": {"max_frames": 4},
         "fleet": {"folds": 2},

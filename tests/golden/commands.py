@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from roadeval.cli.app import main
 from roadeval.report import blocks
+from tests.fixtures.figures import drawn
 from tests.golden import drawings, drive
 
 DONE: Final = "told.json"
@@ -78,7 +79,7 @@ def run_all(folder: Path) -> None:
     drive.write(folder / "tiny.mcap")
     drive.write(folder / "unlabelled.mcap", truths=False)
     (folder / "rbf.toml").write_text('[svm]\nkernel = "rbf"\n', encoding="utf-8")
-    with terminal(folder):
+    with terminal(folder), drawn():
         texts = {name: run(name) for name in COMMANDS}
     (folder / DONE).write_text(json.dumps(texts), encoding="utf-8")
 
