@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -27,7 +28,7 @@ TABLES = ("frames", "windows", "regions", "oracles", "changes", "heat", "disagre
 def scenes() -> list[tuple[int, bytes, np.ndarray]]:
     """The demo's frames, a quarter as wide: stamp, JPEG and truth."""
     with open_log(DEMO) as log:
-        frames = [frame.decode() for frame in log.frames(log.select())]
+        frames = [frame.decode() for frame in islice(log.frames(log.select()), 69)]
     small = [(cv2.resize(each.image, SIZE), cv2.resize(each.truth, SIZE)) for each in frames]
     return [
         (each.stamp_ns, cv2.imencode(".jpg", image[..., ::-1])[1].tobytes(), (truth == 1) * ROAD)

@@ -14,7 +14,7 @@ from roadeval.pipeline.beyond.scene import scene_of
 from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, balanced_back, grow
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
 
-SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)
+SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5, hidden=8)
 
 
 def picture(kerb, seed=0, height=24, width=32):
