@@ -236,31 +236,6 @@ for path in sys.argv[1:]:
     with open(path, "rb") as file:
         print(hashlib.file_digest(file, "sha256").hexdigest())
 """
-# What Rerun's own loader costs, of a process that ends without Python: it is asked for its numbers
-# before it is taken leave of.
-_LOADER: Final = """
-import os, subprocess, sys
-from pathlib import Path
-import rerun_cli
-
-program = next(Path(rerun_cli.__file__).parent.glob("rerun*"))
-child = subprocess.Popen([program, "mcap", "convert", sys.argv[1], "-o", sys.argv[2]],
-                         stdout=subprocess.DEVNULL)
-peak = 0
-while os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None:
-    lines = dict(each.split(":", 1) for each in Path(f"/proc/{child.pid}/status").open())
-    peak = lines.get("VmHWM", f"{peak} kB").split()[0]
-    os.sched_yield()
-read = dict(each.split(": ") for each in Path(f"/proc/{child.pid}/io").open())["rchar"]
-child.wait()
-used = os.times()
-Path(os.environ["COST"]).write_text(f"{read.strip()} {sum(used[2:4])} {peak}")
-"""
-_LAYER: Final = f"""{_END}
-from roadeval import Recording
-recording = Recording(sys.argv[1])
-recording.layer("filtered", "ndi", recording.frame_numbers[-10])
-"""
 
 
 def measured(code: str, *words: object) -> dict[str, Any]:
@@ -312,8 +287,6 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
         "labelled": (_ROADEVAL, *replay, "--every", 20, "--train-frames", 3),
         "replay": (_ROADEVAL, *replay, "--train-frames", 3),
         "rig": (_ROADEVAL, *rig, "--train-frames", 3),
-        "loader": (_LOADER, files[0], folder / "loader.rrd"),
-        "layer": (_LAYER, out),
         "pdf": (_ROADEVAL, "report", out, "-o", folder / "report.pdf"),
         "page": (_ROADEVAL, "report", out, "-o", folder / "report.html"),
     }
@@ -324,8 +297,8 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
     for name in parts:
         found = measured(*every[name])
         read = max(found.pop("read") - own, 0)
-        saved = {"rig": folder / "rig.rrd", "loader": folder / "loader.rrd"}.get(name, out)
-        made = saved.stat().st_size if name == "loader" or "replay" in every[name] else 0
+        saved = folder / "rig.rrd" if name == "rig" else out
+        made = saved.stat().st_size if "replay" in every[name] else 0
         yield {
             "what": name,
             "read, MB": f"{read / 1e6:.0f}",
@@ -336,8 +309,8 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
 
 
 PARTS: Final = (
-    *("sha256sum", "seeking", "loader", "info", "verify", "fifty", "labelled", "replay"),
-    *("rig", "layer", "pdf", "page"),
+    *("sha256sum", "seeking", "info", "verify", "fifty", "labelled", "replay"),
+    *("rig", "pdf", "page"),
 )
 
 

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from tests.fixtures.figures import without_figures  # noqa: F401
+from tests.fixtures.once import once  # noqa: F401
 
 # The machine may be busy with something else.
 settings.register_profile("roadeval", deadline=None)

@@ -18,23 +18,14 @@ KEPT: Final = ("mean", "low", "high", "p", "p_holm", "comparisons", "units")
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """One replay of a drive.
-
-    Parameters
-    ----------
-    tables
-        Its configuration, without what the drive's truth needs.
-    options
-        The same for the terminal; empty where that takes files, too.
-    seeds
-        How often it trains.
-    drives
-        Those that it is made of; all by default.
-    """
+    """A replay of drives."""
 
     tables: Mapping[str, Any]
+    """Its configuration, without what the drive's truth needs."""
     options: str = ""
+    """The same for the terminal; empty where that takes files, too."""
     seeds: int = SEEDS
+    """How often it trains."""
     drives: tuple[str, ...] = tuple(DRIVES)
 
 

@@ -1,8 +1,5 @@
 """Whole drives are replayed once; several tests look at each."""
 
-import fcntl
-import os
-import pickle
 from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,24 +17,6 @@ from tests.fixtures.make import make
 from tests.training.making import frame
 
 
-@pytest.fixture(scope="session")
-def once(tmp_path_factory):
-    """Do something in a folder, unless another worker of these tests has done it already."""
-    base = tmp_path_factory.getbasetemp()
-    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-
-    def once(name: str, do: Callable[[Path], Run]) -> Replayed:
-        folder, result = shared / name, shared / f"{name}.pickle"
-        with (shared / f"{name}.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            if not result.exists():
-                folder.mkdir()
-                result.write_bytes(pickle.dumps(do(folder)))
-        return Replayed(pickle.loads(result.read_bytes()), folder)
-
-    return once
-
-
 @pytest.fixture
 def without_workers(monkeypatch):
     """Let ``fleet`` do its tasks in this process: Dask's workers take seconds to begin."""
@@ -52,7 +31,7 @@ def without_workers(monkeypatch):
 @pytest.fixture(scope="session")
 def demo(once) -> Replayed:
     """The synthetic drive that ships with the project, replayed by the installed program."""
-    return once("demo", lambda folder: replay(folder, DEMO, run=roadeval).run)
+    return Replayed(*once("demo", lambda folder: replay(folder, DEMO, run=roadeval).run))
 
 
 @pytest.fixture(scope="session")
@@ -64,8 +43,7 @@ def at_home(once):
         with drawn():
             return here("replay", drive, *CLASSES, "--jobs", 2, "--json", cwd=folder)
 
-    done = once("home", do)
-    return done.run, done.folder
+    return once("home", do)
 
 
 def of_drive(name: str, *words: Any) -> Callable[[Path], Run]:
@@ -81,25 +59,25 @@ def of_drive(name: str, *words: Any) -> Callable[[Path], Run]:
 @pytest.fixture(scope="session")
 def street(once) -> Replayed:
     """A street whose truth is class ids: 3 is road, 11 is to be ignored."""
-    return once("street", of_drive("street", *CLASSES))
+    return Replayed(*once("street", of_drive("street", *CLASSES)))
 
 
 @pytest.fixture(scope="session")
 def car_park(once) -> Replayed:
     """A drive whose truth is a mask that needs no explanation."""
-    return once("car_park", of_drive("car_park"))
+    return Replayed(*once("car_park", of_drive("car_park")))
 
 
 @pytest.fixture(scope="session")
 def unlabelled(once) -> Replayed:
     """A drive without truth."""
-    return once("unlabelled", of_drive("unlabelled"))
+    return Replayed(*once("unlabelled", of_drive("unlabelled")))
 
 
 @pytest.fixture(scope="session")
 def sparse(once) -> Replayed:
     """A replay that keeps the pictures of every seventh frame."""
-    return once("sparse", of_drive("street", *CLASSES, "--record", "every:7"))
+    return Replayed(*once("sparse", of_drive("street", *CLASSES, "--record", "every:7")))
 
 
 @pytest.fixture(scope="session")
@@ -116,4 +94,4 @@ def ignored(once) -> Replayed:
         words = ("--road-label", 1, "--ignore-label", 11, "--train-frames", 12)
         return replay(folder, folder / "drive.mcap", *words).run
 
-    return once("ignored", do)
+    return Replayed(*once("ignored", do))

@@ -3,7 +3,7 @@
 import pytest
 
 from roadeval import Recording
-from tests.e2e.commands import CLASSES, replay
+from tests.e2e.commands import CLASSES, Replayed, replay
 from tests.fixtures.shared import SHARED
 
 FIGURES = [
@@ -33,7 +33,7 @@ def real(request, once):
     name, *labels = request.param
     drive = SHARED / "drives" / f"{name}.mcap"
     words = (*labels, "--record", "none")
-    return name, once(name, lambda folder: replay(folder, drive, *words).run)
+    return name, Replayed(*once(name, lambda folder: replay(folder, drive, *words).run))
 
 
 def pooled_error(replayed, variant, stage="post"):

@@ -38,6 +38,12 @@ def fleet(tmp_path_factory):
     return path
 
 
+@pytest.fixture
+def tab(drive, watched):
+    """The page of the demo in a tab."""
+    return watched(drive.as_uri()).tab
+
+
 def shown(tab, selector):
     """The texts of what is seen."""
     return [each.text_content() for each in tab.locator(selector).all() if each.is_visible()]
@@ -60,8 +66,7 @@ def test_a_page_is_one_file_of_at_most_10_mb_and_asks_for_nothing(drive, watched
     assert seen.complaints == []
 
 
-def test_every_evaluated_frame_is_in_the_table_with_its_rates(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
+def test_every_evaluated_frame_is_in_the_table_with_its_rates(tab, demo):
     rows = tab.locator(".frames tbody tr")
     assert rows.count() == demo.summary["frames"]["evaluated"]
     columns = tab.locator(".frames thead th[data-rate=ERR]").all_inner_texts()
@@ -71,8 +76,7 @@ def test_every_evaluated_frame_is_in_the_table_with_its_rates(drive, demo, watch
     assert sum(values) / len(values) == pytest.approx(100 * mean, abs=0.01)
 
 
-def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(tab):
     title = tab.locator(".frames thead th[data-rate=ERR] button").first
     read = "rows => rows.map(row => Number(row.cells[2].textContent))"
     title.click()
@@ -83,8 +87,7 @@ def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(drive, watched)
     assert tab.locator(".frames th[aria-sort]").get_attribute("aria-sort") == "ascending"
 
 
-def test_frames_are_filtered_by_variant_rate_and_condition(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_frames_are_filtered_by_variant_rate_and_condition(tab):
     everything = tab.locator(".frames tbody tr").count()
     tab.locator(".choice select").first.select_option("unfiltered")
     assert shown(tab, ".frames thead th[data-variant]") == ["unfiltered"] * 3
@@ -103,8 +106,7 @@ def test_frames_are_filtered_by_variant_rate_and_condition(drive, watched):
     assert all(float(with_) < float(without) for with_, without in zip(*errors, strict=True))
 
 
-def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(tab):
     errors = tab.locator(".frames tr.pictured").evaluate_all(
         "rows => rows.map(row => [Number(row.cells[2].textContent), Number(row.dataset.frame)])"
     )
@@ -119,8 +121,7 @@ def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(dri
     assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(first)
 
 
-def test_the_link_below_the_verdict_leads_to_the_worst_frame(drive, demo, watched):
-    tab = watched(drive.as_uri()).tab
+def test_the_link_below_the_verdict_leads_to_the_worst_frame(tab, demo):
     tab.keyboard.press("ArrowRight")
     link = tab.locator("#summary .links a")
     link.click()
@@ -134,8 +135,7 @@ def test_the_link_below_the_verdict_leads_to_the_worst_frame(drive, demo, watche
     assert command == f"roadeval inspect drive.rrd --frame {worst}"
 
 
-def test_a_frame_without_pictures_offers_the_nearest_and_its_note(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_a_frame_without_pictures_offers_the_nearest_and_its_note(tab):
     rows = tab.locator(".frames tbody tr")
     has = {int(row.get_attribute("data-frame")): row for row in rows.all()}
     pictured = {number for number, row in has.items() if row.get_attribute("class") == "pictured"}
@@ -151,8 +151,7 @@ def test_a_frame_without_pictures_offers_the_nearest_and_its_note(drive, watched
     assert tab.locator(".stage").is_visible()
 
 
-def test_the_address_names_the_frame_and_back_goes_to_the_last_one(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_the_address_names_the_frame_and_back_goes_to_the_last_one(tab, drive, watched):
     first = frame(tab)
     assert "#" not in tab.url
     one, two = (
@@ -171,8 +170,7 @@ def test_the_address_names_the_frame_and_back_goes_to_the_last_one(drive, watche
     assert frame(watched(f"{drive.as_uri()}#frame-{two}").tab) == two
 
 
-def test_a_slider_lies_between_two_variants(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_a_slider_lies_between_two_variants(tab):
     assert tab.locator("select.left").input_value() == "filtered: errors"
     assert tab.locator("select.right").input_value() == "unfiltered: errors"
     above, below = (tab.locator(f".views .{name}") for name in ("above", "below"))
@@ -193,8 +191,7 @@ def test_a_slider_lies_between_two_variants(drive, watched):
     assert tab.locator("select.right").input_value() == "camera"
 
 
-def test_a_picture_enlarges_and_arrow_keys_go_on_inside(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_a_picture_enlarges_and_arrow_keys_go_on_inside(tab):
     first = frame(tab)
     tab.locator(".strip:not([hidden]) .tile img").nth(1).click()
     assert tab.locator("dialog .views").is_visible()
@@ -206,8 +203,7 @@ def test_a_picture_enlarges_and_arrow_keys_go_on_inside(drive, watched):
     assert tab.locator(".viewer .views").is_visible()
 
 
-def test_a_click_on_a_chart_shows_its_frame_and_the_pointer_its_values(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_a_click_on_a_chart_shows_its_frame_and_the_pointer_its_values(tab):
     for chart in (tab.locator(".browser .area").first, tab.locator("figure .along .area").last):
         chart.scroll_into_view_if_needed()
         box = chart.bounding_box()
@@ -222,8 +218,7 @@ def test_a_click_on_a_chart_shows_its_frame_and_the_pointer_its_values(drive, wa
     assert tab.locator(".absent").is_visible() or tab.locator(".stage").is_visible()
 
 
-def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(tab):
     everything = tab.locator(".frames tbody tr").count()
     chart = tab.locator(".browser .area").first
     chart.scroll_into_view_if_needed()
@@ -252,8 +247,7 @@ def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(dr
     assert tab.locator(".frames tbody tr:not([hidden])").count() == everything
 
 
-def test_two_variants_are_chosen_for_the_whole_page(drive, watched):
-    tab = watched(drive.as_uri()).tab
+def test_two_variants_are_chosen_for_the_whole_page(tab):
     one, other = tab.locator(".choice select").all()
     assert other.is_disabled()
     one.select_option("unfiltered")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import chdir, contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 from unittest import mock
@@ -18,12 +16,11 @@ from unittest import mock
 import pandas as pd
 from matplotlib.figure import Figure
 
-from roadeval.cli.app import main
 from roadeval.report import blocks
+from tests.e2e.commands import here
 from tests.fixtures.figures import drawn
 from tests.golden import drawings, drive
 
-DONE: Final = "told.json"
 RANGE: Final = "--start 0.25 --train-frames 5"
 COMMANDS: Final = {
     "replay": f"replay tiny.mcap --save paper.rrd --reports paper {RANGE} --train-gap 2 "
@@ -55,12 +52,9 @@ _STYLES: Final = re.compile(r"\x1b\[[\d;]*m")
 class Told:
     """What the commands left in a folder."""
 
+    texts: dict[str, dict[str, Any]]
+    """What each command printed and drew: ``code``, ``out``, ``err`` and ``figures``."""
     folder: Path
-
-    @cached_property
-    def texts(self) -> dict[str, dict[str, Any]]:
-        """What each command printed and drew: ``code``, ``out``, ``err`` and ``figures``."""
-        return json.loads((self.folder / DONE).read_text(encoding="utf-8"))
 
     def out(self, name: str) -> str:
         """What a command printed on stdout, without its styles."""
@@ -74,14 +68,13 @@ class Told:
         return pd.read_csv(self.folder / run / f"{name}.csv")
 
 
-def run_all(folder: Path) -> None:
-    """Write the drive and run every command on it in this process, at 80 columns."""
+def run_all(folder: Path) -> dict[str, dict[str, Any]]:
+    """Write the drive, run every command on it, at 80 columns, and return what `Told` holds."""
     drive.write(folder / "tiny.mcap")
     drive.write(folder / "unlabelled.mcap", truths=False)
     (folder / "rbf.toml").write_text('[svm]\nkernel = "rbf"\n', encoding="utf-8")
     with terminal(folder), drawn():
-        texts = {name: run(name) for name in COMMANDS}
-    (folder / DONE).write_text(json.dumps(texts), encoding="utf-8")
+        return {name: run(name) for name in COMMANDS}
 
 
 @contextmanager
@@ -99,16 +92,10 @@ def terminal(folder: Path) -> Iterator[None]:
 
 def run(name: str) -> dict[str, Any]:
     """Run a command where everything lies; return its exit code, and what it printed and drew."""
-    out, err = io.StringIO(), io.StringIO()
     look = {"FORCE_COLOR": "1", "TERM": "xterm"} if name in AT_TERMINAL else {}
-    with (
-        mock.patch.dict(os.environ, look),
-        redirect_stdout(out),
-        redirect_stderr(err),
-        _drawn() as figures,
-    ):
-        code = main(COMMANDS[name].split())
-    return {"code": code, "out": out.getvalue(), "err": err.getvalue(), "figures": figures}
+    with mock.patch.dict(os.environ, look), _drawn() as figures:
+        done = here(*COMMANDS[name].split())
+    return {"code": done.returncode, "out": done.stdout, "err": done.stderr, "figures": figures}
 
 
 @contextmanager
