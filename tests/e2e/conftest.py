@@ -5,16 +5,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import cv2
 import pytest
 
-from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
 from tests.e2e.test_fleet import Here
 from tests.fixtures.browser import browser, watched  # noqa: F401
 from tests.fixtures.figures import drawn
 from tests.fixtures.make import make
-from tests.training.making import frame
 
 
 @pytest.fixture
@@ -78,20 +75,3 @@ def unlabelled(once) -> Replayed:
 def sparse(once) -> Replayed:
     """A replay that keeps the pictures of every seventh frame."""
     return Replayed(*once("sparse", of_drive("street", *CLASSES, "--record", "every:7")))
-
-
-@pytest.fixture(scope="session")
-def ignored(once) -> Replayed:
-    """A drive whose truth ignores every pixel once it has trained."""
-
-    def do(folder: Path) -> Run:
-        with LogWriter(folder / "drive.mcap") as log:
-            for number in range(16):
-                made, stamp = frame(number), (number + 1) * 100_000_000
-                _, png = cv2.imencode(".png", made.image[..., ::-1])
-                log.image("/camera/image", stamp, png.tobytes(), "png")
-                log.mask("/truth/road", stamp, made.truth if number < 12 else made.truth * 0 + 11)
-        words = ("--road-label", 1, "--ignore-label", 11, "--train-frames", 12)
-        return replay(folder, folder / "drive.mcap", *words).run
-
-    return Replayed(*once("ignored", do))

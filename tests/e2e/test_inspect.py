@@ -79,11 +79,6 @@ def test_the_viewer_shows_no_picture_on_a_frame_that_has_none(sparse, tmp_path):
     assert drawn[15].std() == 0
 
 
-def test_frames_that_are_ignored_as_a_whole_rank_like_those_without_truth(ignored, capsys):
-    assert main(["inspect", str(ignored.recording), "--list"]) == 0
-    assert "entropy %" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("words", [("--worst", "1"), ("--frame",)])
 def test_a_frame_without_pictures_is_drawn_with_a_warning(
     words, sparse, tmp_path, monkeypatch, capsys

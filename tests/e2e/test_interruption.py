@@ -42,7 +42,7 @@ def stopped(request, tmp_path_factory):
     return folder, (returned, code), said
 
 
-def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told(stopped):
+def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told_and_nothing_else(stopped):
     folder, (returned, code), said = stopped
     assert returned == code
     assert "Traceback" not in said
@@ -51,10 +51,6 @@ def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told(stopped
     recording = Recording(Path(path))
     assert not recording.complete
     assert recording.layer("unfiltered", "post", 0).shape == (480, 640)
-
-
-def test_a_signal_leaves_no_output_under_its_final_name(stopped):
-    folder, *_ = stopped
     assert not (folder / "out.rrd").exists()
     assert not list(folder.rglob("*.csv*"))
     assert not list(folder.rglob("summary.json"))

@@ -45,13 +45,6 @@ def test_a_pixel_gets_the_sum_of_the_leaves_that_walks_end_at(trees, features, e
     assert KERNELS.tree_sum(np.array(features, np.float32), *forest(*trees)).tolist() == expected
 
 
-def test_the_last_of_32_leaves_can_be_reached():
-    nodes = [(0, float(at), ALL & ~((1 << (at + 1)) - 1)) for at in range(31)]
-    features = np.arange(33, dtype=np.float32)[None] - np.float32(0.5)
-    found = KERNELS.tree_sum(features, *forest((nodes, list(range(32)))))
-    assert found.tolist() == [*range(32), 31]
-
-
 @pytest.mark.parametrize("pixels", [1, 255, 256, 257, 1000])
 def test_the_twins_agree_on_any_number_of_pixels(pixels):
     rng = np.random.default_rng(pixels)

@@ -11,7 +11,7 @@ from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions, reach
 from roadeval.pipeline.beyond.scene import scene_of
-from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, balanced_back, grow
+from roadeval.pipeline.beyond.trees import Blend, TreesSettings, balanced_back, grow
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5, hidden=8)
@@ -153,24 +153,6 @@ def test_trees_that_hear_nothing_say_so():
         trees.bind(heard, learnt)(more)
     with pytest.raises(MisfitError, match="train it again"):
         trees.bind(SMALL, learnt)
-
-
-@pytest.mark.parametrize(
-    ("changed", "why"),
-    [
-        ({"feature": np.full((20, NODES), -1, np.int32)}, "feature holds a number outside"),
-        ({"inputs": 5}, "feature holds a number outside 0 to 4"),
-        ({"inputs": 0}, "feature holds a number outside 0 to -1"),
-        ({"kept": np.zeros((20, NODES), np.uint32)}, "rules out a tree's last leaf"),
-        ({"kept": np.full((19, NODES), ALL, np.uint32)}, "kept has the shape"),
-        ({"threshold": np.full((20, NODES), np.nan, np.float32)}, "holds a number outside"),
-        ({"values": np.zeros((20, 31), np.float32)}, "values has the shape"),
-        ({"feature": np.zeros((20, NODES), np.int64)}, "instead of int32"),
-    ],
-)
-def test_trees_that_no_training_gives_are_refused(forest, changed, why):
-    with pytest.raises(ValueError, match=why):
-        replace(forest, **changed)
 
 
 def test_trees_for_other_features_are_a_misfit(learnt):

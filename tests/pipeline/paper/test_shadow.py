@@ -276,29 +276,6 @@ def test_compensation_in_hsi_equals_the_loop_over_components(statistic, image, w
     assert_rounded(layers["compensated"], np.where(shadowed[..., None] > 0, exact, image))
 
 
-def test_a_component_gets_the_mean_and_deviation_of_its_ring():
-    rng = np.random.default_rng(1)
-    image = rng.normal(130, 12, (40, 40, 3))
-    image[10:30, 10:30] = rng.normal(40, 4, (20, 20, 3))
-    image = np.clip(image, 0, 255).astype(np.uint8)
-    labels = np.zeros((40, 40), np.int32)
-    labels[10:30, 10:30] = 1
-    ring = shadow.buffer_ring(Packed.of(labels > 0), 3)
-    result = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings(ring_width=3))
-    around, inside = image[ring.pixels() > 0].astype(float), result[labels > 0].astype(float)
-    # Rounding moves no pixel, and so neither statistic, by more than half a level.
-    np.testing.assert_allclose(inside.mean(axis=0), around.mean(axis=0), rtol=0, atol=0.5)
-    np.testing.assert_allclose(inside.std(axis=0), around.std(axis=0), rtol=0, atol=0.5)
-
-
-def test_a_constant_component_takes_the_mean_of_its_ring_with_gain_1():
-    image = picture("....", ".#..", "....")
-    labels = mask("....", ".#..", "....").astype(np.int32)
-    ring = shadow.buffer_ring(Packed.of(labels > 0), 1)
-    result = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
-    assert result[1, 1].tolist() == np.rint(image[ring.pixels() > 0].mean(axis=0)).tolist()
-
-
 @pytest.mark.parametrize("colour_space", ["rgb", "hsi"])
 def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
     image = noise(3, 4)
@@ -306,16 +283,6 @@ def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
     chosen = ShadowSettings(colour_space=colour_space)
     result = shadow.compensate(View.of(image), one(labels), ring, chosen)
     np.testing.assert_array_equal(result, image)
-
-
-def test_the_gain_may_be_bounded_and_is_not_by_default():
-    image = np.repeat(np.array([[[0], [20], [22], [250]]], np.uint8), 3, axis=2)
-    labels = np.array([[0, 1, 1, 0]], np.int32)
-    ring = Packed.of(np.array([[1, 0, 0, 1]], np.uint8))
-    for most, pixels in ((None, [0, 250]), (4.0, [121, 129])):
-        chosen = ShadowSettings(max_gain=most)
-        result = shadow.compensate(View.of(image), one(labels), ring, chosen)
-        assert result[0, 1:3, 0].tolist() == pixels
 
 
 @given(images())
