@@ -10,9 +10,6 @@ from unittest import mock
 import pytest
 from hypothesis import settings
 
-from tests.fixtures.figures import without_figures  # noqa: F401
-from tests.fixtures.once import once  # noqa: F401
-
 # The machine may be busy with something else.
 settings.register_profile("roadeval", deadline=None)
 settings.load_profile("roadeval")
@@ -27,6 +24,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if find_spec("roadeval.kernels._loops") is None:
     os.environ["ROADEVAL_PLAIN"] = "1"
 
+# Only now: they import NumPy and the loops.
+from tests.fixtures.figures import without_figures  # noqa: E402, F401
+from tests.fixtures.once import once  # noqa: E402, F401
 
 # What is imported and collected stays to the end: nothing of it is searched for again and again.
 gc.disable()
