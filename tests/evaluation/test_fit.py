@@ -121,8 +121,15 @@ def test_moved_masks_are_named_with_their_pixels(right: int, down: int, holes: f
     assert abs(finding.down - down) <= 1
 
 
-def straight(_: float) -> np.ndarray:
-    return road_at(0.0)
+@pytest.mark.parametrize("grow", [-4, -2, 2, 4])
+@pytest.mark.parametrize(("right", "down"), [(0, 0), (2, 0), (4, 0), (0, 5), (0, -6), (-8, 6)])
+def test_masks_that_are_grown_and_moved_are_named_with_the_move_or_left_alone(
+    grow: int, right: int, down: int
+) -> None:
+    for finding in found(ROADS, mine=moved(rough(ROADS, grow=grow, holes=0.1), right, down)):
+        assert finding.misfit is Misfit.MOVED
+        assert abs(finding.right - right) <= 2
+        assert abs(finding.down - down) <= 2
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,9 @@
 """Whether truth, masks and images belong together: of the same frame, the same side and place.
 
-Edges of a mask lie on edges of the image it was made of, whatever the mask gets wrong. So the edges
-of the truth, and of each mask from elsewhere, are held against the image of their frame and of its
-neighbours, as they are, mirrored, upside down and moved; masks against the truth as well. What fits
-much better than the plain pairing, in nearly all frames, is a finding. No number changes by it.
+Edges of a mask lie on edges of the image it was made of, and near those of the truth, whatever the
+mask gets wrong. So the edges of the truth, and of each mask from elsewhere, are held against their
+frame and its neighbours, as they are, mirrored, upside down and moved. What fits much better than
+the plain pairing, in nearly all frames, is a finding. No number changes by it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, ROAD, Frame, Packed
-from roadeval.data.arrays import Floats, Plane
+from roadeval.data.arrays import Floats, Places, Plane
 
 TRUTH: Final = "truth"
 """The subject that is no mask of a method."""
@@ -31,32 +31,43 @@ _FAR: Final = 13
 """Pixels that a mask may have been moved by."""
 _WIDEST: Final = 640
 """Columns of the images that are looked at: larger ones are reduced."""
+_SMALLEST: Final = 96
+"""Rows and columns of images, at least, that are looked at."""
 _MARGIN: Final = _FAR + 2
 """Pixels at the image's border whose edges do not count: those of what was moved in from beyond."""
+_POINTS: Final = 200
+"""Points of a mask's edge that are looked at, about."""
+_REACH: Final = 20
+"""Pixels from another mask's edge up to which distances are told apart."""
 _GROWN: Final = 8
-"""Pixels that its edge may lie farther out or in all around."""
-_NEAR: Final = 2.5
+"""Pixels that an edge may lie farther out or in all around: a method's way, and no finding."""
+_HALF: Final = 2.5
+"""Pixels from another mask's edge where nearness is one half."""
+_NEAR: Final = 3.0
 """Pixels of a move that is named, at least: masks of many a method lie a little off."""
-_FEWER: Final = 3
-"""Every so many points of the edge are held against the moves."""
-_POINTS: Final = 400
-"""Points of a mask's edge that are looked at."""
+_CLEAR: Final = 0.7
+"""Nearness to the truth of masks whose outline is clear: these tell a move from growth."""
+_ALIKE: Final = 0.98
+"""The share of it that moves by `_NEAR` more or less do not reach, then, where one is named."""
 _LEAST: Final = 6
 """Spots without which nothing is found."""
-_SURE: Final = 3.0
+_SURE: Final = 2.5
 """Least mean gain of what fits better over the spots, in standard errors."""
-_RATHER: Final = 1.5
-"""The same of a move over an edge that lies farther out, or in, all around."""
-_MUCH: Final = 0.05
+_MUCH: Final = 0.04
 """Least mean gain, as a share of how well the plain pairing fits."""
 _STILL: Final = 0.005
 """The share of pixels whose truth changes from spot to spot, on average, up to which the scene is
 one and the same: there a bad method's masks cannot be told from moved ones."""
-_SMALLEST: Final = 96
-"""Rows and columns of images, at least, that are looked at."""
 _UPSIDE: Final = 0.4
 """The share of road high in the image is larger by so much than that before the vehicle, on
 average, where road and other pixels are exchanged."""
+_MOVES: Final = np.mgrid[-_FAR : _FAR + 1, -_FAR : _FAR + 1].reshape(2, -1, 1)
+"""``(2, K, 1)``: pixels down and to the right."""
+_STAY: Final = np.zeros((2, 1, 1), np.intp)
+_GROWTHS: Final = np.arange(-_GROWN, _GROWN + 1)
+_OFFSETS: Final = np.subtract.outer(np.arange(-_REACH, _REACH + 1), _GROWTHS)
+_NEARNESS: Final = 1 / (1 + (_OFFSETS / _HALF) ** 2)
+"""``(distances, growths)``: how near a point lies to an edge once its mask is grown so far."""
 
 
 class Misfit(StrEnum):
@@ -67,8 +78,6 @@ class Misfit(StrEnum):
     UPSIDE_DOWN = "upside down"
     INVERTED = "inverted"
     MOVED = "moved"
-    GROWN = "grown"
-    """Its edge lies farther out, or in, all around: the method's own way, and no finding."""
 
 
 @dataclass(frozen=True)
@@ -85,26 +94,30 @@ class Finding:
     """Pixels by which the subject is moved to the right and down. 0 unless it is moved."""
 
 
+_Points = tuple[Places, Places]
+"""``(n,)`` each: columns and rows."""
+
+
 @dataclass(frozen=True, eq=False)
-class _Edges:
-    """Points of a mask's edge."""
+class _Mask:
+    """The edge of a mask that is held against images and other masks."""
 
-    x: npt.NDArray[np.intp]
-    y: npt.NDArray[np.intp]
-    cosine: Floats
-    sine: Floats
-    """``(n,)`` each: of twice the angle of the edge's normal."""
-    inward: tuple[Floats, Floats]
-    """``(n,)`` each: the normal itself, right and down, of length 1; it points into the mask."""
+    x: Places
+    y: Places
+    right: Floats
+    down: Floats
+    """``(n,)`` each: points of the edge, and its normals, of length 1, which point inside."""
+    distances: Plane
+    """``(H, W)``: distance to the edge, `_REACH` at it, less inside, more outside."""
 
-    def every(self, step: int) -> _Edges:
-        """Return every so many of the points."""
-        right, down = self.inward
-        return _Edges(
-            *(self.x[::step], self.y[::step]),
-            *(self.cosine[::step], self.sine[::step]),
-            (right[::step], down[::step]),
-        )
+    def turned(self, way: int) -> _Mask:
+        """Return it with left and right exchanged where ``way`` is 1, or upside down where 0."""
+        x, y, right, down = self.x, self.y, self.right, self.down
+        if way:
+            x, right = self.distances.shape[1] - 1 - x, -right
+        else:
+            y, down = self.distances.shape[0] - 1 - y, -down
+        return _Mask(x, y, right, down, np.ascontiguousarray(np.flip(self.distances, way)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +129,28 @@ class _Slopes:
     usual: float
 
 
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A frame at a spot or near one."""
+
+    number: int
+    image: _Slopes
+    truth: _Points | None
+    computed: _Points | None
+    """Points of the edges of the truth, and of most masks that were computed here."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """How well a subject fits a frame, at each of some moves."""
+
+    image: Floats
+    """``(K,)``: agreement with the image's edges."""
+    other: Floats
+    """``(K, growths)``: nearness to the truth's edges, or, for the truth, to those of the masks
+    that were computed here; NaN without."""
+
+
 def _slopes(picture: Plane) -> _Slopes:
     import cv2
 
@@ -124,35 +159,64 @@ def _slopes(picture: Plane) -> _Slopes:
     return _Slopes(across, down, usual)
 
 
-def _edges(road: Plane, ignored: Plane | None) -> _Edges:
-    """Return points of the edge of an ``(H, W)`` mask of 0 and 255, away from what is ignored."""
+def _edge(road: Plane, ignored: Plane | None) -> Plane:
+    """Return the edge of an ``(H, W)`` mask, nonzero there, away from what is ignored."""
     import cv2
 
-    slopes = _slopes(road)
-    cross = np.ones((3, 3), np.uint8)
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     edge = cv2.morphologyEx(road, cv2.MORPH_GRADIENT, cross)
     if ignored is not None:
         edge[cv2.dilate(ignored, np.ones((7, 7), np.uint8)) > 0] = 0
-    inner = np.flatnonzero(edge[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN])
-    inner = inner[:: max(1, len(inner) // _POINTS)]
-    y, x = (place + _MARGIN for place in np.divmod(inner, road.shape[1] - 2 * _MARGIN))
+    return np.asarray(edge, np.uint8)
+
+
+def _points(edge: Plane) -> _Points:
+    """Return some points of an edge, away from the border."""
+    import cv2
+
+    inner = cv2.findNonZero(edge[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN])
+    if inner is None:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    some = inner.reshape(-1, 2)[:: max(1, len(inner) // _POINTS)]
+    x, y = some.T.astype(np.intp) + _MARGIN
+    return x, y
+
+
+def _mask(road: Plane, ignored: Plane | None) -> _Mask:
+    """Return the edge of an ``(H, W)`` mask of 0 and 255, away from what is ignored."""
+    import cv2
+
+    edge, slopes = _edge(road, ignored), _slopes(road)
+    x, y = _points(edge)
     across, down = (s[y, x].astype(np.float32) for s in (slopes.across, slopes.down))
     size = np.maximum(np.hypot(across, down), 1e-9)
-    right, below = across / size, down / size
-    return _Edges(x, y, right**2 - below**2, 2 * right * below, (right, below))
+    away = cv2.distanceTransform((edge == 0).astype(np.uint8), cv2.DIST_L2, 3)
+    away = np.asarray(np.minimum(away, _REACH) + 0.5, np.uint8)
+    distances = np.where(road > 0, _REACH - away, _REACH + away)
+    return _Mask(x, y, across / size, down / size, distances)
 
 
-def _agreement(
-    edges: _Edges, slopes: _Slopes, right: npt.NDArray[np.intp], below: npt.NDArray[np.intp]
-) -> Floats:
-    """Return how well edges lie on slopes once moved back by some steps, ``(K,)``, at most 1."""
-    width = slopes.across.shape[1]
-    place = edges.y * width + edges.x - (below * width + right)[:, None]
-    across, down = (s.ravel()[place].astype(np.float32) for s in (slopes.across, slopes.down))
-    size = np.hypot(across, down)
-    along = edges.cosine * (across**2 - down**2) + edges.sine * 2 * across * down
-    fit = along / np.maximum(size * (size + slopes.usual), 1e-9)
-    return np.asarray(fit.sum(1) / max(len(edges.x), 1), np.float64)
+def _fit(mask: _Mask, image: _Slopes, other: _Points | None, moves: npt.NDArray[np.intp]) -> _Fit:
+    """Return how well a mask fits an image and another mask's edge once moved back.
+
+    ``moves`` are ``(2, K, 1)``, or ``(2, K, n)`` where each point moves in a way of its own.
+    """
+    steps = moves[0] * mask.distances.shape[1] + moves[1]
+    place = mask.y * mask.distances.shape[1] + mask.x - steps
+    across, down = (s.ravel()[place].astype(np.float32) for s in (image.across, image.down))
+    # The cosine of twice the angle between normal and slope: 1 along it, -1 across.
+    size = across**2 + down**2
+    along = 2 * (mask.right * across + mask.down * down) ** 2 - size
+    agreement = along / np.maximum(size + image.usual * np.sqrt(size), 1e-9)
+    agreement = agreement.sum(axis=1, dtype=np.float64) / max(len(mask.x), 1)
+    if other is None:
+        return _Fit(agreement, np.full((len(place), len(_GROWTHS)), np.nan))
+    x, y = other
+    distances = mask.distances.ravel()[y * mask.distances.shape[1] + x + steps]
+    shape = len(place), len(_NEARNESS)
+    codes = distances + np.arange(shape[0])[:, None] * shape[1]
+    counts = np.bincount(codes.ravel(), minlength=shape[0] * shape[1]).reshape(shape)
+    return _Fit(agreement, counts @ _NEARNESS / max(len(x), 1))
 
 
 def _times(shape: tuple[int, ...]) -> int:
@@ -171,24 +235,6 @@ def _shrinking(shape: tuple[int, ...]) -> Callable[[Plane], Plane]:
     return lambda plane: np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The slopes of a frame that is near a spot."""
-
-    number: int
-    image: _Slopes
-    truth: _Slopes | None
-    computed: _Slopes | None
-    """Slopes of the mean of the masks that were computed from the image here."""
-
-
-_PLAIN: Final = (Misfit.LAG, 0, 0, 0)
-Hypothesis = tuple[Misfit, int, int, int]
-"""A misfit with frames, pixels to the right and pixels down, as in `Finding`."""
-_NONE: Final = np.zeros(1, np.intp)
-_MOVES: Final = np.mgrid[-_FAR : _FAR + 1, -_FAR : _FAR + 1].reshape(2, -1)
-
-
 class FitCheck:
     """Collects, frame by frame in the drive's order, how well truth and masks fit.
 
@@ -202,13 +248,14 @@ class FitCheck:
         self._stride = stride
         self._shape: tuple[int, ...] = ()
         """Shape of the first image; images of another size are not looked at."""
-        self._recent: deque[_Seen] = deque(maxlen=LAST_LAG)
-        self._open: list[tuple[int, int, dict[str, _Edges]]] = []
-        self._spots = 0
-        self._fits = defaultdict[str, dict[Hypothesis, dict[int, tuple[float, float]]]](dict)
-        """By subject, hypothesis and spot: agreement with the image, and with the truth."""
-        self._moved = defaultdict[str, dict[int, Floats]](dict)
-        """By subject and spot: the same of each of `_MOVES`, ``(2, K)``."""
+        self._recent: deque[_View] = deque(maxlen=LAST_LAG)
+        self._open: list[tuple[int, dict[str, _Mask]]] = []
+        """Frame and masks of the spots whose later neighbours are still to come."""
+        self._fits = defaultdict[Finding, dict[int, _Fit]](dict)
+        """By change and frame of a spot; a lag of 0 is no change."""
+        self._moves = defaultdict[str, list[tuple[_Fit, Floats]]](list)
+        """By subject, for each spot: the fit at each of `_MOVES`, and, where it stays, the
+        agreement with the image at each of `_GROWTHS`."""
         self._upside = defaultdict[str, list[float]](list)
         self._truth: Plane | None = None
         """Truth of the last spot, 255 for road."""
@@ -221,145 +268,99 @@ class FitCheck:
             return
         is_spot = frame.number >= self._due and (frame.truth is not None or frame.external)
         reach = LAST_LAG * self._stride
-        self._open = [spot for spot in self._open if frame.number - spot[1] <= reach]
+        self._open = [spot for spot in self._open if frame.number - spot[0] <= reach]
         is_near = self._due - frame.number <= reach
         if not (is_spot or self._open or is_near):
             return
-        seen = _look_at(frame, computed)
-        for place, number, edges in self._open:
-            self._hold(place, frame.number - number, edges, seen)
+        view = _view(frame, computed)
+        for number, masks in self._open:
+            self._note_lag(number, masks, view)
         if is_spot:
             self._due = frame.number + self._apart
-            edges = self._new_spot(frame, seen)
+            masks = self._new_spot(frame, view)
             for earlier in self._recent:
-                self._hold(self._spots, earlier.number - frame.number, edges, earlier)
-            self._open.append((self._spots, frame.number, edges))
-            self._spots += 1
-        self._recent.append(seen)
+                self._note_lag(frame.number, masks, earlier)
+            self._open.append((frame.number, masks))
+        self._recent.append(view)
 
-    def _new_spot(self, frame: Frame, seen: _Seen) -> dict[str, _Edges]:
-        """Note what a spot's subjects fit without a neighbour; return their edges."""
+    def _new_spot(self, frame: Frame, view: _View) -> dict[str, _Mask]:
+        """Note how a spot's subjects fit its own frame; return them."""
         shrunk = _shrinking(frame.image.shape)
         subjects = {name: mask * np.uint8(255) for name, mask in frame.external.items()}
-        ignored = None
         if frame.truth is not None:
-            ignored = shrunk((frame.truth == IGNORE).astype(np.uint8))
-            subjects[TRUTH] = (frame.truth == ROAD).astype(np.uint8) * np.uint8(255)
-        road = subjects.get(TRUTH)
-        if road is not None and self._truth is not None and road.shape == self._truth.shape:
-            self._changes.append(float(np.mean(road != self._truth)))
-        self._truth = self._truth if road is None else road
-        edges = {}
-        for name, mask in subjects.items():
-            if mask.shape != frame.image.shape[:2]:
+            subjects[TRUTH] = _road(frame.truth)
+            if self._truth is not None and frame.truth.shape == self._truth.shape:
+                self._changes.append(float(np.mean(subjects[TRUTH] != self._truth)))
+            self._truth = subjects[TRUTH]
+        masks = {}
+        for name, full in subjects.items():
+            if full.shape != frame.image.shape[:2]:
                 continue
-            road = shrunk(mask)
-            self._upside[name].append(_share_above(road, ignored if name == TRUTH else None))
-            own = edges[name] = _edges(road, ignored if name == TRUTH else None)
-            height, width = road.shape
-            mirrored = replace(own, x=width - 1 - own.x, sine=-own.sine)
-            flipped = replace(own, y=height - 1 - own.y, sine=-own.sine)
-            self._note(name, _PLAIN, own, seen)
-            self._note(name, (Misfit.MIRRORED, 0, 0, 0), mirrored, seen)
-            self._note(name, (Misfit.UPSIDE_DOWN, 0, 0, 0), flipped, seen)
-            if name != TRUTH and seen.truth is not None:
-                down, right = _MOVES
-                few = own.every(_FEWER)
-                moved = [_agreement(few, s, right, down) for s in (seen.image, seen.truth)]
-                self._moved[name][self._spots] = np.array(moved)
-                for pixels in filter(None, range(-_GROWN, _GROWN + 1)):
-                    x, y = (
-                        place - np.rint(pixels * way).astype(np.intp)
-                        for place, way in zip((own.x, own.y), own.inward, strict=True)
-                    )
-                    key = (Misfit.GROWN, 0, pixels, 0)
-                    self._note(name, key, replace(own, x=x, y=y), seen)
-        return edges
+            road, ignored = shrunk(full), None
+            if name == TRUTH and frame.truth is not None:
+                ignored = shrunk((frame.truth == IGNORE).astype(np.uint8))
+            self._upside[name].append(_share_above(road, ignored))
+            mask = masks[name] = _mask(road, ignored)
+            self._note(frame.number, Finding(name, Misfit.LAG), mask, view)
+            self._note(frame.number, Finding(name, Misfit.MIRRORED), mask.turned(1), view)
+            self._note(frame.number, Finding(name, Misfit.UPSIDE_DOWN), mask.turned(0), view)
+            if name != TRUTH and view.truth is not None:
+                fit = _fit(mask, view.image, view.truth, _MOVES)
+                normals = np.array([mask.down, mask.right])[:, None]
+                outward = np.rint(_GROWTHS[:, None] * normals).astype(np.intp)
+                self._moves[name].append((fit, _fit(mask, view.image, None, outward).image))
+        return masks
 
-    def _hold(self, place: int, later: int, edges: dict[str, _Edges], seen: _Seen) -> None:
-        """Hold a spot's subjects against a frame that is ``later`` by so many numbers."""
-        steps, rest = divmod(later, self._stride)
+    def _note_lag(self, spot: int, masks: dict[str, _Mask], view: _View) -> None:
+        """Note how a spot's subjects fit a frame before or after it."""
+        steps, rest = divmod(spot - view.number, self._stride)
         if not rest and 0 < abs(steps) <= LAST_LAG:
-            for name, own in edges.items():
-                self._note(name, (Misfit.LAG, -steps, 0, 0), own, seen, place)
+            for name, mask in masks.items():
+                self._note(spot, Finding(name, Misfit.LAG, frames=steps), mask, view)
 
-    def _note(
-        self, name: str, key: Hypothesis, edges: _Edges, seen: _Seen, place: int | None = None
-    ) -> None:
-        image, other = (
-            math.nan if slopes is None else float(_agreement(edges, slopes, _NONE, _NONE)[0])
-            for slopes in (seen.image, seen.computed if name == TRUTH else seen.truth)
-        )
-        spot = self._spots if place is None else place
-        self._fits[name].setdefault(key, {})[spot] = image, other
+    def _note(self, spot: int, change: Finding, mask: _Mask, view: _View) -> None:
+        other = view.computed if change.subject == TRUTH else view.truth
+        self._fits[change][spot] = _fit(mask, view.image, other, _STAY)
 
     def findings(self) -> Iterator[Finding]:
         """Yield what does not fit, the truth first."""
         truth = self._finding(TRUTH, alone=False)
         if truth is not None:
             yield truth
-        for name in self._fits:
-            if name != TRUTH and (found := self._finding(name, alone=truth is not None)):
-                yield found
+        for name in self._upside:
+            if name != TRUTH and (finding := self._finding(name, alone=truth is not None)):
+                yield finding
 
     def _finding(self, name: str, *, alone: bool) -> Finding | None:
         """Return what is sure about a subject, by the images ``alone`` or by the truth as well."""
-        fits = self._fits.get(name, {})
-        if len(fits.get(_PLAIN, ())) < _LEAST:
+        plain = Finding(name, Misfit.LAG)
+        if len(self._fits[plain]) < _LEAST:
             return None
-        moved = self._moved[name]
-        if len(moved) >= _LEAST and not alone and np.mean(self._changes) > _STILL:
-            place = int(sum(moved.values(), np.zeros((2, 1))).sum(0).argmax())
-            down, right = _MOVES[:, place].tolist()
-            fits[Misfit.MOVED, 0, right, down] = {n: (*v[:, place],) for n, v in moved.items()}
-        gains: dict[Hypothesis, _Gain] = {}
-        for each in fits:
-            # Masks that were computed here may have learnt that the truth is mirrored, but not
-            # that it is late.
-            images_only = alone or (name == TRUTH and each[0] is not Misfit.LAG)
-            if each != _PLAIN:
-                gain = self._gain(name, each, images_only=images_only)
-                gains |= {each: gain} if gain else {}
-        key = max(
-            (each for each in gains if each[0] is not Misfit.GROWN),
-            key=lambda each: gains[each].mean,
-            default=_PLAIN,
-        )
-        misfit, frames, right, down = key
-        is_sure = key != _PLAIN and gains[key].errors > _SURE and gains[key].share > _MUCH
-        if misfit is Misfit.MOVED:
-            # A move must fit better than an edge that lies farther out, or in, all around.
-            ways = [each for each in gains if each[0] is Misfit.GROWN]
-            way = max(ways, key=lambda each: gains[each].mean, default=_PLAIN)
-            better = self._gain(name, key, way)
-            is_near = math.hypot(right, down) <= _NEAR
-            is_sure = is_sure and not is_near and better is not None and better.errors > _RATHER
-        if is_sure:
-            times = _times(self._shape)
-            return Finding(name, misfit, frames * self._stride, right * times, down * times)
+        changes = [change for change in self._fits if change.subject == name and change != plain]
+        # Masks that were computed here may have learnt that the truth is mirrored, but not
+        # that it is late.
+        gains = {
+            change: _gain(
+                self._fits[plain],
+                self._fits[change],
+                images_only=alone or (name == TRUTH and change.misfit is not Misfit.LAG),
+            )
+            for change in changes
+        }
+        if len(self._moves[name]) >= _LEAST and not alone and np.mean(self._changes) > _STILL:
+            gains |= dict([_best_move(name, self._moves[name])])
+        change = max(gains, key=lambda change: gains[change].mean, default=plain)
+        is_off = change.misfit is not Misfit.MOVED or math.hypot(change.right, change.down) >= _NEAR
+        if is_off and gains[change].errors > _SURE and gains[change].share > _MUCH:
+            return replace(
+                change,
+                frames=change.frames * self._stride,
+                right=change.right * _times(self._shape),
+                down=change.down * _times(self._shape),
+            )
         if np.nanmean(self._upside[name]) > _UPSIDE:
             return Finding(name, Misfit.INVERTED)
         return None
-
-    def _gain(
-        self,
-        name: str,
-        key: Hypothesis,
-        base: Hypothesis = _PLAIN,
-        *,
-        images_only: bool = False,
-    ) -> _Gain | None:
-        """Return how much better a hypothesis fits than another; None where few spots tell."""
-        values, before = self._fits[name][key], self._fits[name][base]
-        spots = [spot for spot in values if spot in before]
-        if len(spots) < _LEAST:
-            return None
-        columns = slice(0, 1 if images_only else 2)
-        ours, theirs = (np.array([v[spot] for spot in spots])[:, columns] for v in (values, before))
-        gain = np.nansum(ours - theirs, axis=1)
-        error = max(float(gain.std(ddof=1)) / math.sqrt(len(gain)), 1e-9)
-        fit = max(float(np.nansum(theirs + 0 * ours, axis=1).mean()), 0.02)
-        return _Gain(mean := float(gain.mean()), mean / error, mean / fit)
 
 
 @dataclass(frozen=True)
@@ -370,20 +371,82 @@ class _Gain:
     errors: float
     share: float
 
+    @classmethod
+    def of(cls, before: Floats, after: Floats) -> _Gain:
+        """Return the gain from fits of each spot, ``(spots,)``, to those after a change."""
+        gain = after - before
+        mean = float(gain.mean())
+        error = max(float(gain.std(ddof=1)) / math.sqrt(len(gain)), 1e-9)
+        return cls(mean, mean / error, mean / max(float(before.mean()), 0.02))
 
-def _look_at(frame: Frame, computed: Sequence[Packed]) -> _Seen:
+
+def _gain(plain: dict[int, _Fit], changed: dict[int, _Fit], *, images_only: bool) -> _Gain:
+    """Return how much better a change fits than the plain pairing; 0 where few spots tell."""
+    spots = [spot for spot in changed if spot in plain]
+    if len(spots) < _LEAST:
+        return _Gain(0, 0, 0)
+    before, after = (np.array([fits[spot].image[0] for spot in spots]) for fits in (plain, changed))
+    if not images_only:
+        near = np.array([[fits[spot].other[0] for spot in spots] for fits in (plain, changed)])
+        near[:, np.isnan(near).any(axis=(0, 2))] = 0
+        # How far a method's edges lie out or in is its way, before and after the change.
+        before, after = (
+            agreement + nearness[:, nearness.mean(axis=0).argmax()]
+            for agreement, nearness in zip((before, after), near, strict=True)
+        )
+    return _Gain.of(before, after)
+
+
+def _best_move(name: str, spots: Sequence[tuple[_Fit, Floats]]) -> tuple[Finding, _Gain]:
+    """Return the move that fits best, and its gain over edges that lie out or in all around.
+
+    Of so many moves one always fits better by chance. So the gain at every other spot is that of
+    the move that fits best at the rest.
+    """
+    agreement = np.array([fit.image for fit, _ in spots])
+    nearness = np.array([fit.other for fit, _ in spots])
+
+    def best(among: npt.NDArray[np.bool_]) -> tuple[int, int]:
+        near = nearness[among].mean(axis=0)
+        move = int((agreement[among].mean(axis=0) + near.max(axis=1)).argmax())
+        return move, int(near[move].argmax())
+
+    still = np.array([grown for _, grown in spots]) + nearness[:, len(_MOVES[0]) // 2]
+    after = np.zeros(len(spots))
+    for judged in (np.arange(len(spots)) % 2 == part for part in (0, 1)):
+        move, growth = best(~judged)
+        after[judged] = (agreement[:, move] + nearness[:, move, growth])[judged]
+    gain = _Gain.of(still[:, still.mean(axis=0).argmax()], after)
+    place = best(np.ones(len(spots), bool))[0]
+    down, right = _MOVES[:, place, 0].tolist()
+    # The slanted sides of a road that is grown lie as if it were moved up. Where another move and
+    # growth fit a clear outline as well, or perhaps moves farther off, nothing is sure.
+    near = nearness.mean(axis=0).max(axis=1)
+    others = near[np.hypot(_MOVES[0] - down, _MOVES[1] - right)[:, 0] >= _NEAR]
+    is_alike = others.max() > _ALIKE * near[place] or max(abs(right), abs(down)) == _FAR
+    if near.max() > _CLEAR and is_alike:
+        gain = replace(gain, errors=0.0)
+    return Finding(name, Misfit.MOVED, right=right, down=down), gain
+
+
+def _road(truth: Plane) -> Plane:
+    return (truth == ROAD).astype(np.uint8) * np.uint8(255)
+
+
+def _view(frame: Frame, computed: Sequence[Packed]) -> _View:
     import cv2
 
     shrunk = _shrinking(frame.image.shape)
     image = _slopes(shrunk(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)))
-    truth = None
+    truth = most = None
     if frame.truth is not None and frame.external:
-        truth = _slopes(shrunk((frame.truth == ROAD).astype(np.uint8) * np.uint8(255)))
-    mean = None
+        ignored = shrunk((frame.truth == IGNORE).astype(np.uint8))
+        truth = _points(_edge(shrunk(_road(frame.truth)), ignored))
     masks = [mask.pixels() for mask in computed if mask.shape == frame.image.shape[:2]]
     if masks and frame.truth is not None:
-        mean = _slopes(shrunk(sum(masks, np.zeros_like(masks[0])) * np.uint8(255 // len(masks))))
-    return _Seen(frame.number, image, truth, mean)
+        share = shrunk(sum(masks, np.zeros_like(masks[0])) * np.uint8(255 // len(masks)))
+        most = _points(_edge((share > 127).astype(np.uint8), None))
+    return _View(frame.number, image, truth, most)
 
 
 def _share_above(road: Plane, ignored: Plane | None) -> float:
