@@ -178,8 +178,9 @@ def misfits_of_truth(log: Log) -> Iterator[str]:
     selection = log.select()
     numbers = selection.among_truth(log.frames(selection).numbers)
     places = np.linspace(0, len(numbers) - 1, FEW, dtype=int).tolist()
-    near = {each for place in places for each in _around(numbers[place], log.config.frames.every)}
-    fit = FitCheck(numbers, log.config.frames.every, FEW)
+    every = log.config.frames.every
+    near = {number for place in places for number in _around(numbers[place], every)}
+    fit = FitCheck(numbers, every, FEW)
     for logged in log.frames(selection, near):
         with suppress(FrameError):
             fit.add(logged.decode())
