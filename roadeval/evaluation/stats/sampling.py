@@ -17,10 +17,6 @@ from roadeval.data.arrays import Floats, Sums
 
 REGRESSION_FROM: Final = 8
 """So many labels it takes to learn how a rate goes with the frames' score."""
-FINER: Final = 4
-"""Each frame has at least two to the power of so many less one points of the order's ring."""
-LEAST_LEFT: Final = 0.05
-"""One minus the leverage of a frame is at least this."""
 FAR: Final = 2.0
 """Scores that lie so many interquartile ranges above the upper quartile are those of bursts. With
 3 the interval held in 74 % of draws where the score of a burst is twice that of other frames, with
@@ -63,7 +59,8 @@ def draw_order(count: int, seed: int) -> Sums:
     .. [1] A. B. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995.
     """
     rng = np.random.default_rng(seed)
-    levels = max(count - 1, 1).bit_length() + FINER
+    # So fine that a frame has at least 15 points of the ring.
+    levels = max(count - 1, 1).bit_length() + 4
     cells = np.arange(2**levels)
     rank = np.zeros(2**levels, np.int64)
     for level in range(levels):
@@ -106,7 +103,10 @@ def estimate(
     .. [1] W. G. Cochran, Sampling Techniques, 3rd edition, 1977.
     .. [2] K. M. Wolter, Introduction to Variance Estimation, 2nd edition, 2007.
     """
+    from scipy.special import stdtrit
+
     labels, frames = len(values), len(every_score)
+    share = labels / frames
     mean, centred = float(values.mean()), scores - scores.mean()
     spread, fitted = float(centred @ centred), 1
     residuals = values - mean
@@ -119,47 +119,27 @@ def estimate(
             mean, fitted = moved, 2
             residuals = residuals - slope * centred
             weights = 1 + labels * off * centred / spread
-            left = np.maximum(left - centred**2 / spread, LEAST_LEFT)
-    share = labels / frames
-    if labels <= 1:
+            left = np.maximum(left - centred**2 / spread, 0.05)
+    error = 0.0
+    if labels > 1:
+        parts = weights * residuals / left
+        along = float((np.diff(parts) ** 2).sum()) / (2 * (labels - 1))
+        simple = float(parts @ parts) / labels
+        error = math.sqrt((1 - share) * (along + share * simple) / labels)
+    if labels <= 1 or (not error and share < 1):
         return Estimate(mean, None, None, confidence, labels, frames, None)
-    parts = weights * residuals / left
-    along = float((np.diff(parts) ** 2).sum()) / (2 * (labels - 1))
-    simple = float(parts @ parts) / labels
-    error = math.sqrt((1 - share) * (along + share * simple) / labels)
-    if not error and share < 1:
-        return Estimate(mean, None, None, confidence, labels, frames, None)
-    reach = _student(confidence, labels - fitted) * error / mean if mean else 0.0
-    low, high = mean * math.exp(-reach), min(mean * math.exp(min(reach, 700.0)), 1.0)
-    more, unseen = _to_halve(labels, frames, fitted, confidence), _unseen(scores, every_score)
-    seen = 1 - unseen / frames
-    low, high = low * seen, high * seen + 1 - seen
-    return Estimate(mean, low, high, confidence, labels, frames, more, unseen)
-
-
-def _unseen(scores: Floats, every_score: Floats) -> int:
-    """Return how many frames are far more in doubt than the rest, if none of them was drawn.
-
-    A single one is no burst.
-    """
-    lower, upper = np.quantile(every_score, (0.25, 0.75))
-    far = upper + FAR * (upper - lower)
-    beyond = int(np.count_nonzero(every_score > far))
-    return 0 if beyond < 2 or (scores > far).any() else beyond
-
-
-def _student(confidence: float, freedom: int) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, (1 + confidence) / 2))
-
-
-def _to_halve(labels: int, frames: int, fitted: int, confidence: float) -> int | None:
-    """Return how many more labels would halve an interval, if the frames are as those seen."""
     counts = np.arange(labels, frames + 1)
-    from scipy.special import stdtrit
-
     quantiles = stdtrit(counts - fitted, (1 + confidence) / 2)
     widths = quantiles * np.sqrt(1 / counts - 1 / frames)
     halved = np.flatnonzero(widths <= widths[0] / 2)
-    return int(halved[0]) if len(halved) and halved[0] else None
+    more = int(halved[0]) if len(halved) and halved[0] else None
+    reach = float(quantiles[0]) * error / mean if mean else 0.0
+    low, high = mean * math.exp(-reach), min(mean * math.exp(min(reach, 700.0)), 1.0)
+    lower, upper = np.quantile(every_score, (0.25, 0.75))
+    far = upper + FAR * (upper - lower)
+    unseen = int(np.count_nonzero(every_score > far))
+    if unseen < 2 or (scores > far).any():  # A single one is no burst.
+        unseen = 0
+    seen = 1 - unseen / frames
+    low, high = low * seen, high * seen + 1 - seen
+    return Estimate(mean, low, high, confidence, labels, frames, more, unseen)
