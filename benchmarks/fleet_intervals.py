@@ -1,7 +1,7 @@
 """How often a fleet's intervals hold, and what they find: ``python -m benchmarks.fleet_intervals``.
 
-Fleets are made up, so that the truth is known, and given to the function that `roadeval` uses. The
-table is that of INTERVALS.md.
+Fleets are made up, so that the truth is known, and given to the function that `roadeval` uses.
+``--write`` puts the table into INTERVALS.md.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from benchmarks.intervals import show
 from roadeval.evaluation.stats import DriveMean, group_means, over_drives
 
 Values = npt.NDArray[np.float64]
@@ -83,72 +84,42 @@ def _effects(
     return (shared + draw(rng, len(group))) / math.sqrt(2)
 
 
-# --- Another interval, for comparison -------------------------------------------------------------
-
-
-def student(means: Values) -> tuple[float, float]:
-    """Return Student's interval of the mean of groups' means."""
-    half = special.stdtrit(len(means) - 1, 1 - TAIL) * means.std(ddof=1) / math.sqrt(len(means))
-    return means.mean() - half, means.mean() + half
-
-
-# --- Tables ---------------------------------------------------------------------------------------
-
-WIDTHS: Final = {"t": 3, "ours": 4, "at .5": 5, "at 1": 4, "width": 5}
-"""The columns, and how many characters they have. "at" is how often a true mean is found; the rest,
-but for the width, how often an interval holds, all in percent."""
+# --- The table ------------------------------------------------------------------------------------
 
 
 def judged(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[float]:
-    """Make a fleet, and return what the columns are the averages of."""
+    """Make a fleet: whether Student's interval and ours hold, what ours finds, and its width."""
     effects = fleet(rng, draw, layout, groups)
-    found = over_drives(effects, CONFIDENCE)
-    low, high = found.low / SCALE, found.high / SCALE
-    shares = [
-        _holds(student(group_means(effects)), 0),
-        _holds((low, high), 0),
-        # An effect that is there moves the fleet; here 0 moves instead.
-        *(1 - _holds((low, high), -effect) for effect in POWER),
-    ]
-    return [*(100 * share for share in shares), high - low]
-
-
-def _holds(ends: tuple[float, float], value: float) -> float:
-    return float(ends[0] <= value <= ends[1])
+    means, ours = group_means(effects) / SCALE, over_drives(effects, CONFIDENCE)
+    half = special.stdtrit(groups - 1, 1 - TAIL) * means.std(ddof=1) / math.sqrt(groups)
+    low, high = ours.low / SCALE, ours.high / SCALE
+    # An effect that is there moves the fleet; here 0 moves instead.
+    found = [100.0 * (not low <= -effect <= high) for effect in POWER]
+    return [100.0 * (abs(means.mean()) <= half), 100.0 * (low <= 0 <= high), *found, high - low]
 
 
 def rows(repetitions: int) -> Iterator[str]:
     """Yield the lines of the table."""
-    rule = f"{'=' * 6}  {'=' * 16}  ===" + "".join(f" {'=' * width}" for width in WIDTHS.values())
-    names = "".join(f" {name:>{width}}" for name, width in WIDTHS.items())
-    yield rule
-    yield f"{'effect':6}  {'drives':16}  {'n':>3}{names}"
-    yield rule
+    names = ["effect", "drives", "n", "Student's", "ours", *(f"at {at}" for at in POWER), "width"]
+    yield f"| {' | '.join(names)} |"
+    yield f"|---|---|{'--:|' * (len(names) - 2)}"
     for kind, (name, draw) in enumerate(EFFECTS.items()):
         for place, layout in enumerate(LAYOUTS):
             for groups in GROUPS:
                 rng = np.random.default_rng([kind, place, groups])
                 results = [judged(rng, draw, layout, groups) for _ in range(repetitions)]
-                yield f"{name:6}  {layout.name:16}  {groups:3}{_cells(np.array(results))}"
-    yield rule
-
-
-def _cells(results: Values) -> str:
-    """Return the columns' averages, and the width's median."""
-    shown = []
-    for (name, width), values in zip(WIDTHS.items(), results.T, strict=True):
-        value = np.median(values) if name == "width" else values.mean()
-        shown.append(f" {value:{width}.{2 if name == 'width' else 0}f}")
-    return "".join(shown)
+                *shares, widths = np.array(results).T
+                cells = "".join(f" {share.mean():.0f} |" for share in shares)
+                yield f"| {name} | {layout.name} | {groups} |{cells} {np.median(widths):.2f} |"
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--repetitions", type=int, default=1000, help="fleets a line")
+    parser.add_argument("--write", action="store_true", help="into INTERVALS.md, too")
     options = parser.parse_args()
-    for line in rows(options.repetitions):
-        print(line, flush=True)
+    show("fleets", rows(options.repetitions), write=options.write)
 
 
 if __name__ == "__main__":
