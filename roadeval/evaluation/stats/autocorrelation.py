@@ -10,8 +10,9 @@ Skewed series bend the distribution [2]_: a drive that met few bursts has a mean
 *and* a spread that is too small.
 
 How often the intervals hold, beside those of textbooks, is in ``benchmarks/INTERVALS.md``. Drift
-that noise hides on a short drive, or that takes longer than the drive, is not allowed for: three or
-four of five intervals hold there rather than nineteen of twenty.
+that noise hides on a short drive, or that takes longer than the drive, and bursts that a drive
+hardly met are not allowed for: there three or four of five hold rather than nineteen of twenty, and
+p-values are too small.
 
 References
 ----------
