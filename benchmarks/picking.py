@@ -83,7 +83,7 @@ def of_idd(folder: Path) -> Drive:
     found = []
     for frame in (frame for drive in scored.values() for frame in drive):
         assert frame.truth is not None
-        outputs = [output for _, output in chain.run(View.of(frame.image))]
+        outputs = [result.output for result in chain.run(View.of(frame.image))]
         codes = next(each.probability for each in outputs if each.probability is not None)
         mask = outputs[-1].mask.pixels()
         if (known := frame.truth != IGNORE).any():

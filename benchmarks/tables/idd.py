@@ -193,8 +193,8 @@ def score(config: RunConfig, seed: int, train: Drives, test: Drives) -> Counted:
 
 def last(chain: Chain, frame: Frame) -> NDArray[np.uint8]:
     """Return the chain's final mask."""
-    *_, (_, output) = chain.run(View.of(frame.image))
-    return output.mask.pixels()
+    *_, final = chain.run(View.of(frame.image))
+    return final.output.mask.pixels()
 
 
 def err(total: Counted) -> Any:

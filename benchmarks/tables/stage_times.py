@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from statistics import median
-from time import perf_counter
 from typing import Any, Final
 
 from benchmarks.world import RenderSettings
@@ -47,9 +46,4 @@ def _best(chain: Chain, frame: Frame) -> dict[str, float]:
 
 def _stages(chain: Chain, frame: Frame) -> dict[str, float]:
     """Return the seconds of each stage on a frame."""
-    found = {}
-    begin = perf_counter()
-    for name, _ in chain.run(View.of(frame.image)):
-        found[name] = perf_counter() - begin
-        begin = perf_counter()
-    return found
+    return {result.stage: result.seconds for result in chain.run(View.of(frame.image))}

@@ -40,7 +40,7 @@ def found_on(drive: list[SynthFrame], preset: str, stage: str) -> dict[str, floa
     chain = config.pipeline.bind(model.parameters["it"])
     totals = np.zeros(5)
     for frame in drive[TRAINING:]:
-        output = dict(chain.run(View.of(frame.image)))[stage]
+        output = next(r.output for r in chain.run(View.of(frame.image)) if r.stage == stage)
         shadow = output.regions["shadow"].pixels() > 0
         true, road = frame.shadow > 0, frame.road == ROAD
         sets = (shadow & true, shadow, true, shadow & true & road, true & road)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from time import perf_counter
 from typing import Any
 
-from roadeval.data import LayerSpec, Output, Packed, Truth
+from roadeval.data import LayerSpec, Output, Packed, StageResult, Truth
 from roadeval.pipeline.stage import Stage, View
 from roadeval.pipeline.stages import stages_of
 
@@ -121,15 +122,28 @@ class Chain:
 
     steps: tuple[Step, ...]
 
-    def run(self, view: View) -> Iterator[tuple[str, Output]]:
-        """Yield each stage's name and output on what is seen before the first.
+    def run(
+        self, view: View, shared: dict[Any, StageResult] | None = None
+    ) -> Iterator[StageResult]:
+        """Yield what each stage makes of what is seen before the first, and how long it took.
 
-        A stage runs when it is asked for, so that a caller can time it.
+        A stage runs when its result is taken. ``shared`` holds what the chains of a frame have in
+        common: the first stage that makes a mask and has learnt nothing, as a network that is a
+        variant and is tuned in another. It runs once.
         """
+        shared, seen = {} if shared is None else shared, view
         for step in self.steps:
-            output = step.run(view)
-            view = view.after(output)
-            yield step.stage.name, output
+            key = step.stage.name, step.settings
+            is_shared = seen is view and step.stage.yields_mask and step.stage.fit is None
+            result = shared.get(key) if is_shared else None
+            if result is None:
+                start = perf_counter()
+                output = step.run(seen)
+                result = StageResult(step.stage.name, output, perf_counter() - start)
+            if is_shared:
+                shared[key] = result
+            yield result
+            seen = seen.after(result.output)
 
     def oracles(
         self, view: View, outputs: Sequence[Output], road: Truth, shadow: Truth | None
@@ -140,17 +154,11 @@ class Chain:
         the truths, ``(H, W)`` uint8 (0, 1, 255); without that of shadow no filter is replaced.
         Yielded are the name of the stage that was replaced, and the masks of those after it.
         """
-        for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
+        for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True), 1):
             truth = shadow if step.stage.is_filter else road
             if (oracle := step.stage.oracle) is not None and truth is not None:
                 seen = view.after(oracle(step.settings, step.parameters, view, truth))
-                yield step.stage.name, dict(_masks(self.steps[place + 1 :], seen))
+                later = Chain(self.steps[place:]).run(seen)
+                masks = ((result.stage, result.output.mask) for result in later)
+                yield step.stage.name, {name: mask for name, mask in masks if mask is not None}
             view = view.after(output)
-
-
-def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:
-    for step in steps:
-        output = step.run(view)
-        view = view.after(output)
-        if output.mask is not None:
-            yield step.stage.name, output.mask

@@ -20,7 +20,7 @@ def chains(request):
 
 
 def arrays(chain, image):
-    outputs = [output for _, output in chain.run(View.of(image))]
+    outputs = [result.output for result in chain.run(View.of(image))]
     layers = [(layer.spec.name, layer.array) for o in outputs for layer in o.layers]
     regions = [(name, mask.pixels()) for o in outputs for name, mask in o.regions.items()]
     return layers + regions
@@ -46,7 +46,7 @@ def test_layers_are_the_ones_announced_in_shape_and_type(chains):
     image = noise(30, 40)
     for names, chain in zip((NAMES, NAMES[1:]), chains, strict=True):
         settings = {step.stage.name: step.settings for step in chain.steps}
-        layers = [layer for _, output in chain.run(View.of(image)) for layer in output.layers]
+        layers = [layer for each in chain.run(View.of(image)) for layer in each.output.layers]
         assert tuple(layer.spec for layer in layers) == Pipeline(names, settings).layers()
         for layer in layers:
             assert layer.array.shape[:2] == image.shape[:2]
@@ -57,10 +57,10 @@ def test_layers_are_the_ones_announced_in_shape_and_type(chains):
 
 
 def test_a_stages_mask_is_the_layer_of_its_name(chains):
-    for name, output in chains[0].run(View.of(noise(30, 40))):
-        if output.mask is not None:
-            layers = {layer.spec.name: layer.array for layer in output.layers}
-            np.testing.assert_array_equal(layers[name], output.mask.pixels())
+    for result in chains[0].run(View.of(noise(30, 40))):
+        if (mask := result.output.mask) is not None:
+            layers = {layer.spec.name: layer.array for layer in result.output.layers}
+            np.testing.assert_array_equal(layers[result.stage], mask.pixels())
 
 
 @pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)

@@ -102,8 +102,8 @@ def test_every_layer_equals_the_plain_pipeline(drive, preset, filtered):
         expected = reference.layers(images[number], model, filtered=filtered, printed=printed)
         layers = {
             layer.spec.name: layer.array
-            for _, output in chain.run(View.of(images[number]))
-            for layer in output.layers
+            for result in chain.run(View.of(images[number]))
+            for layer in result.output.layers
         }
         assert list(layers) == list(expected)
         for name, array in layers.items():

@@ -30,15 +30,15 @@ def assert_same(found, expected, name=""):
 
 
 def oracles(chain, shadow_truth=TRULY_DARK):
-    outputs = [output for _, output in chain.run(SEEN)]
+    outputs = [result.output for result in chain.run(SEEN)]
     return dict(chain.oracles(SEEN, outputs, ROAD, shadow_truth))
 
 
 def masks(steps_of, image):
     return {
-        name: output.mask
-        for name, output in steps_of.run(View.of(image))
-        if output.mask is not None
+        result.stage: result.output.mask
+        for result in steps_of.run(View.of(image))
+        if result.output.mask is not None
     }
 
 
@@ -64,7 +64,7 @@ def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
 
 
 def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
-    outputs = [output for _, output in chain.run(SEEN)]
+    outputs = [result.output for result in chain.run(SEEN)]
     told = dict(chain.oracles(SEEN, outputs, ROAD, outputs[0].regions["shadow"].pixels()))
     for name, mask in masks(chain, IMAGE).items():
         assert_same(told["shadow"][name], mask, name)
@@ -75,7 +75,7 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     settings = {step.stage.name: step.settings for step in chain.steps}
     settings["exposure"] = STAGES["exposure"].settings()
     longer = chain_of(names, settings)
-    outputs = [output for _, output in longer.run(SEEN)]
+    outputs = [result.output for result in longer.run(SEEN)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
     told = dict(longer.oracles(SEEN, outputs, ROAD, outputs[1].regions["shadow"].pixels()))

@@ -18,7 +18,7 @@ def test_a_fitted_variant_finds_the_road_in_a_new_frame():
     model = fit(FRAMES, {"unfiltered": pipeline}, TrainingSettings())
     chain = pipeline.bind(model.parameters["unfiltered"])
     fresh = frame(9)
-    masks = {name: output.mask.pixels() for name, output in chain.run(View.of(fresh.image))}
+    masks = {each.stage: each.output.mask.pixels() for each in chain.run(View.of(fresh.image))}
     for name in ("similarity", "svm", "post"):
         wrong = (masks[name] != fresh.truth).mean()
         assert wrong < 0.06, name

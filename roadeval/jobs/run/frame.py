@@ -1,9 +1,8 @@
-"""Running chains on frames, stage by stage, with a clock."""
+"""A frame through the variants of a run: computed, or as another system has made their masks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from time import perf_counter
 from typing import Any, Final
 
 from roadeval.config.run import RunConfig
@@ -46,33 +45,14 @@ def run_variant(
     shadow_truth: Truth | None = None,
     known: dict[Any, Any] | None = None,
 ) -> VariantResult:
-    """Run a chain on a frame and time each of its stages.
+    """Run a chain on a frame, and given the truth also with each stage replaced by its oracle.
 
-    Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
-    ``known`` is what the frame's variants share: the first stage of chains that makes a mask and
-    has learnt nothing, as a network that is tuned besides.
+    ``known`` is what the frame's variants share, see `Chain.run`.
     """
-    shared = {} if known is None else known
-    results, seen = [], view
-    for step in chain.steps:
-        # A network that is one variant, and tuned in another, runs once.
-        stage, found = step.stage, None
-        is_shared = seen is view and stage.yields_mask and stage.fit is None
-        if is_shared:
-            found = shared.get((stage.name, step.settings))
-        if found is None:
-            start = perf_counter()
-            output = step.run(seen)
-            found = StageResult(stage.name, output, perf_counter() - start)
-        if is_shared:
-            shared[stage.name, step.settings] = found
-        results.append(found)
-        seen = seen.after(found.output)
-    if truth is None:
-        return VariantResult(name, tuple(results))
-    outputs = [each.output for each in results]
-    oracles = dict(chain.oracles(view, outputs, truth, shadow_truth))
-    return VariantResult(name, tuple(results), oracles)
+    results = tuple(chain.run(view, known))
+    outputs = [result.output for result in results]
+    told = () if truth is None else chain.oracles(view, outputs, truth, shadow_truth)
+    return VariantResult(name, results, dict(told))
 
 
 def external_layout(name: str, where: str, *, probable: bool = False) -> VariantLayout:
