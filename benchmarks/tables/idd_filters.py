@@ -23,7 +23,7 @@ SEEDS: Final = 3
 FLAT: Final = 0.03
 """A frame is flat if less than this share of its road is dark."""
 ODDS: Final = (0.1, 1.0)
-"""Factors of the odds, see `roadeval.pipeline.beyond.shade_candidates.GatedSettings`."""
+"""Factors of the odds, see `roadeval.pipeline.beyond.gated.GatedSettings`."""
 CHAINS: Final[Mapping[str, Mapping[str, Any]]] = {
     "colours": {"preset": "gated", "chain": idd.FILTER_ALONE},
     "robust": {

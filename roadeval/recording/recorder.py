@@ -33,6 +33,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import IGNORED
 from roadeval.data.words import short_names
+from roadeval.evaluation.score import TESTED
 from roadeval.geometry.plan import Plan
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
@@ -136,7 +137,7 @@ def _numbers(
 
 
 def worst_error(result: FrameResult, layout: Layout) -> float:
-    """Return the greatest ERR of any variant's final mask; -1 for a frame not evaluated.
+    """Return the greatest error rate of any variant's final mask; -1 for a frame not evaluated.
 
     Where no frame has truth it is how much the first variant's mask is in doubt.
     """
@@ -144,7 +145,7 @@ def worst_error(result: FrameResult, layout: Layout) -> float:
         signs = [(each.entropy, each.disagreement) for each in result.doubts[:1]]
         return next((sign for each in signs for sign in each if not math.isnan(sign)), -1.0)
     finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
-    return max((t.rates["ERR"] for t in finals), default=-1.0)
+    return max((t.rates[TESTED] for t in finals), default=-1.0)
 
 
 class WorstFrames:

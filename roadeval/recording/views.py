@@ -35,6 +35,7 @@ from roadeval.data import (
 from roadeval.data.colours import Colour
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score import TESTED
 from roadeval.geometry.ground import Ground
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
@@ -114,8 +115,8 @@ def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
         _below(prefix, [view])
         pictures.append(view)
         variants = layout.variants[:_ROWS] if layout.has_truth else ()
-        paths += [f"{prefix}/metrics/{each.name}/{each.stages[-1]}/ERR" for each in variants]
-    curves = [plot("ERR as a fraction, by camera", paths)] if paths else []
+        paths += [f"{prefix}/metrics/{each.name}/{each.stages[-1]}/{TESTED}" for each in variants]
+    curves = [plot(f"{TESTED} as a fraction, by camera", paths)] if paths else []
     below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
     grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
     return rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras")

@@ -16,11 +16,9 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import BlindPrior
 from roadeval.logs.frames import LoggedFrame
 from roadeval.logs.truth.picks import Picks, Why
-from roadeval.pipeline.beyond.exposure import ExposureSettings, expose, gains
-from roadeval.pipeline.beyond.features import reach
-from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
+from roadeval.pipeline.scene import exposed, reach, scene_of, stretched
 from roadeval.pipeline.stage import Output, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
@@ -161,9 +159,8 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
-    exposure = ExposureSettings(patch=settings.patch)
-    exposed = expose(image, gains(image, exposure), exposure.level)
-    near = stretched(reach(scene_of(exposed, WIDTH, settings.patch)), image.shape) < settings.far
+    scene = scene_of(exposed(image, settings.patch), WIDTH, settings.patch)
+    near = stretched(reach(scene), image.shape) < settings.far
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))

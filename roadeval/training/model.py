@@ -27,7 +27,7 @@ from roadeval.runtime.files import check_input, put, writing
 from roadeval.version import VERSION as ROADEVAL
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 10
+VERSION: Final = 11
 """Version of the file, the only one that is read; raised when a stage's parameters change."""
 WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
 """The version of roadeval by that of the file, where the file does not say it."""

@@ -47,8 +47,7 @@ class TrainingSettings:
     """Self-supervision: pixels above this share of the height are not road."""
     far: Annotated[float, Interval(gt=0, le=1_000_000)] = 1.0
     """Self-supervision: pixels below the horizon whose distance from the patch is less than this
-    are road, the others are not; see `roadeval.pipeline.beyond.features`. Most roads end at
-    1."""
+    are road, the others are not; see `roadeval.pipeline.scene.reach`. Most roads end at 1."""
 
     def __post_init__(self) -> None:
         if self.adapt and self.model is None:

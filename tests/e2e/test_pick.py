@@ -1,6 +1,7 @@
 """From no truth to a number: pick frames, label them, replay with them, pick on."""
 
 import json
+import re
 import shlex
 import shutil
 
@@ -19,10 +20,7 @@ from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 
 HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
-QUICK = (
-    'preset = "robust"\n[trees]\nwidth = 80\ntrees = 15\nhidden = 8\n'
-    "[training]\npixels_per_class = 50\n"
-)
+QUICK = 'preset = "robust"\n[trees]\ntrees = 15\n[training]\npixels_per_class = 50\n'
 """Some trees are enough: what is picked and counted is tested here, not how good it is."""
 
 
@@ -139,6 +137,25 @@ def test_labels_in_coco_give_the_numbers_of_the_images(work, truths, labelled):
     assert others["totals"] == images["totals"]
 
 
+def test_the_folder_of_labels_alone_is_taken_for_the_picks_whose_labels_it_holds(labelled):
+    work, summary, _ = labelled
+    words = ("--truth", "to_label/labels", "--record", "none", *HIDDEN)
+    done = here("replay", "street.mcap", "--reports", "alone", *words, cwd=work)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((work / "alone" / "summary.json").read_text())
+    assert found["estimate"] == summary["estimate"]
+
+
+def test_stamps_that_a_program_has_rounded_are_found_nevertheless(work, truths, labelled):
+    """JavaScript and jq 1.6 keep numbers as floats of 64 bits."""
+    _, summary, _ = labelled
+    label(work / "to_label", truths)
+    path = work / "to_label" / "pick.json"
+    rounded = re.sub(r"\d{19}", lambda digits: f"{float(digits[0]):.17g}", path.read_text())
+    path.write_text(rounded)
+    assert scored(work, "--record", "none")[0]["estimate"] == summary["estimate"]
+
+
 def test_labels_that_were_renumbered_are_refused(work, truths):
     folder = work / "to_label"
     label(folder, truths)
@@ -215,9 +232,7 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert stamps_of(Picks.read(work / "at_once"), Why.RANDOM) == stamps_of(after, Why.RANDOM)
 
 
-def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
-    work, truths, without_workers
-):
+def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
     shutil.copy(work / "street.mcap", work / "second.mcap")
     (work / "first.toml").write_text('topics.truth = ""\nframes.max_frames = 20\n')
     words = ("-n", 6, "-o", "both", "--config", "first.toml")

@@ -27,7 +27,7 @@ FRAMES = 22
 SMALL = {
     "preset": "robust",
     "training": {"pixels_per_class": 200},
-    "trees": {"width": 64, "trees": 8, "hidden": 4, "passes": 2},
+    "trees": {"width": 64, "trees": 8},
 }
 
 

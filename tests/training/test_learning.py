@@ -190,7 +190,7 @@ def adapt(logged, path, pipelines, **settings):
 @pytest.fixture
 def robust(tmp_path):
     """The preset's pipeline, and a model of it."""
-    small = {"trees": 3, "width": 32, "least": 5, "features": ("place", "colour")}
+    small = {"trees": 3, "width": 32, "features": ("place", "colour")}
     made = {"unfiltered": configure({"preset": "robust", "trees": small}).pipeline}
     path = tmp_path / "city.model"
     save_model(fit([frame(n) for n in (50, 51)], made, TrainingSettings()), path)

@@ -90,6 +90,7 @@ def _show(
     opened: Result, frame: int | None, rank: int | None, variant: str | None, *, file: Path | None
 ) -> None:
     """Open the viewer at a frame, by its number or rank, or draw it into a file."""
+    from roadeval.evaluation.score import TESTED
     from roadeval.jobs.results import inspect as job
 
     drive, of, why = opened.drive, "", ""
@@ -98,7 +99,7 @@ def _show(
         drive, of = job.drive_of(opened, found)
         frame = found.frame if frame is None else frame
     elif file and frame is None and (bad := job.worst(drive, variant)):
-        which = "worst" if bad.by == "ERR" else "first to look at"
+        which = "worst" if bad.by == TESTED else "first to look at"
         why = f", the {which} with pictures (--frame N or --worst K takes another)"
         frame = bad.frame
     if frame is not None and (sentence := job.without_pictures(drive, frame)):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from roadeval.cli.screens.tables import ascii_of, show_table
 from roadeval.data.words import percent, points, short_names
+from roadeval.evaluation.score import TESTED
 from roadeval.report.blocks import Table
 from roadeval.results.sentences import without_filter
 
@@ -23,7 +24,7 @@ def show(name: str, found: Sequence[WorstFrame], out: Console, *, of_fleet: bool
     was kept.
     """
     mask = f"{found[0].variant} by {found[0].by} of {found[0].stage}"
-    scored = found[0].by == "ERR"
+    scored = found[0].by == TESTED
     what, rule = "worst frames", "of neighbours only the worst"
     if not scored:
         what, rule = "without truth, frames to look at", "one a scene; a rank, and no error rate"

@@ -11,6 +11,7 @@ from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
 from roadeval.data.words import counted
+from roadeval.evaluation.score import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections.ground import distance_table
@@ -57,7 +58,7 @@ def _scores(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block
         yield cameras_table(facts)
     if pairs := facts.final_effects:
         yield differences_table(facts, brief=True)
-        if legend := correction(each.rates["ERR"] for each in pairs):
+        if legend := correction(each.rates[TESTED] for each in pairs):
             yield Text(legend)
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)

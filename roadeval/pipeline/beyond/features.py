@@ -16,8 +16,8 @@ import numpy as np
 
 from roadeval.data import CERTAIN, Packed, Probability, Rgb
 from roadeval.data.arrays import Places, Values
-from roadeval.pipeline.beyond.scene import BARRIERS, Scene, distance, mean
 from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.scene import BARRIERS, Scene, distance, mean
 from roadeval.pipeline.stage import Output, TrainingSet
 
 Named = Mapping[str, Values]
@@ -291,15 +291,6 @@ def at_samples(
     return straight[back], mirrored[back]
 
 
-OVER_EDGES: Final = 1.0
-"""Where roads end by the distance over the edges of the working image, which grows with all that is
-crossed."""
-AROUND_EDGES: Final = 1.5
-"""And by that over the squared edges of the image at twice its size, which grows where something
-steep is, thin kerbs included. Both values are the best, or next to it, on the train part of IDD
-Lite, on CamVid 0016E5 and 0006R0 and a synthetic drive; for working images of 160 columns, made of
-320 or more: edges of smaller images are blurred, and more is reached. They hold after the stage
-`exposure`, which weakens edges among what is brighter than the patch."""
 SUNLIT: Final = 80
 """Of the lower half's log brightness: about that of sunlit ground."""
 SHADE, SUN = -0.8, -0.3
@@ -307,17 +298,6 @@ SHADE, SUN = -0.8, -0.3
 as shade, at or above `SUN` as lit."""
 LIGHT: Final = f"light.light_over_{SUNLIT}th_percentile"
 """The feature that is the light of a pixel."""
-
-
-def reach(scene: Scene) -> Values:
-    """Return how far each pixel lies from the patch, ``(h, w)`` float32; roads end at about 1.
-
-    It is ``(over / OVER_EDGES + around / AROUND_EDGES) / 2`` of the distances over edges and over
-    squared edges. They are what makes a way long. It needs no training, and most roads end at about
-    the same value, whatever the camera. Hue does not count: a verge as bright as the road is
-    reached.
-    """
-    return 1 / 2 * (scene.over_edges / OVER_EDGES + scene.around_edge / AROUND_EDGES)
 
 
 def lit(bright: Values) -> Values:

@@ -32,9 +32,9 @@ from pydantic import Field
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, Truth, colours, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.beyond.features import paths
-from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
-from roadeval.pipeline.reference_patch import ReferencePatch, Share
+from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.scene import Scene, enlarged, mean, reduced, stretched
 from roadeval.pipeline.stage import (
     Output,
     Stage,
@@ -48,6 +48,16 @@ from roadeval.pipeline.stage import (
 
 GRID: Final = (12, 16)
 """Rows and columns of the cells by which the place of road is learnt."""
+WIDTH: Final = 160
+"""Columns of the working image: wider images are reduced to it for all that is decided. Texture
+then means the same for every camera, and the time is the same too."""
+DARKNESS: Final = 0.6
+"""Candidates are darker than this share of the sunlit level."""
+PLACE: Final = 0.05
+"""Candidates lie where at least this share of the training pixels is road: sky, trees and houses
+are elsewhere."""
+DOUBT: Final = 0.1
+"""Below this probability nothing is brightened."""
 WINDOWS: Final = (3, 9)
 """Sides of the squares over which texture is averaged."""
 PATCH: Final = ReferencePatch()
@@ -95,22 +105,12 @@ COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image"
 
 @stage_settings
 class GatedSettings:
-    """Settings of the gated filter. Lengths are in pixels of the working image."""
+    """Settings of the gated filter."""
 
-    width: Annotated[int, Field(ge=32, le=4096)] = 160
-    """Of the working image: wider ones are reduced to it for all that is decided. Texture then
-    means the same for every camera, and the time is the same too."""
-    darkness: Share = 0.6
-    """Candidates are darker than this share of the sunlit level."""
-    place: Share = 0.05
-    """Candidates lie where at least this share of the training pixels is road: sky, trees and
-    houses are elsewhere."""
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
     """Factor of the odds that a candidate is shaded road. The more, the more dark road comes back,
     and the more is brightened that is none. A classifier on colours takes all of that for road,
     and wants caution; one that sees place and surroundings as well takes 1."""
-    least: Annotated[float, Field(ge=0, lt=1)] = 0.1
-    """Below this probability nothing is brightened."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ class Look:
     """``(h, w)`` bool."""
 
 
-def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
+def look(image: Rgb, place: Floats) -> Look:
     """Find the sunlit level, lit road's colour and the candidates of a working image.
 
     Where road is likely by its place alone, nearly every frame has some that is lit: that level is
@@ -142,7 +142,7 @@ def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
     counted = np.cumsum(np.bincount(total[likely], share[likely], minlength=1))
     level = float(np.searchsorted(counted, LEVEL * counted[-1])) if counted[-1] > 0 else 0.0
     lit = np.array(cv2.mean(image, (likely & (total >= LIT * level)).view(np.uint8))[:3])
-    candidates = (total < settings.darkness * level) & (share > settings.place)
+    candidates = (total < DARKNESS * level) & (share > PLACE)
     return Look(image, level, lit, share, candidates)
 
 
@@ -202,13 +202,13 @@ class ShadedRoad:
         check_arrays(self, np.float32, **shapes)
 
 
-def fit(sample: TrainingSet, settings: GatedSettings) -> ShadedRoad:
+def fit(sample: TrainingSet, _settings: GatedSettings) -> ShadedRoad:
     """Learn where road is, and the odds that a dark pixel is road."""
     place = learn_place(sample)
     values, labels = [], []
     for index, image in enumerate(sample.images):
         here = sample.frame == index
-        seen = look(reduced(image, settings.width), place, settings)
+        seen = look(reduced(image, WIDTH), place)
         rows, columns = seen.candidates.shape
         row = sample.row[here] * rows // image.shape[0]
         column = sample.column[here] * columns // image.shape[1]
@@ -336,9 +336,9 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
 def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     """Filter what is seen."""
     shape = view.image.shape
-    seen = look(reduced(view.image, settings.width), model.place, settings)
+    seen = look(reduced(view.image, WIDTH), model.place)
     likely = probability(seen, model, settings.odds)
-    shaded = np.maximum((likely - settings.least) / (1 - settings.least), 0)
+    shaded = np.maximum((likely - DOUBT) / (1 - DOUBT), 0)
     gain = gains(seen, shaded)
     image = brighten(view.image, gain) if shaded.any() else view.image
     small = (shaded > 0.5).view(np.uint8)
@@ -358,11 +358,11 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     )
 
 
-def oracle(settings: GatedSettings, model: ShadedRoad, view: View, truth: Truth) -> Output:
+def oracle(_settings: GatedSettings, model: ShadedRoad, view: View, truth: Truth) -> Output:
     """Brighten what is truly shadow."""
-    small = reduced(view.image, settings.width)
+    small = reduced(view.image, WIDTH)
     shadow = enlarged((truth == 1).view(np.uint8), small.shape)
-    gain = gains(look(small, model.place, settings), shadow.astype(np.float32))
+    gain = gains(look(small, model.place), shadow.astype(np.float32))
     return Output(image=brighten(view.image, gain) if shadow.any() else view.image)
 
 

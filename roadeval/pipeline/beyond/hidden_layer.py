@@ -26,6 +26,12 @@ LEAST: Final = 1e-6
 """Between the percentiles of a feature that hardly varies."""
 PENALTY: Final = 0.1
 """Of the squared weights (scikit-learn's ``alpha``)."""
+PLANES: Final = 64
+"""What a decision costs grows with them."""
+PASSES: Final = 12
+"""Of the training through as many pixels as there are."""
+NOISE: Final = 0.1
+"""Deviation of what is added in training to each rank, -1 to 1."""
 BATCH: Final = 256
 """Pixels between two steps of the training, at most."""
 STEPS: Final = 150
@@ -79,17 +85,12 @@ def train(
     road: Flags,
     weights: Floats | None,
     seed: int,
-    *,
-    planes: int,
-    passes: int,
-    noise: float,
 ) -> HiddenLayer:
     """Train a network with scikit-learn's Adam, by one thread.
 
     Each pass draws pixels anew by their weights, and adds other noise to their ranks: few frames
     show few values of what is the same all over a frame, and nothing shall hang on their digits.
-    The arguments are those of `roadeval.pipeline.beyond.trees.grow`, the number of planes, passes
-    through as many pixels as there are, and the deviation of what is added to each rank.
+    The arguments are those of `roadeval.pipeline.beyond.trees.grow`.
     """
     from threadpoolctl import threadpool_limits
 
@@ -104,20 +105,20 @@ def train(
     from sklearn.neural_network import MLPClassifier
 
     network = MLPClassifier(
-        (planes,),
+        (PLANES,),
         alpha=PENALTY,
         batch_size=min(count, max(FEWEST, min(BATCH, count // STEPS))),
         learning_rate_init=STEP,
         random_state=seed,
     )
     with threadpool_limits(1, "blas"):
-        for number in range(passes):
+        for number in range(PASSES):
             drawn = rng.choice(count, count, p=chances)
             noisy = rng.standard_normal((count, seen.shape[1]), dtype=np.float32)
-            noisy *= noise
+            noisy *= NOISE
             noisy += seen[drawn]
             if number:
-                network._optimizer.learning_rate_init = STEP * (1 - number / passes)
+                network._optimizer.learning_rate_init = STEP * (1 - number / PASSES)
             network.partial_fit(noisy, road[drawn], classes=[False, True])
     (inner, out), (bias, shift) = network.coefs_, network.intercepts_
     return HiddenLayer(

@@ -39,11 +39,10 @@ from roadeval.pipeline.beyond.features import (
     lit,
     names_of,
     opinions,
-    reach,
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
-from roadeval.pipeline.beyond.scene import Scene, scene_of, stretched
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
+from roadeval.pipeline.scene import Scene, reach, scene_of, stretched
 from roadeval.pipeline.stage import (
     GREATEST,
     MisfitError,
@@ -69,6 +68,10 @@ BINS: Final = 255
 """Ranges of a feature that a tree can tell apart: the most that scikit-learn knows."""
 RATE: Final = 0.1
 """Share of what is left to mend that a tree mends."""
+MOST_LEAVES: Final = 31
+"""Of a tree."""
+LEAST: Final = 50
+"""Training pixels of a leaf, mirrored ones included."""
 SHARE: Final = 0.33
 """Of the features, drawn anew for each node, among which it chooses."""
 
@@ -105,15 +108,13 @@ class Forest:
         return KERNELS.tree_sum(values, *arrays) + self.offset
 
 
-def grow(
-    values: Values, road: Flags, weights: Floats | None, settings: TreesSettings, seed: int
-) -> Forest:
+def grow(values: Values, road: Flags, weights: Floats | None, trees: int, seed: int) -> Forest:
     """Grow trees with scikit-learn's gradient boosting on histograms.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
     ``values`` are ``(n, F)`` finite features, ``road`` ``(n,)`` labels, of which both occur;
-    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. ``seed`` draws the
-    features among which a node chooses.
+    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. ``trees`` is their
+    number, ``seed`` draws the features among which a node chooses.
     """
     from threadpoolctl import threadpool_limits
 
@@ -127,9 +128,9 @@ def grow(
 
     boosting = HistGradientBoostingClassifier(
         learning_rate=RATE,
-        max_iter=settings.trees,
-        max_leaf_nodes=settings.leaves,
-        min_samples_leaf=settings.least,
+        max_iter=trees,
+        max_leaf_nodes=MOST_LEAVES,
+        min_samples_leaf=LEAST,
         max_features=SHARE,
         early_stopping=False,
         random_state=seed,
@@ -191,9 +192,6 @@ GEODESIC: Final = LayerSpec(
 )
 
 
-Count = Annotated[int, Field(ge=1, le=10_000)]
-
-
 @stage_settings
 class TreesSettings:
     """Settings of the boosted trees."""
@@ -205,20 +203,8 @@ class TreesSettings:
     opinion: bool = False
     """Whether what the stage before says of a pixel is a feature, too: its log-odds of road, or the
     distance to its mask's edge."""
-    patch: ReferencePatch = ReferencePatch()
-    """The reference patch, from which distances of colour and paths are measured."""
-    trees: Count = 150
+    trees: Annotated[int, Field(ge=1, le=10_000)] = 150
     """How many. What a decision costs grows with them."""
-    leaves: Annotated[int, Field(ge=2, le=LEAVES)] = 31
-    """Of a tree, at most."""
-    least: Count = 50
-    """Training pixels of a leaf, mirrored ones included, at least."""
-    hidden: Count = 64
-    """Planes of the network. What a decision costs grows with them, too."""
-    passes: Count = 12
-    """Of the network's training through as many pixels as were sampled."""
-    noise: Annotated[float, Field(ge=0, le=10)] = 0.1
-    """Deviation of what is added in training to each input of the network, -1 to 1."""
     reach_weight: Annotated[float, Field(ge=0, le=100)] | None = None
     """``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
     the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
@@ -279,7 +265,7 @@ def see(settings: TreesSettings, image: Rgb, opinion: Output | None = None) -> t
 
     Those of the opinion come last, where the settings ask for it.
     """
-    scene = scene_of(image, settings.width, settings.patch)
+    scene = scene_of(image, settings.width, ReferencePatch())
     own = features(scene, settings.features)
     if not settings.opinion:
         return scene, own
@@ -301,9 +287,8 @@ def fit(sample: TrainingSet, settings: TreesSettings, base: Blend | None = None)
         values = np.column_stack([values, known])
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
-    s, seed = settings, sample.seed
-    forest = grow(values, road, weights, s, seed)
-    network = train(values, road, weights, seed, planes=s.hidden, passes=s.passes, noise=s.noise)
+    forest = grow(values, road, weights, settings.trees, sample.seed)
+    network = train(values, road, weights, sample.seed)
     sizes = np.unique(np.array([each.shape[:2] for each in sample.images], np.int32), axis=0)
     return Blend(forest, network, sizes, base)
 

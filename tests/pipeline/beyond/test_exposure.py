@@ -4,24 +4,26 @@ import numpy as np
 import pytest
 
 from roadeval.pipeline.beyond import exposure
-from roadeval.pipeline.beyond.exposure import ExposureSettings
-from roadeval.pipeline.reference_patch import patch_mask
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
+from roadeval.pipeline.scene import LEVEL, expose, gains
 from roadeval.pipeline.stage import View
+
+PATCH = ReferencePatch()
 
 
 def scene(road, elsewhere=(10, 200, 90), shape=(40, 60)):
     """An image with one colour in the reference patch and another one elsewhere."""
-    patch = patch_mask(*shape, ExposureSettings().patch)
+    patch = patch_mask(*shape, PATCH)
     return np.where(patch[..., None] > 0, road, elsewhere).astype(np.uint8)
 
 
-def run(image, **settings):
-    return exposure.bind(ExposureSettings(**settings), None)(View.of(image))
+def run(image):
+    return exposure.bind(exposure.ExposureSettings(), None)(View.of(image))
 
 
 def test_the_patch_turns_grey():
     image = scene((48, 96, 192))
-    patch = patch_mask(40, 60, ExposureSettings().patch) > 0
+    patch = patch_mask(40, 60, PATCH) > 0
     assert (run(image).image[patch] == 96).all()
 
 
@@ -35,7 +37,7 @@ def test_what_is_brighter_than_the_patch_is_compressed_and_keeps_its_order():
     found = run(scene((48, 96, 192), elsewhere=(200, 200, 1))).image[0, 0].tolist()
     assert found == [200, 159, 0]
     greys = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)[None]
-    tones = exposure.expose(greys, np.full(3, 3.0), 96.0)[0, :, 0].astype(int)
+    tones = expose(greys, np.full(3, 3.0), LEVEL)[0, :, 0].astype(int)
     assert (np.diff(tones[:64]) >= 1).all()
     assert (np.diff(tones) >= 0).all()
     assert tones[32] == 96
@@ -45,12 +47,12 @@ def test_what_is_brighter_than_the_patch_is_compressed_and_keeps_its_order():
 def test_the_median_is_what_counts_not_what_stands_on_the_road():
     image = scene((48, 48, 48))
     image[:, 32:] = 255  # two fifths of the patch
-    assert exposure.gains(image, ExposureSettings())[0] == 2.0
+    assert gains(image, PATCH)[0] == 2.0
 
 
-@pytest.mark.parametrize(("grey", "gain"), [(0, 6.0), (1, 6.0), (255, 0.25)])
+@pytest.mark.parametrize(("grey", "gain"), [(0, 6.0), (1, 6.0), (255, LEVEL / 255)])
 def test_gains_are_bounded(grey, gain):
-    assert exposure.gains(scene((grey,) * 3), ExposureSettings(level=48.0))[0] == gain
+    assert gains(scene((grey,) * 3), PATCH)[0] == gain
 
 
 def test_the_same_scene_under_another_exposure_gives_nearly_the_same_image():

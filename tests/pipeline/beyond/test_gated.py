@@ -72,8 +72,8 @@ def test_nothing_is_a_candidate_where_no_road_was_in_training():
 @pytest.mark.parametrize("exposure", [0.5, 1.0, 1.6])
 def test_candidates_and_their_features_do_not_depend_on_the_exposure(exposure):
     image = np.rint(road(ROAD * SHADE) * exposure).astype(np.uint8)
-    seen = look(image, BELOW, GatedSettings())
-    expected = look(road(ROAD * SHADE), BELOW, GatedSettings())
+    seen = look(image, BELOW)
+    expected = look(road(ROAD * SHADE), BELOW)
     np.testing.assert_array_equal(seen.candidates, expected.candidates)
     np.testing.assert_allclose(
         features_of(seen)[:3, 90, 80], features_of(expected)[:3, 90, 80], atol=0.15
@@ -83,19 +83,19 @@ def test_candidates_and_their_features_do_not_depend_on_the_exposure(exposure):
 def test_the_sunlit_level_weighs_pixels_by_how_likely_they_are_road():
     image = road()
     image[: HEIGHT // 3] = 250  # sky
-    assert look(image, BELOW, GatedSettings()).level == 360
-    assert look(image, np.full(GRID, 0.9), GatedSettings()).level == 750
+    assert look(image, BELOW).level == 360
+    assert look(image, np.full(GRID, 0.9)).level == 750
 
 
 def test_the_level_of_a_road_mostly_in_the_shade_is_that_of_its_lit_part():
     image = road(ROAD * SHADE, np.s_[40:, :120])
-    seen = look(image, BELOW, GatedSettings())
+    seen = look(image, BELOW)
     assert seen.level == 360
     np.testing.assert_allclose(seen.lit, ROAD)
 
 
 def test_features_are_relative_to_lit_road():
-    found = features_of(look(road(ROAD * SHADE), BELOW, GatedSettings()))
+    found = features_of(look(road(ROAD * SHADE), BELOW))
     dark, lit = np.rint(ROAD * SHADE) + 8, ROAD + 8
     light = np.log(dark).mean() - np.log(lit).mean()
     logs = np.log(dark / lit)
@@ -170,7 +170,7 @@ def test_nothing_is_brightened_where_there_was_no_shade_to_learn_from():
 
 
 def test_the_odds_are_those_of_the_features():
-    seen = look(road(ROAD * SHADE), BELOW, GatedSettings())
+    seen = look(road(ROAD * SHADE), BELOW)
     blue = features_of(seen)[BLUE, 90, 80]
     for odds in (0.25, 1.0, 4.0):
         expected = odds * np.exp(50 * blue - 3)
@@ -188,17 +188,18 @@ def test_shade_becomes_lit_road_each_channel_apart():
 
 def test_half_a_doubt_is_half_the_gain(monkeypatch):
     monkeypatch.setattr(gated, "SOFTNESS", 1)
-    seen = look(road(ROAD * SHADE), BELOW, GatedSettings())
+    seen = look(road(ROAD * SHADE), BELOW)
     whole, half = (gains(seen, share * seen.candidates.astype(np.float32)) for share in (1, 0.5))
     np.testing.assert_allclose(half**2, whole, rtol=1e-5)
 
 
-def test_shadow_is_what_is_more_likely_shaded_road_than_not():
-    seen = look(road(ROAD * SHADE), BELOW, GatedSettings())
+def test_shadow_is_what_is_more_likely_shaded_road_than_not(monkeypatch):
+    monkeypatch.setattr(gated, "DOUBT", 0.0)
+    seen = look(road(ROAD * SHADE), BELOW)
     log_odds = 50 * features_of(seen)[BLUE, 90, 80]
     for share, expected in ((0.6, 1), (0.4, 0)):
         learnt = model(50.0, np.log(share / (1 - share)) - log_odds)
-        _, layers = run(road(ROAD * SHADE), learnt, odds=1.0, least=0.0)
+        _, layers = run(road(ROAD * SHADE), learnt, odds=1.0)
         assert layers["shaded"][90, 80] == pytest.approx(share, abs=1e-3)
         assert layers["shadow"][90, 80] == expected
 

@@ -9,12 +9,20 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.features import at_samples, names_of, opinions, reach
-from roadeval.pipeline.beyond.scene import scene_of
-from roadeval.pipeline.beyond.trees import Blend, TreesSettings, balanced_back, grow
+from roadeval.pipeline.beyond.features import at_samples, names_of, opinions
+from roadeval.pipeline.beyond.trees import (
+    ALL,
+    NODES,
+    Blend,
+    TreesSettings,
+    balanced_back,
+    grow,
+)
+from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.scene import reach, scene_of
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
 
-SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5, hidden=8)
+SMALL = TreesSettings(width=32, trees=20)
 
 
 def picture(kerb, seed=0, height=24, width=32):
@@ -53,18 +61,17 @@ def features_and_road(seed=0, count=600):
 
 
 @pytest.mark.parametrize("weighted", [False, True])
-@pytest.mark.parametrize("leaves", [2, 5, 32])
-def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
+def test_the_arrays_say_what_scikit_learns_trees_say(weighted):
     values, road = features_and_road(count=1000)
     values = values.round(0)  # so few that each has a bin, as in scikit-learn
     weights = balanced_back(road, 0.2) if weighted else None
-    forest = grow(values, road, weights, replace(SMALL, leaves=leaves), 0)
+    forest = grow(values, road, weights, SMALL.trees, 0)
     found = forest.sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(
         learning_rate=trees.RATE,
         max_iter=SMALL.trees,
-        max_leaf_nodes=leaves,
-        min_samples_leaf=SMALL.least,
+        max_leaf_nodes=trees.MOST_LEAVES,
+        min_samples_leaf=trees.LEAST,
         max_features=trees.SHARE,
         early_stopping=False,
         random_state=0,
@@ -155,6 +162,24 @@ def test_trees_that_hear_nothing_say_so():
         trees.bind(SMALL, learnt)
 
 
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"feature": np.full((20, NODES), -1, np.int32)}, "feature holds a number outside"),
+        ({"inputs": 5}, "feature holds a number outside 0 to 4"),
+        ({"inputs": 0}, "feature holds a number outside 0 to -1"),
+        ({"kept": np.zeros((20, NODES), np.uint32)}, "rules out a tree's last leaf"),
+        ({"kept": np.full((19, NODES), ALL, np.uint32)}, "kept has the shape"),
+        ({"threshold": np.full((20, NODES), np.nan, np.float32)}, "holds a number outside"),
+        ({"values": np.zeros((20, 31), np.float32)}, "values has the shape"),
+        ({"feature": np.zeros((20, NODES), np.int64)}, "instead of int32"),
+    ],
+)
+def test_trees_that_no_training_gives_are_refused(forest, changed, why):
+    with pytest.raises(ValueError, match=why):
+        replace(forest, **changed)
+
+
 def test_trees_for_other_features_are_a_misfit(learnt):
     known = len(names_of(SMALL.features))
     with pytest.raises(MisfitError, match=f"grown on {known} features .* computes 3;"):
@@ -195,7 +220,7 @@ def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, g
         trees.bind(replace(without, reach_weight=weight), learnt)(VIEW).probability / CERTAIN
         for weight in (0.0, 2.0)
     )
-    scene = scene_of(VIEW.image, SMALL.width, SMALL.patch)
+    scene = scene_of(VIEW.image, SMALL.width, ReferencePatch())
     light = scene.tones[0] - np.percentile(scene.tones[0][len(scene.tones[0]) // 2 :], 80)
     lit = np.interp(light, [-0.8, -0.3], [0, 1])
     expected = -2 * lit * np.maximum(reach(scene) - 1, 0)
