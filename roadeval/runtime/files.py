@@ -7,7 +7,6 @@ an output is removed then.
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import hashlib
 import os
@@ -16,7 +15,6 @@ import re
 import secrets
 import shutil
 import stat
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -184,19 +182,19 @@ class Content:
 
 
 class NewFolder:
-    """A folder that is written as ``partial`` and takes its place when it is complete.
+    """A folder that is written as ``partial``, and whose files take their places together.
 
-    On Linux it changes places with an old folder that holds nothing else, in one step. Otherwise
-    its files are moved into the old folder: the seal is removed first and moved last, and
-    `claimed_folder` completes what a killed run had begun. Where ``path`` is a link, its target is
-    replaced; ``content`` says what, in an old folder.
+    It is written inside the folder of its name. Then the old seal is removed first, and the new one
+    moved last; `claimed_folder` completes what a killed run had begun. Where ``path`` is a link,
+    the folder behind it is written; ``content`` says what is replaced in it.
     """
 
     def __init__(self, path: Path, content: Content) -> None:
         self.path: Final = path
         self._content: Final = content
         self._target: Final = Path(os.path.realpath(path))
-        self.partial: Final = own_name(_home_of(self._target) / self._target.name)
+        self._is_new: Final = not self._target.exists()
+        self.partial: Final = own_name(self._target / self._target.name)
 
     def begin(self) -> None:
         """Make it, empty; an OSError if that fails, or no folder can have its name."""
@@ -204,53 +202,21 @@ class NewFolder:
         self.partial.mkdir(parents=True)
 
     def publish(self) -> None:
-        """Let it take its place.
+        """Let its files take their places.
 
         After an OSError the old content is there, or the next `claimed_folder` completes the new.
         """
-        if not self._target.exists():
-            self.partial.rename(self._target)
-        elif self._exchanged():
-            remove(self.partial)  # it has the old content now
-        else:
-            self._move_in()
-
-    def discard(self) -> None:
-        """Remove the partial folder, if there is one."""
-        remove(self.partial)
-
-    def _exchanged(self) -> bool:
-        """Exchange it with the old folder and return True, if that is possible."""
-        target = self._target
-        own = self._content.names(target / self._content.seal)
-        try:
-            if (
-                _home_of(target) == target
-                or target.samefile(os.curdir)
-                or any(each.name not in own or each.is_dir() for each in target.iterdir())
-            ):
-                return False
-            old = target.stat()
-            with suppress(OSError, AttributeError):  # Windows has no such function
-                os.chown(self.partial, old.st_uid, old.st_gid)
-            self.partial.chmod(stat.S_IMODE(old.st_mode))
-            _exchange(self.partial, target)
-        except OSError:
-            return False
-        return True
-
-    def _move_in(self) -> None:
-        """Move its files into the old folder."""
         for each in self.partial.iterdir():
             if (self._target / each.name).is_dir():
                 raise IsADirectoryError(errno.EISDIR, "is a folder", str(self._target / each.name))
-        inside = own_name(self._target / self._target.name)
-        try:
-            shutil.move(self.partial, inside)  # perhaps from another disk
-        except OSError:
-            remove(inside)
-            raise
-        _settle(inside.rename(f"{inside}{_MOVING}"), self._content)
+        _settle(self.partial.rename(f"{self.partial}{_MOVING}"), self._content)
+
+    def discard(self) -> None:
+        """Remove the partial folder, and the empty one that was made for it, if there are such."""
+        remove(self.partial)
+        if self._is_new:
+            with suppress(OSError):
+                self._target.rmdir()
 
 
 def _settle(moving: Path, content: Content) -> None:
@@ -269,28 +235,6 @@ def _settle(moving: Path, content: Content) -> None:
                 each.replace(target / each.name)
         seal.replace(target / content.seal)
     remove(moving)
-
-
-def _exchange(one: Path, other: Path) -> None:
-    """Exchange the names of two folders in one step; an OSError where that is impossible."""
-    if sys.platform == "linux":
-        here, exchange = -100, 2  # AT_FDCWD and RENAME_EXCHANGE in the kernel's headers
-        renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
-        names = here, os.fsencode(one), here, os.fsencode(other)
-        if renameat2 is not None and not renameat2(*names, exchange):
-            return
-    raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-
-
-def _home_of(target: Path) -> Path:
-    """Return the folder for partial files and locks: an output's parent, or the output itself.
-
-    The parent of a mount point is on another disk, and perhaps not seen by everybody.
-    """
-    if not os.path.isdir(target):  # noqa: PTH112 - for a name that is too long it is False
-        return target.parent
-    apart = os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)
-    return target if apart else target.parent
 
 
 @contextmanager
@@ -324,13 +268,9 @@ def claimed_folder(path: Path, content: Content) -> Iterator[bool]:
     """
     check_output(path, folder=True)
     target = Path(os.path.realpath(path))
-    home = _home_of(target)
-    with _made(home), claimed(target, home) as certain:
-        if certain:
-            for left in own_names(target / target.name):
-                _settle(left, content) if left.name.endswith(_MOVING) else remove(left)
-            for left in own_names(target):
-                remove(left)
+    with _made(target), claimed(target, target) as certain:
+        for left in own_names(target / target.name) if certain else ():
+            _settle(left, content) if left.name.endswith(_MOVING) else remove(left)
         yield certain
 
 

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from roadeval.errors import RoadevalError
 
-ADDING: Final = ("os.mkdir", "os.link", "os.rename", "ctypes.dlsym")
-"""Steps for which a disk may lack room; the last one looks up the call that exchanges folders."""
+ADDING: Final = ("os.mkdir", "os.link", "os.rename")
+"""Steps for which a disk may lack room."""
 OTHERS: Final = ("os.remove", "os.rmdir", "os.chmod", "os.chown", "os.truncate", "fcntl.flock")
 WRITES: Final = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 DONE, FAILED, KILLED, BROKEN = 0, 1, 9, 70

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -18,9 +17,7 @@ pytestmark = pytest.mark.skipif(
 
 
 IN_PLACE = "in place"
-SITUATIONS = ["exchange", IN_PLACE, "first"]
-if sys.platform != "linux":
-    SITUATIONS.remove("exchange")
+SITUATIONS = ["again", IN_PLACE, "first"]
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +96,6 @@ def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
         for name in ("out.rrd", "out.mcap"):
             assert found[name] in (old[name], new[name])
         if found["reports"] not in (old["reports"], new["reports"]):
-            assert situation == IN_PLACE
             assert "summary.json" not in found["reports"]
             moving += 1
             recover(place)
@@ -108,7 +104,7 @@ def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
         check_next_run(place, tmp_path / "model", after)
     assert code == steps.DONE
     assert number > 20
-    assert bool(moving) == (situation == IN_PLACE)
+    assert moving
 
 
 def test_a_disk_that_is_full_from_any_step_on_costs_no_earlier_result(

@@ -88,8 +88,8 @@ def test_whoever_shares_one_output_with_another_run_is_refused(name, to, tmp_pat
 def test_what_killed_runs_left_goes_when_a_run_has_ended(to, tmp_path):
     for name in (".out.0123abcd.partial.mcap", ".out.mcap.lock", "out.00000003.partial.rrd"):
         (tmp_path / name).touch()
-    for name in (".reports.0123abcd.partial", "out.00000001.partial.rrd-images"):
-        (tmp_path / name).mkdir()
+    for name in ("reports/.reports.0123abcd.partial", "out.00000001.partial.rrd-images"):
+        (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / "frames.csv").touch()
     (tmp_path / "out.00000002.partial.rrd").write_text("some frames")
     with to.holding(()):
@@ -98,13 +98,15 @@ def test_what_killed_runs_left_goes_when_a_run_has_ended(to, tmp_path):
 
 
 def test_without_locks_nothing_that_may_be_another_run_s_is_removed(to, tmp_path, monkeypatch):
-    left = [".out.0123abcd.partial.mcap", ".reports.0123abcd.partial", "out.00000001.partial.rrd"]
-    for name in left:
-        (tmp_path / name).touch()
+    left = [".out.0123abcd.partial.mcap", "out.00000001.partial.rrd"]
+    for path in (*left, "reports/.reports.0123abcd.partial"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).touch()
     monkeypatch.setitem(sys.modules, "fcntl", None)
     with to.holding(()), to.holding(()):
         pass
-    assert names(tmp_path) == left
+    assert names(tmp_path) == [*left, "reports"]
+    assert names(to.reports) == [".reports.0123abcd.partial"]
 
 
 @pytest.mark.parametrize(
@@ -180,6 +182,7 @@ def test_every_command_knows_a_place_that_is_taken_before_it_computes(
     for path, reason in ((pipe, "is a pipe, not a"), (within, "Not a directory")):
         with pytest.raises(RoadevalError, match=f"^{path}: cannot be.*: {reason}"):
             attempted(command, path)
-    with holding(held), pytest.raises(RoadevalError, match=r"^held.*: another run is writing it"):
+    own = holding(folder=held) if command == "replay, reports" else holding(held)
+    with own, pytest.raises(RoadevalError, match=r"^held.*: another run is writing it"):
         attempted(command, held)
     assert names(tmp_path) == before
