@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +25,7 @@ LISTED: Final = 1_000_000
 VALUES: Final = 2_000_000
 DEPTH: Final = 32
 """Tables and lists inside one another."""
+_TOO_MANY: Final = "it holds more than {:,} values"
 _TOO_DEEP: Final = f"it nests more than {DEPTH} tables and lists inside one another"
 BYTES: Final = 64 << 20
 TOML_BYTES: Final = 1 << 20
@@ -50,29 +52,13 @@ def read_json(
     The lengths of texts have a limit only where these may be ``shown``.
     """
     _check_size(len(content), most)
-    comma, bracket, brace = (",", "[", "{") if isinstance(content, str) else (b",", b"[", b"{")
-    if sum(map(content.count, (comma, bracket, brace))) > 2 * values:  # type: ignore[arg-type]
-        raise ValueError(f"it holds more than {values:,} values")
-    try:
-        found = json.loads(content)
-    except (RecursionError, ValueError) as error:
-        raise ValueError(_damage(error)) from error
-    _check(found, values, shown=shown)
-    return found
-
-
-def _damage(error: Exception) -> str:
-    """Return in words what a parser found."""
-    match error:
-        case RecursionError():
-            return _TOO_DEEP
-        case json.JSONDecodeError(lineno=line, colno=column):
-            return f"it is no JSON, or ends early (line {line}, column {column})"
-        case UnicodeDecodeError():
-            return "it is not in UTF-8"
-        case _ if "integer string conversion" in str(error):
-            return "a number in it has thousands of digits"
-    return str(error)
+    marks = ",[{" if isinstance(content, str) else (b",", b"[", b"{")
+    if sum(map(content.count, marks)) > 2 * values:  # type: ignore[arg-type]
+        raise ValueError(_TOO_MANY.format(values))
+    with _in_words():
+        document = json.loads(content)
+    _check(document, values, shown=shown)
+    return document
 
 
 def read_toml(text: str) -> dict[str, Any]:
@@ -80,43 +66,57 @@ def read_toml(text: str) -> dict[str, Any]:
     _check_size(len(text), TOML_BYTES)
     if sum(line.count(".") ** 2 for line in text.splitlines()) > DOTS**2:
         raise ValueError(f"a name in it has more than {DOTS:,} parts, or several have so many")
-    try:
-        found = tomllib.loads(text)
-    except (RecursionError, ValueError) as error:
-        raise ValueError(_damage(error)) from error
-    _check(found, VALUES)
-    return found
+    with _in_words():
+        document = tomllib.loads(text)
+    _check(document, VALUES)
+    return document
 
 
 def read_yaml(path: Path) -> Any:
     """Read a YAML document; a ValueError if it is damaged or beyond a limit, or has aliases."""
     import yaml
 
+    text, depth = read_bounded(path, YAML_BYTES), 0
     try:
-        text = read_bounded(path, YAML_BYTES).decode()
-        kinds, depth = ("FlowSequence", "FlowMapping", "BlockSequence", "BlockMapping"), 0
-        opening = tuple(getattr(yaml, f"{kind}StartToken") for kind in kinds)
-        closing = yaml.FlowSequenceEndToken, yaml.FlowMappingEndToken, yaml.BlockEndToken
-        for token in yaml.scan(text):
-            if isinstance(token, yaml.AliasToken):
-                raise ValueError("it has aliases, as *name: write them out")
-            # PyYAML would take a minute for brackets that open and never close.
-            depth += isinstance(token, opening) - isinstance(token, closing)
-            if depth > DEPTH:
-                raise RecursionError
-        found = yaml.safe_load(text)
+        with _in_words():
+            for token in yaml.scan(text):
+                if isinstance(token, yaml.AliasToken):
+                    raise ValueError("it has aliases, as *name: write them out")
+                # PyYAML would take a minute for brackets that open and never close.
+                kind = type(token).__name__
+                depth += kind.endswith(("SequenceStartToken", "MappingStartToken"))
+                depth -= kind.endswith("EndToken") and not kind.startswith("Stream")
+                if depth > DEPTH:
+                    raise RecursionError
+            document = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise ValueError("it is damaged") from error
-    except (RecursionError, ValueError) as error:
-        raise ValueError(_damage(error)) from error
-    _check(found, VALUES)
-    return found
+    _check(document, VALUES)
+    return document
+
+
+@contextmanager
+def _in_words() -> Iterator[None]:
+    """Say in plain words what a parser found."""
+    try:
+        yield
+    except RecursionError as error:
+        raise ValueError(_TOO_DEEP) from error
+    except json.JSONDecodeError as error:
+        place = f"line {error.lineno}, column {error.colno}"
+        raise ValueError(f"it is no JSON, or ends early ({place})") from error
+    except UnicodeDecodeError as error:
+        raise ValueError("it is not in UTF-8") from error
+    except ValueError as error:
+        if "integer string conversion" not in str(error):
+            raise
+        raise ValueError("a number in it has thousands of digits") from error
 
 
 def check_texts(texts: Iterable[str]) -> None:
     """Raise a ValueError for texts that would take too long to show."""
     together = 0
-    for text in (line for each in texts for line in each.split("\n")):
+    for text in (line for lines in texts for line in lines.split("\n")):
         if len(text) > LONGEST:
             raise ValueError(
                 f"it holds a text of {len(text):,} letters, and at most {LONGEST:,} are read"
@@ -134,26 +134,24 @@ def _check_size(size: int, most: int) -> None:
 def _check(document: Any, most: int, *, shown: bool = True) -> None:
     """Raise a ValueError for a document that is too deep, too large or too long to be shown."""
     texts: list[str] = []
-    level: list[Any] = [document]
-    depth = values = 0
+    level, depth, values = [document], 0, 0
     while level:
         depth, values = depth + 1, values + len(level)
-        inner: list[Any] = []
         if depth > DEPTH:
             raise ValueError(_TOO_DEEP)
         if values > most:
-            raise ValueError(f"it holds more than {most:,} values")
-        for each in level:
-            if isinstance(each, str):
-                texts.append(each)
-            elif isinstance(each, dict):
-                texts += each
-                inner += each.values()
-            elif isinstance(each, list):
-                inner += each
-                if shown and sum(len(e) for e in each if isinstance(e, str)) > LISTED:
+            raise ValueError(_TOO_MANY.format(most))
+        outer, level = level, []
+        for value in outer:
+            if isinstance(value, str):
+                texts.append(value)
+            elif isinstance(value, dict):
+                texts += value
+                level += value.values()
+            elif isinstance(value, list):
+                level += value
+                if shown and sum(len(text) for text in value if isinstance(text, str)) > LISTED:
                     raise ValueError(f"a list in it has more than {LISTED:,} letters")
-        level = inner
     if shown:
         check_texts(texts)
 

@@ -94,7 +94,8 @@ def test_what_killed_runs_left_goes_when_a_run_has_ended(to, tmp_path):
     (tmp_path / "out.00000002.partial.rrd").write_text("some frames")
     with to.holding(()):
         assert "out.00000002.partial.rrd" in names(tmp_path)
-    assert names(tmp_path) == []
+    assert names(tmp_path) == ["reports"]
+    assert names(to.reports) == []
 
 
 def test_without_locks_nothing_that_may_be_another_run_s_is_removed(to, tmp_path, monkeypatch):
