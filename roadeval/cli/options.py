@@ -225,7 +225,7 @@ def _maybe_named(names: str, text: str) -> tuple[str, str | None]:
 OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option.group)))
 """In the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
-    "topics.image": "--image-topic",
+    "topics.image": "--image-topic"
 }
 _MARKED: Final = re.compile(r"`([\w-]+(?:\.[\w-]+)*)`")
 

@@ -11,10 +11,7 @@ from typing import Final, NoReturn
 
 from roadeval.cli.exit_codes import ExitCode
 
-EXIT_CODES: Final = {
-    signal.SIGINT: ExitCode.INTERRUPTED,
-    signal.SIGTERM: ExitCode.TERMINATED,
-}
+EXIT_CODES: Final = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
 
 
 GRACE_S: Final = 0.05

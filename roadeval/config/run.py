@@ -213,10 +213,7 @@ class RunConfig(LogConfig):
         pipeline = pipeline_of(self.pipeline, tables)
         check_tables(
             tables,
-            (
-                *("chain", "only", *pipeline.settings, "variants", "masks", "cameras"),
-                *SECTIONS,
-            ),
+            (*("chain", "only", *pipeline.settings, "variants", "masks", "cameras"), *SECTIONS),
         )
         only = tables.get("only", self.only)
         if not isinstance(only, list | tuple) or not all(isinstance(name, str) for name in only):

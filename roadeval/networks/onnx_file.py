@@ -85,11 +85,7 @@ class OnnxFile:
     metadata: Mapping[str, str]
 
     def run(
-        self,
-        values: Array,
-        outputs: tuple[str, ...],
-        seconds: float,
-        grown: float = math.inf,
+        self, values: Array, outputs: tuple[str, ...], seconds: float, grown: float = math.inf
     ) -> list[Array]:
         """Compute some outputs for the values of the one input, within some seconds.
 

@@ -33,16 +33,7 @@ import numpy.typing as npt
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import (
-    ROAD,
-    Frame,
-    LayerSpec,
-    Moment,
-    Output,
-    Packed,
-    Rgb,
-    Truth,
-)
+from roadeval.data import ROAD, Frame, LayerSpec, Moment, Output, Packed, Rgb, Truth
 from roadeval.data.arrays import Flags, Places, Planes
 from roadeval.errors import RoadevalError
 

@@ -187,11 +187,7 @@ SHADOW_TRUTH: Final = LayerSpec(
     "true_shadow",
     LayerKind.MASK,
     "True shadow",
-    (
-        LabelClass(0, "lit", CLEAR),
-        LabelClass(1, "shadow", (*SHADOW, 160)),
-        IGNORED_CLASS,
-    ),
+    (LabelClass(0, "lit", CLEAR), LabelClass(1, "shadow", (*SHADOW, 160)), IGNORED_CLASS),
 )
 
 

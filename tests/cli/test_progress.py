@@ -36,10 +36,7 @@ def lines_of(steps, monkeypatch):
 
 def test_the_first_step_of_a_stage_is_a_line(monkeypatch):
     steps = [(0, step(1, 10, "training")), (1, step(2, 10, "training")), (2, step(1, 50))]
-    assert lines_of(steps, monkeypatch) == [
-        "training: 1 of 10 frames",
-        "replaying: 1 of 50 frames",
-    ]
+    assert lines_of(steps, monkeypatch) == ["training: 1 of 10 frames", "replaying: 1 of 50 frames"]
 
 
 def test_a_line_comes_now_and_then_with_rate_and_time_left(monkeypatch):

@@ -56,12 +56,7 @@ def test_every_option_arrives(asked, tmp_path):
                 "resize_truth": True,
             },
             "labels": {"road": [3, 4], "ignore": [11]},
-            "frames": {
-                "start": "1.5",
-                "end": "2013-05-01T12:00:00Z",
-                "every": 2,
-                "max_frames": 7,
-            },
+            "frames": {"start": "1.5", "end": "2013-05-01T12:00:00Z", "every": 2, "max_frames": 7},
             "output": {"save": "out.rrd", "reports": "out", "mcap": "o.mcap", "record": "none"},
             "run": {"jobs": 1},
         }
@@ -142,8 +137,7 @@ def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
 
 
 @pytest.mark.parametrize(
-    "words",
-    ["--road-color 1,2", "--road-color red", "--mask-topic net", "--mask-topic truth=/x"],
+    "words", ["--road-color 1,2", "--road-color red", "--mask-topic net", "--mask-topic truth=/x"]
 )
 def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
     assert main(["replay", "drive.mcap", *words.split()]) == 2

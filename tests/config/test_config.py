@@ -43,20 +43,14 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ("[frames]\nscale = 1.5", r"frames\.scale: .*\(given: 1.5\)"),
         ("[frames]\nstart = 'noon'", "'noon' is no time"),
         ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
-        (
-            "[labels]\nroad_colors = [[1, 2]]",
-            r"labels\.road_colors, item 1: is too short",
-        ),
+        ("[labels]\nroad_colors = [[1, 2]]", r"labels\.road_colors, item 1: is too short"),
         ("[labels]\nroad = [3, -40000]", r"labels\.road, item 2: .*\(given: -40000\)"),
         ("[training.patch]\nx = 1", r"training\.patch.x: .*choose bottom, bottom_width, top"),
         ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
         ("chain = [['post']]", r"no stage \['post'\]"),
         ("ring_width = 3", "ring_width is in no table; put it below one of .*shadow"),
         ("[output]\nsave = 'g.toml'", r"output.save g.toml: name a file that ends in .rrd"),
-        (
-            "[fleet]\nkeep = 'best:3'",
-            r"fleet\.keep: must be all, none or worst:N",
-        ),
+        ("[fleet]\nkeep = 'best:3'", r"fleet\.keep: must be all, none or worst:N"),
         (
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = [3, -1]",
             r"net\.road, item 2: must be at least 0",

@@ -35,22 +35,6 @@ def test_another_file_than_the_stated_one_is_refused(tmp_path):
         Network.of(found)
 
 
-@pytest.mark.parametrize(
-    ("classes", "last", "activation", "decide"),
-    [
-        (1, None, "sigmoid", "threshold"),
-        (1, "Sigmoid", "none", "threshold"),
-        (2, None, "softmax", "argmax"),
-        (2, "Softmax", "none", "argmax"),
-    ],
-)
-def test_what_an_output_means_follows_from_its_classes_and_what_makes_it(
-    classes, last, activation, decide, tmp_path
-):
-    found = read(network(tmp_path / "n.onnx", classes=classes, last=last))
-    assert (found.activation, found.decide) == (activation, decide)
-
-
 # --- What is asked for ----------------------------------------------------------------------------
 
 ASKED = {

@@ -40,13 +40,6 @@ def test_the_mask_is_the_one_that_numpy_computes(tmp_path):
     assert 0.2 < road.mask.mean() < 0.8
 
 
-def test_the_mask_is_where_the_probability_is_above_the_threshold(tmp_path):
-    path = network(tmp_path / "n.onnx", values=balanced(IMAGE))
-    road = opened(path, decide="threshold", threshold=0.7).road(FRAME)
-    assert np.array_equal(road.mask, road.codes > round(0.7 * CERTAIN))
-    assert road.graded
-
-
 @pytest.mark.parametrize("classes", [1, 2, 3])
 @pytest.mark.parametrize("decide", [None, "threshold", "argmax"])
 def test_a_threshold_is_heeded_whatever_decides(classes, decide, tmp_path):
@@ -98,10 +91,7 @@ def test_channels_scale_mean_and_deviation_are_applied_in_this_order(tmp_path):
     values = balanced(IMAGE)
     mean, deviation = (0.4, 0.5, 0.6), (0.2, 0.25, 0.3)
     road = opened(
-        network(tmp_path / "n.onnx", values=values),
-        channels="bgr",
-        mean=mean,
-        deviation=deviation,
+        network(tmp_path / "n.onnx", values=values), channels="bgr", mean=mean, deviation=deviation
     ).road(IMAGE)
     planes = ((IMAGE[..., ::-1] / 255 - mean) / deviation).transpose(2, 0, 1)
     expected = softmax(framed(scores(values, planes)))[1]
@@ -148,14 +138,6 @@ def test_threads_disturb_each_other_in_nothing(tmp_path):
     with ThreadPoolExecutor(8) as pool:
         together = [road.codes for road in pool.map(found.road, frames)]
     assert all(map(np.array_equal, alone, together))
-
-
-def test_numbers_that_are_none_are_an_error(tmp_path):
-    values = balanced(IMAGE)
-    values["b2"][:] = np.nan
-    path = network(tmp_path / "n.onnx", values=values)
-    with pytest.raises(NetworkError, match="NaN"):
-        opened(path).road(FRAME)
 
 
 def _depending(path, *nodes, **values):

@@ -103,13 +103,6 @@ def test_a_pipeline_keeps_the_names_of_its_chain():
 MASK = Packed.of(np.zeros((6, 8), np.uint8))
 
 
-def test_an_image_may_have_any_layout():
-    image = noise(6, 8)[:, ::-1]
-    view = View.of(image)
-    assert view.image.flags.c_contiguous
-    np.testing.assert_array_equal(view.image, image)
-
-
 def test_after_an_image_the_channels_are_its_own():
     image, filtered = noise(6, 8), 255 - noise(6, 8)
     view = View.of(image).after(Output(mask=MASK))

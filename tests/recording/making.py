@@ -60,16 +60,9 @@ WINDOW = {
     "first_frame": 2,
     "last_frame": 18,
     "frames": 17,
-} | {
-    **dict.fromkeys(TABLES["windows"].names[8:], 0.25),
-    "variant": "filtered",
-    "stage": "post",
-}
+} | {**dict.fromkeys(TABLES["windows"].names[8:], 0.25), "variant": "filtered", "stage": "post"}
 WINDOWS = ",".join(str(WINDOW[name]) for name in TABLES["windows"].names)
-RESULTS = {
-    "summary": json.dumps(SUMMARY),
-    "windows": f"{TABLES['windows'].header}{WINDOWS}\n",
-}
+RESULTS = {"summary": json.dumps(SUMMARY), "windows": f"{TABLES['windows'].header}{WINDOWS}\n"}
 RERUN = Path(sys.executable).with_name("rerun")
 
 

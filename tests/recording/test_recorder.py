@@ -18,11 +18,7 @@ import rerun as rr
 from roadeval.recording.layout import RecordingError, RecordRule
 from roadeval.recording.recorder import LEAST_FREE, Recorder
 from roadeval.recording.recording import Recording
-from tests.recording.making import (
-    layout,
-    rerun,
-    result,
-)
+from tests.recording.making import layout, rerun, result
 from tests.results.making import lines
 
 

@@ -10,14 +10,7 @@ import rerun as rr
 from roadeval.recording.layout import RecordingError, RecordRule
 from roadeval.recording.recorder import Recorder
 from roadeval.recording.recording import Recording
-from tests.recording.making import (
-    RESULTS,
-    frame,
-    layout,
-    record,
-    rows_of,
-    unscored,
-)
+from tests.recording.making import RESULTS, frame, layout, record, rows_of, unscored
 from tests.results.making import lines
 
 

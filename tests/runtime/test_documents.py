@@ -5,12 +5,7 @@ import time
 
 import pytest
 
-from roadeval.runtime.documents import (
-    LONGEST,
-    read_bounded,
-    read_json,
-    read_toml,
-)
+from roadeval.runtime.documents import LONGEST, read_bounded, read_json, read_toml
 
 BIG = "x" * (LONGEST + 1)
 MANY = "y" * 1_001

@@ -6,13 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roadeval.runtime.text import (
-    UNENCODABLE,
-    as_markdown,
-    visible,
-    visible_lines,
-    without_secrets,
-)
+from roadeval.runtime.text import UNENCODABLE, as_markdown, visible, visible_lines, without_secrets
 
 ANYTHING = st.text(st.characters(codec=None))
 

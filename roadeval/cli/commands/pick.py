@@ -37,8 +37,7 @@ def pick(
         arguments.option("--format", "Of the present masks, which are to be corrected."),
     ] = "png",
     variant: Annotated[
-        str | None,
-        arguments.option("--by", "Whose masks and doubt. Default: the first.", "NAME"),
+        str | None, arguments.option("--by", "Whose masks and doubt. Default: the first.", "NAME")
     ] = None,
     seed: Annotated[int, arguments.option("--seed", "Of the drawing.", "N", min=0)] = 0,
     given: Given,

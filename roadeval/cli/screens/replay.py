@@ -15,12 +15,7 @@ from roadeval.evaluation.score import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections.ground import distance_table
-from roadeval.report.tables import (
-    cameras_table,
-    differences_table,
-    stages_table,
-    thresholds_table,
-)
+from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction, without_truth
 

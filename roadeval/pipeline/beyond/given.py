@@ -30,9 +30,5 @@ def bind(settings: GivenSettings, _learnt: None, view: View) -> Output:
 
 
 STAGE: Final = Stage(
-    name="given",
-    title="Another method's masks",
-    settings=GivenSettings,
-    bind=bind,
-    layers=(GIVEN,),
+    name="given", title="Another method's masks", settings=GivenSettings, bind=bind, layers=(GIVEN,)
 )

@@ -80,12 +80,7 @@ class HiddenLayer:
         return self.weights @ inner + self.shift
 
 
-def train(
-    values: Values,
-    road: Flags,
-    weights: Floats | None,
-    seed: int,
-) -> HiddenLayer:
+def train(values: Values, road: Flags, weights: Floats | None, seed: int) -> HiddenLayer:
     """Train a network with scikit-learn's Adam, by one thread.
 
     Each pass draws pixels anew by their weights, and adds other noise to their ranks: few frames

@@ -22,10 +22,7 @@ LINE: Final = 3
 wide."""
 POST: Final = mask_spec("post", "Road (Eq. 17-23)")
 BOUNDARY: Final = mask_spec(
-    "boundary",
-    "Road boundary (Eq. 22)",
-    none=colours.CLEAR,
-    boundary=(*colours.BOUNDARY, 255),
+    "boundary", "Road boundary (Eq. 22)", none=colours.CLEAR, boundary=(*colours.BOUNDARY, 255)
 )
 
 

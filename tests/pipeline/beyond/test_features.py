@@ -8,13 +8,7 @@ from skimage.graph import MCP_Geometric
 from skimage.measure import block_reduce
 from skimage.transform import downscale_local_mean
 
-from roadeval.pipeline.beyond.features import (
-    GROUPS,
-    beyond,
-    features,
-    names_of,
-    outwards,
-)
+from roadeval.pipeline.beyond.features import GROUPS, beyond, features, names_of, outwards
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import from_patch, reach, scene_of, steepness, tones_of
 

@@ -9,12 +9,7 @@ from sklearn.neural_network import MLPClassifier
 
 from roadeval.pipeline.beyond.features import GROUPS, SHADE, SUN, names_of
 from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
-from roadeval.pipeline.beyond.trees import (
-    Blend,
-    TreesSettings,
-    grow,
-    network_weight,
-)
+from roadeval.pipeline.beyond.trees import Blend, TreesSettings, grow, network_weight
 
 
 def features_and_road(seed=0, count=4000):

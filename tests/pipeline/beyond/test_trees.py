@@ -10,14 +10,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions
-from roadeval.pipeline.beyond.trees import (
-    ALL,
-    NODES,
-    Blend,
-    TreesSettings,
-    balanced_back,
-    grow,
-)
+from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, balanced_back, grow
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import reach, scene_of
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View

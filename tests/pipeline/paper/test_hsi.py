@@ -47,10 +47,3 @@ def test_conversion_inverts_on_every_seventh_level_and_on_random_colours():
 def test_colours_outside_the_cube_are_clipped():
     white_bright_red = colour.hsv_to_rgb(np.array(0.0), np.array(1.0), np.array(1.0))
     assert white_bright_red.tolist() == [255, 0, 0]
-
-
-def test_a_hue_of_360_degrees_is_red():
-    full, v = np.array(1.0), np.array(1 / 3)
-    np.testing.assert_array_equal(
-        colour.hsv_to_rgb(np.array(360.0), full, v), colour.hsv_to_rgb(np.array(0.0), full, v)
-    )
