@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from roadeval.config.run import RunConfig
     from roadeval.config.variants import Variant
     from roadeval.jobs.results.result import Result as Result_
-    from roadeval.logs.settings import LogConfig
 
 
 def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
@@ -109,22 +107,6 @@ def configuration(given: Given) -> RunConfig:
             f"({config.training.model})"
         )
     return config
-
-
-def of_a_log(given: Given) -> LogConfig:
-    """Return what options ask of a log; wrong usage as in `configuration`."""
-    from roadeval.config.camera_file import read_camera
-    from roadeval.config.run import log_config
-    from roadeval.config.tables import in_file
-
-    with usage():
-        _check_names(given, "topics.masks")
-        found = log_config({**_tables(given), **_cameras(given)})
-    if path := given.get("ground"):
-        ground = read_camera(path, found.topics.image)
-        with in_file(str(path)):
-            return replace(found, ground=log_config({"ground": ground}).ground)
-    return found
 
 
 def _variant(name: str, path: str | None) -> Variant:

@@ -384,19 +384,6 @@ def load_config(path: str | Path, *, trusted: bool = True) -> RunConfig:
     return configure(read_tables(path, trusted=trusted), where=str(path))
 
 
-def log_config(tables: Mapping[str, Any]) -> LogConfig:
-    """Return the settings of a log in some tables, without stages and their settings.
-
-    A `ConfigError` for a key or a value that cannot be used.
-    """
-    asked = LogConfig()
-    found = {
-        name: override(getattr(asked, name), tables.get(name, {}), name)
-        for name in ("topics", "truth", "labels", "frames", "ground")
-    }
-    return replace(asked, **found)
-
-
 WIDTH: Final = 100
 _BOUNDS: Final = {
     "minimum": "at least {}",

@@ -205,7 +205,9 @@ def _place(error: Exception) -> str:
     return "".join(f" ({Path(each.filename).name}:{each.lineno})" for each in own)
 
 
-KINDS: Final[Mapping[LayerKind, tuple[int, tuple[type[np.generic], ...]]]] = {
+Held = tuple[int, tuple[type[np.generic], ...]]
+"""Dimensions of an array, and the types of which one must be its own."""
+KINDS: Final[Mapping[LayerKind, Held]] = {
     LayerKind.MASK: (2, (np.bool_, np.integer)),
     LayerKind.LABELS: (2, (np.uint8,)),
     LayerKind.RGB: (3, (np.uint8,)),
@@ -223,14 +225,13 @@ def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSp
         raise TypeError("it handed out no mask (Packed.of makes one)")
     if output.mask is not None and output.mask.shape != size:
         raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
-    arrays: list[tuple[str, Any, tuple[int, tuple[type[np.generic], ...]]]] = [
-        ("image", output.image, (3, (np.uint8,))),
+    if wrong := [layer.spec.name for layer in output.layers if layer.spec not in specs]:
+        raise ValueError(f"it handed out a layer {wrong[0]!r} that it does not announce")
+    arrays: list[tuple[str, Any, Held]] = [
+        ("image", output.image, KINDS[LayerKind.RGB]),
         ("probability", output.probability, (2, (np.uint16,))),
+        *((f"layer {a.spec.name!r}", a.array, KINDS[a.spec.kind]) for a in output.layers),
     ]
-    for layer in output.layers:
-        if layer.spec not in specs:
-            raise ValueError(f"it handed out a layer {layer.spec.name!r} that it does not announce")
-        arrays.append((f"layer {layer.spec.name!r}", layer.array, KINDS[layer.spec.kind]))
     for what, array, (dimensions, types) in arrays:
         if array is None:
             continue

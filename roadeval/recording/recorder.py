@@ -83,18 +83,17 @@ def _payloads(
     result: FrameResult, camera: _Camera, kinds: Collection[LayerKind]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the images of a frame by entity path; of its layers those of some kinds."""
-    frame, codecs = result.frame, camera.codecs
+    frame, size = result.frame, (camera.layout.height, camera.layout.width)
     # The viewer takes images for a video, whose size must not change.
-    is_odd = 0 != camera.layout.width != frame.image.shape[1]
-    is_odd |= 0 != camera.layout.height != frame.image.shape[0]
+    is_odd = any(0 != a != b for a, b in zip(size, frame.image.shape[:2], strict=True))
+    pictures = [*_pictures(result, camera.plan, kinds)]
     if frame.media_type in ("image/jpeg", "image/png") and not is_odd:
         yield at.CAMERA, bytes(frame.payload)
     else:
-        codec = codecs[at.CAMERA]
-        yield at.CAMERA, codec.encode(codec.fitted(frame.image) if is_odd else frame.image)
-    for path, picture in _pictures(result, camera.plan, kinds):
+        pictures.insert(0, (at.CAMERA, frame.image))
+    for path, picture in pictures:
         if picture is not None:
-            codec = codecs[path]
+            codec = camera.codecs[path]
             yield path, codec.encode(codec.fitted(picture) if is_odd else picture)
 
 
@@ -427,14 +426,11 @@ class Recorder:
 
     def check_disk_space(self) -> None:
         """Raise a `RecordingError` if the disk is full, or as good as full; by an ENOSPC."""
-        if self._is_disk_full():
+        if self._room() < self._rows.size:
             raise RecordingError(
                 f"{self.path}: cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must "
                 "stay free)"
             ) from _failure(errno.ENOSPC)
-
-    def _is_disk_full(self) -> bool:
-        return self._room() < self._rows.size
 
     def _room(self) -> float:
         """Return the bytes beside `LEAST_FREE`; a place that is no disk, as /proc, has no end."""
@@ -508,7 +504,7 @@ class Recorder:
 
     def _refusal(self) -> OSError | None:
         """Return the error with which one more byte is refused, as at a limit or a full quota."""
-        if self._is_disk_full():
+        if self._room() < self._rows.size:
             return _failure(errno.ENOSPC)
         with suppress(ImportError):  # elsewhere than on POSIX there is no such limit
             import resource

@@ -42,10 +42,10 @@ class Checked:
 
 def meanings(kind: type) -> Mapping[str, str]:
     """Return the string after each field of a class, and of its bases; none without a source."""
-    found: dict[str, str] = {}
-    for each in reversed(kind.__mro__):
-        found |= _meanings(each.__module__).get(each.__qualname__, {})
-    return found
+    texts: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        texts |= _meanings(base.__module__).get(base.__qualname__, {})
+    return texts
 
 
 @cache
@@ -55,17 +55,13 @@ def _meanings(module: str) -> Mapping[str, Mapping[str, str]]:
         source = inspect.getsource(sys.modules[module])
     except (KeyError, OSError, TypeError):
         return {}
-    classes = [each for each in ast.parse(source).body if isinstance(each, ast.ClassDef)]
-    return {each.name: dict(_strings(each)) for each in classes}
-
-
-def _strings(described: ast.ClassDef) -> list[tuple[str, str]]:
-    found = []
-    for field, after in pairwise(described.body):
-        match field, after:
-            case (
-                ast.AnnAssign(target=ast.Name(name)),
-                ast.Expr(value=ast.Constant(value=str(text))),
-            ):
-                found.append((name, inspect.cleandoc(text)))
-    return found
+    texts: dict[str, dict[str, str]] = {}
+    for described in ast.parse(source).body:
+        for field, after in pairwise(getattr(described, "body", ())):
+            match field, after:
+                case (
+                    ast.AnnAssign(target=ast.Name(name)),
+                    ast.Expr(value=ast.Constant(value=str(text))),
+                ) if isinstance(described, ast.ClassDef):
+                    texts.setdefault(described.name, {})[name] = inspect.cleandoc(text)
+    return texts

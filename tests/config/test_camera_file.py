@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from roadeval.config.camera_file import read_camera
-from roadeval.config.run import log_config
+from roadeval.config.run import configure
 from roadeval.config.tables import ConfigError
 from roadeval.geometry.settings import GroundSettings
 
@@ -48,7 +48,7 @@ REAR = {**FRONT, "intrinsics": [400.0, 400.0, 370.0, 240.0], "rostopic": "/cam1/
 def given(folder: Path, text: str, topic: str | None = None) -> GroundSettings:
     path = folder / "camera.yaml"
     path.write_text(text)
-    return log_config({"ground": read_camera(path, topic)}).ground
+    return configure({"ground": read_camera(path, topic)}).ground
 
 
 def test_the_file_of_ros_is_read(tmp_path: Path):

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.world.camera import Camera, Pose
-from roadeval.config.run import log_config
+from roadeval.config.run import configure
 from roadeval.config.tables import ConfigError
 from roadeval.data import Calibration, Mounting
 from roadeval.geometry.ground import Ground, GroundError, ground_of
@@ -327,7 +327,7 @@ def test_a_camera_that_cannot_be_is_refused_by_the_name_of_its_setting(given: di
 )
 def test_a_file_with_a_number_that_no_camera_has_is_refused(name: str, content: object):
     with pytest.raises(ConfigError, match=rf"ground\.{name}"):
-        log_config({"ground": {name: content}})
+        configure({"ground": {name: content}})
 
 
 def test_a_plan_shows_the_pixel_in_which_each_cell_lies():

@@ -28,7 +28,7 @@ def info(
     indexes are read, unless --verify asks for all of it.
     """
     arguments.one_camera(given)
-    config = arguments.of_a_log(given)
+    config = arguments.configuration(given)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe
 
