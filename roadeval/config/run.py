@@ -126,14 +126,12 @@ class RunConfig(LogConfig):
                 raise ConfigError(
                     f"camera {name}: the name is reserved; give it another under [[cameras]]"
                 )
-        own = [name for name in ("image", "truth", "shadow", "masks") if getattr(self.topics, name)]
-        if names and own:
+        topics = ("image", "truth", "shadow", "masks")
+        of_one = [f"topics.{name}" for name in topics if getattr(self.topics, name)]
+        of_one += ["ground"] * self.ground.given
+        if names and of_one:
             raise ConfigError(
-                f"`topics.{own[0]}`: which camera's? Name it under [[cameras]], beside its image"
-            )
-        if names and self.ground.given:
-            raise ConfigError(
-                "`ground`: which camera's? Name it under [[cameras]], beside its image"
+                f"`{of_one[0]}`: which camera's? Name it under [[cameras]], beside its image"
             )
         if names and (self.truth.path or self.masks):
             raise ConfigError(
@@ -150,23 +148,16 @@ class RunConfig(LogConfig):
         """Return the configuration of each camera by its name; of one camera alone by ``""``."""
         if not self.cameras:
             return {"": self}
-        topics = (
+        configs = {}
+        for camera in self.cameras:
+            topics: dict[str, Any] = {"image": camera.image, "masks": camera.masks}
             # An empty name under [topics] takes no topic, of any camera.
-            replace(
-                self.topics,
-                image=each.image,
-                truth=self.topics.truth if each.truth is None else each.truth,
-                shadow=self.topics.shadow if each.shadow is None else each.shadow,
-                masks=each.masks,
+            topics |= {"truth": camera.truth} if camera.truth is not None else {}
+            topics |= {"shadow": camera.shadow} if camera.shadow is not None else {}
+            configs[visible(camera.name or camera.image)] = replace(
+                self, cameras=(), ground=camera.ground, topics=replace(self.topics, **topics)
             )
-            for each in self.cameras
-        )
-        return {
-            visible(each.name or each.image): replace(
-                self, cameras=(), ground=each.ground, topics=own
-            )
-            for each, own in zip(self.cameras, topics, strict=True)
-        }
+        return configs
 
     def pipelines(self) -> dict[str, Pipeline]:
         """Return the pipeline of every variant, by name."""

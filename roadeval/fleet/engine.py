@@ -54,7 +54,11 @@ def started(
 
     with ExitStack() as stack:
         if scheduler is None:
-            stack.enter_context(_safe_path())
+            # A worker receives this process's own path only after it has imported some modules:
+            # until then it shall import nothing from the current folder.
+            if not os.environ.get("PYTHONSAFEPATH"):
+                os.environ["PYTHONSAFEPATH"] = "1"
+                stack.callback(os.environ.pop, "PYTHONSAFEPATH", None)
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or dask.system.CPU_COUNT
             client = stack.enter_context(_local(distributed, count))
@@ -69,24 +73,6 @@ def started(
 def died(error: BaseException) -> bool:
     """Return whether an error means that the workers of a task have died."""
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
-
-
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let Python processes that begin in the block import nothing from the current folder.
-
-    A worker receives this process's own path, but only after it has imported some modules. Dask's
-    own setting would stay in this process's environment.
-    """
-    before = os.environ.get("PYTHONSAFEPATH")
-    os.environ["PYTHONSAFEPATH"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["PYTHONSAFEPATH"]
-        else:
-            os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextmanager

@@ -27,13 +27,13 @@ class Pipeline:
         """Return the stages, in order."""
         return stages_of(self.chain)
 
-    def _each(self) -> Iterator[tuple[Stage, Any]]:
-        """Yield the stages with their settings."""
-        return ((stage, self.settings[stage.name]) for stage in self.stages())
+    def _pairs(self) -> list[tuple[Stage, Any]]:
+        """Return the stages with their settings."""
+        return [(stage, self.settings[stage.name]) for stage in self.stages()]
 
     def layers(self) -> tuple[LayerSpec, ...]:
         """Return the layers that the stages will hand out, in order."""
-        return tuple(spec for stage, own in self._each() for spec in stage.specs(own))
+        return tuple(spec for stage, own in self._pairs() for spec in stage.specs(own))
 
     def masks(self) -> tuple[str, ...]:
         """Return the names of the stages that make a road mask, in order."""
@@ -62,13 +62,13 @@ class Pipeline:
                 for key, value in asdict(own).items()
                 if key not in (*stage.inference_only, *stage.places)
             }
-            for stage, own in self._each()
+            for stage, own in self._pairs()
             if stage.fit is not None or not stage.yields_mask or stage in heard
         }
 
     def heard(self) -> tuple[Stage, ...]:
         """Return the stages whose masks a later one learns from; none where no stage hears any."""
-        pairs = [*self._each()]
+        pairs = self._pairs()
         last = max((n for n, (s, own) in enumerate(pairs) if s.hears and s.hears(own)), default=0)
         return tuple(stage for stage, _ in pairs[:last] if stage.yields_mask)
 
@@ -77,17 +77,17 @@ class Pipeline:
 
         A `RoadevalError` if a file cannot be used.
         """
-        found = {stage.name: stage.resolve(own) for stage, own in self._each() if stage.resolve}
+        found = {stage.name: stage.resolve(own) for stage, own in self._pairs() if stage.resolve}
         return replace(self, settings={**self.settings, **found})
 
     def without_places(self) -> Pipeline:
         """Return the pipeline without the settings that say where files lie."""
-        blank = {s.name: replace(own, **dict.fromkeys(s.places, "")) for s, own in self._each()}
+        blank = {s.name: replace(own, **dict.fromkeys(s.places, "")) for s, own in self._pairs()}
         return replace(self, settings=blank)
 
     def about(self) -> dict[str, dict[str, Any]]:
         """Return what results say of stages beside their settings, by stage."""
-        return {stage.name: dict(stage.about(own)) for stage, own in self._each() if stage.about}
+        return {stage.name: dict(stage.about(own)) for stage, own in self._pairs() if stage.about}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the chain and its settings as plain data, in the shape of a TOML file."""
@@ -100,7 +100,7 @@ class Pipeline:
         A `MisfitError` if that does not fit the settings.
         """
         steps = []
-        for stage, own in self._each():
+        for stage, own in self._pairs():
             learnt = parameters.get(stage.name)
             steps.append(Step(stage, own, learnt, stage.bind(own, learnt)))
         return Chain(tuple(steps))

@@ -63,13 +63,6 @@ def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
         assert_same(told[name], mask, name)
 
 
-def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
-    outputs = [result.output for result in chain.run(SEEN)]
-    told = dict(chain.oracles(SEEN, outputs, ROAD, outputs[0].regions["shadow"].pixels()))
-    for name, mask in masks(chain, IMAGE).items():
-        assert_same(told["shadow"][name], mask, name)
-
-
 def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     names = ("exposure", *NAMES)
     settings = {step.stage.name: step.settings for step in chain.steps}

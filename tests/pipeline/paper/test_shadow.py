@@ -32,7 +32,15 @@ def run(image, options=None):
     return output, {layer.spec.name: layer.array for layer in output.layers}
 
 
-# --- Eq. 6 ----------------------------------------------------------------------------------------
+# --- Eq. 3-6 --------------------------------------------------------------------------------------
+
+
+def test_the_conversion_from_hue_saturation_and_value_inverts_theirs():
+    levels = np.append(np.arange(0, 256, 7), 255).astype(np.uint8)
+    lattice = np.stack(np.meshgrid(levels, levels, levels), axis=-1)
+    for rgb in (lattice, noise(300, 300)):
+        back = shadow.hsv_to_rgb(shadow.hue(rgb), shadow.saturation(rgb), shadow.value(rgb))
+        np.testing.assert_array_equal(back, rgb)
 
 
 def test_ndi_of_every_sum_and_minimum():
