@@ -147,7 +147,10 @@ def road_probability(
         return reduce(np.add, road), road
     rest = reduce(np.maximum, map(plane, others), np.full_like(best, -HUGE))
     if settings.decide == "argmax":
-        against = _share if settings.activation == "none" else _odds
+
+        def against(one: Values, other: Values) -> Values:
+            return _share(one, other) if settings.activation == "none" else sigmoid(one - other)
+
         rivals = [
             reduce(np.maximum, [*road[:place], *road[place + 1 :]], rest)
             for place in range(len(road))
@@ -158,10 +161,6 @@ def road_probability(
     whole = reduce(np.add, chain(powers, (np.exp(plane(number) - most) for number in others)))
     shares: list[Values] = [power / whole for power in powers]
     return reduce(np.add, shares), shares
-
-
-def _odds(one: Values, other: Values) -> Values:
-    return sigmoid(one - other)
 
 
 def _share(one: Values, other: Values) -> Values:

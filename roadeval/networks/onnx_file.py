@@ -253,8 +253,9 @@ def weight_files(model: memoryview) -> Iterator[str]:
     while waiting:
         kind, message = waiting.pop()
         if kind == "entry":
-            key, value = ([*map(_text, _all(message, number))][-1:] for number in (1, 2))
-            yield from value if key == ["location"] else ()
+            key, value = ([*_all(message, number)][-1:] for number in (1, 2))
+            if key == [b"location"]:
+                yield from (bytes(name).decode(errors="replace") for name in value)
             continue
         for number, value in protobuf_fields(message):
             if (inner := HOLDING[kind].get(number)) and isinstance(value, memoryview):
@@ -266,7 +267,3 @@ def _all(message: memoryview, number: int, *inner: int) -> Iterator[memoryview]:
     for found, value in protobuf_fields(message):
         if found == number and isinstance(value, memoryview):
             yield from _all(value, *inner) if inner else (value,)
-
-
-def _text(value: memoryview) -> str:
-    return bytes(value).decode(errors="replace")

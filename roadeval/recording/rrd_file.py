@@ -104,11 +104,11 @@ class RrdFile:
             self._places[place.path].append(place)
 
     def span(self, path: str) -> Span:
-        """Return from which frame to which an entity has rows."""
-        spans = [place.span for place in self._places.get(self.below + path, ()) if place.span]
-        return Span(
-            min((s.first for s in spans), default=inf), max((s.last for s in spans), default=-inf)
-        )
+        """Return from which frame to which an entity has rows, but for what was logged once."""
+        places = self._places.get(self.below + path, ())
+        spans = [place.span for place in places if place.span and place.span != ALWAYS]
+        firsts, lasts = zip(*spans, strict=True) if spans else ([inf], [-inf])
+        return Span(min(firsts), max(lasts))
 
     def batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
         """Yield the rows of an entity that have a value, a batch a message.
@@ -126,11 +126,11 @@ class RrdFile:
         kept = self._kept.get(path)
         if kept is None or not kept[0].holds(frame):
             places = self._places.get(self.below + path, ())
-            spans = [(p.span, p) for p in places if p.span and p.span != ALWAYS]
-            here = [place for span, place in spans if span.holds(frame)]
+            spans = {p: p.span for p in places if p.span and p.span != ALWAYS}
+            here = {place: span for place, span in spans.items() if span.holds(frame)}
             if not here:
                 return None
-            firsts, lasts = zip(*(span for span, _ in spans if span.holds(frame)), strict=True)
+            firsts, lasts = zip(*here.values(), strict=True)
             images: dict[int, pa.ListScalar] = {}
             for batch in self._at(component, here):
                 frames = batch.column(FRAME).to_pylist()

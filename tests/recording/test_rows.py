@@ -33,11 +33,6 @@ def run(frames, rows, limits=WAIT):
         yield frames, key[0], rows_of(batcher[key])
 
 
-@pytest.mark.parametrize(("frames", "waits"), [(0, 8), (71, 8), (80, 10), (511, 63), (9999, 64)])
-def test_rows_wait_for_a_part_of_the_frames_so_far(frames, waits):
-    assert WAIT.after(frames) == waits
-
-
 def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
     ended = list(run(1000, lambda frame: [("/a", numbers, (frame,))]))
     assert [row for *_, rows in ended for row in rows] == list(range(1000))
