@@ -42,11 +42,6 @@ app = typer.Typer(
 )
 
 
-def _place(name: str) -> int:
-    """Return the place of a command in the help."""
-    return FIRST.index(name) if name in FIRST else len(FIRST)
-
-
 class Command(TyperCommand):
     """A command whose help shows the options part by part."""
 
@@ -63,7 +58,8 @@ class Command(TyperCommand):
                 formatter.write_dl(records)
 
 
-for _name in sorted((each.name for each in iter_modules(commands.__path__)), key=_place):
+_others = sorted({module.name for module in iter_modules(commands.__path__)} - {*FIRST})
+for _name in (*FIRST, *_others):
     # A command is the function that bears its file's name.
     app.command(cls=Command)(getattr(import_module(f"{commands.__name__}.{_name}"), _name))
 
@@ -166,5 +162,5 @@ def _usage(error: typer.TyperException) -> str:
     sentence = sentence.removeprefix("Invalid value: ")
     sentence = _NO_NUMBER.sub(lambda found: f"must be a {_NUMBERS[found[1]]}", sentence)
     context = getattr(error, "ctx", None)
-    sentence = messages.one_line(sentence)
+    sentence = " ".join(line.strip() for line in sentence.splitlines())
     return f"{sentence}; see '{context.command_path} --help'" if context else sentence

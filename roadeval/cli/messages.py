@@ -66,11 +66,6 @@ def interrupted(sentence: object) -> None:
     _write("interrupted", "bold yellow", sentence)
 
 
-def one_line(sentence: object) -> str:
-    """Join the lines of what a library says, so that a message is one line."""
-    return " ".join(line.strip() for line in str(sentence).splitlines())
-
-
 def _write(kind: str, style: str, sentence: object) -> None:
     said = visible(without_secrets(str(sentence)))
     try:

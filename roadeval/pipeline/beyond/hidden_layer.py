@@ -92,7 +92,10 @@ def train(values: Values, road: Flags, weights: Floats | None, seed: int) -> Hid
     lowest, highest = np.percentile(values, [OUTER, 100 - OUTER], axis=0).astype(np.float32)
     scale = (CODES - 1) / np.maximum(highest - lowest, LEAST)
     features = np.ascontiguousarray(values.T)
-    ranks = np.stack([_ranks(each) for each in codes_of(features, lowest, scale)])
+    # Of each code the share of pixels below it less that above it.
+    counts = [np.bincount(codes, minlength=CODES) for codes in codes_of(features, lowest, scale)]
+    shares = [(2 * count.cumsum() - count) / len(road) - 1 for count in counts]
+    ranks = np.stack(shares).astype(np.float32)
     seen = np.ascontiguousarray(ranked(features, lowest, scale, ranks).T)
     rng, count = np.random.default_rng(seed), len(road)
     chances = None if weights is None else weights / weights.sum()
@@ -142,10 +145,3 @@ def ranked(values: Values, lowest: Values, scale: Values, ranks: Values) -> Valu
     for place, code, rank in zip(found, codes, ranks, strict=True):
         place[...] = cv2.LUT(code[None], rank[None])[0]
     return found
-
-
-def _ranks(codes: Codes) -> Values:
-    """Return for each code the share of pixels below it less that above it, ``(CODES,)``."""
-    counts = np.bincount(codes, minlength=CODES)
-    below = np.cumsum(counts) - counts
-    return ((2 * below + counts) / len(codes) - 1).astype(np.float32)
