@@ -481,9 +481,10 @@ class FrameStream:
         self._selection = selection
         self.numbers: Final = numbers
         """The numbers of the frames that are asked for, in order."""
-        begin = int(images.log_times[numbers[0]])
+        begin, few = int(images.log_times[numbers[0]]), are_few(images, numbers)
         self._labels: dict[str, tuple[LabelSource, Partners]] = {
-            name: (source, source.partners(begin)) for name, source in selection.labels.items()
+            name: (source, source.partners(begin, few=few))
+            for name, source in selection.labels.items()
         }
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
         if isinstance(self._pictures, Video):
@@ -579,14 +580,20 @@ def looked_at(selection: Selection) -> Iterator[str]:
     yield from stream.accounting.notes
 
 
+def are_few(images: TopicReader, numbers: Sequence[int]) -> bool:
+    """Return whether images between these lie in chunks that need not be read for these."""
+    between = range(numbers[0], numbers[-1] + 1)
+    return images.chunks_of(numbers) < images.chunks_of(between)
+
+
 def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int]) -> Iterator[int]:
     """Yield those of some frames, in order, that have a label, and read no more than that takes.
 
     They are looked for image by image, or label by label where fewer chunks are read for that.
     """
-    ends = []
+    ends, few = [], are_few(images, numbers)
     for number in (*numbers[-2:], numbers[0]):  # of the last two one may have a damaged stamp
-        partners = source.partners(int(images.log_times[number]))
+        partners = source.partners(int(images.log_times[number]), few=few)
         partners.of(number)
         ends.append(partners.near)
     *last, first = ends
@@ -596,7 +603,8 @@ def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int])
         yield from (number for number in numbers if partners.of(number) is not None)
         return
     wanted = frozenset(numbers)
-    found = (each for each in frames_of(source.pairing, begin, end) if each in wanted)
+    by_label = frames_of(source.pairing, begin, end, few=True)
+    found = (number for number in by_label if number in wanted)
     waiting = sorted(islice(found, 2 * REACH))  # labels may be logged nearly in order
     yield from (heappushpop(waiting, number) for number in found)
     yield from sorted(waiting)

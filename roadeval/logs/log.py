@@ -28,7 +28,7 @@ from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
-from roadeval.logs.truth.pairing import shown_name, with_keys
+from roadeval.logs.truth.names import shown_name, with_keys
 from roadeval.runtime.text import visible
 
 

@@ -1,5 +1,6 @@
 """Frames and truth out of a log."""
 
+import random
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -176,7 +177,7 @@ def test_labels_are_paired_only_within_the_range(
     messages += [("/labels", each + 50, raw(each, mask, "mono8")) for each in stamps[::4]]
     messages.sort(key=lambda message: message[1])
     path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
-    topics = TopicSettings(sync_tolerance_ms=1e-3)
+    topics = TopicSettings(sync_tolerance_ms=5e-5)
     monkeypatch.setattr(reader, "SMALL", 0)  # of small logs all stamps are read
     with open_log(path, LogConfig(topics=topics, frames=frames)) as log:
         selection = log.select()
@@ -185,6 +186,39 @@ def test_labels_are_paired_only_within_the_range(
         assert len(found) >= 3
         assert all(number % 4 == 0 for number in found)
         assert len(read) < len(messages) / 8
+
+
+@pytest.mark.parametrize("future", [0, 5_000_000])
+@pytest.mark.parametrize(("late", "jitter"), [(0, 0), (70, 0), (-400, 0), (70, 60), (3000, 300)])
+def test_of_few_frames_each_has_the_label_that_it_has_among_all(
+    tmp_path: Path, late: int, jitter: int, future: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Labels are logged later than images, more or less, and one frame's stamps lie ahead."""
+    monkeypatch.setattr(reader, "SMALL", 0)
+    chance, mask = random.Random(late), grey(0)
+    mask[3:] = 255
+    messages = []
+    for number in range(200):
+        stamp = 20_000_000 + 100 * number + future * (number == 40)
+        at = 20_000_000 + 100 * number + chance.randint(0, jitter)
+        messages.append(("/camera", at, compressed(stamp, jpeg(grey(number)))))
+        if number % 4 == 0:
+            at += late + chance.randint(0, jitter)
+            stamp += 0 if future else chance.randint(-20, 20)
+            messages.append(("/labels", at, raw(stamp, mask, "mono8")))
+    messages.sort(key=lambda message: message[1])
+    path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
+    labelled = []
+    for every in (1, 10):
+        config = LogConfig(frames=FrameSettings(every=every))
+        with open_log(path, config) as log:
+            selection = log.select()
+            read = chunks_read(log, monkeypatch)
+            stream = log.frames(selection)
+            labelled.append({f.number: f.labelled for f in stream if f.number % 10 == 0})
+    assert labelled[0] == labelled[1]
+    assert sum(labelled[1].values()) == 10 or jitter > 100
+    assert jitter or future or len(read) < 50
 
 
 def two_cameras(path: Path, names: list[str]) -> Path:

@@ -33,10 +33,9 @@ from roadeval.logs.settings import NS
 
 PROBES: Final = 3
 """Messages to try before a topic counts as undecodable."""
-KEPT: Final = 32
-"""Messages of a topic to keep, those of at most `KEPT_BYTES`: a label's stamp is looked at before
-its turn, and its chunk, mostly of other topics, is long forgotten when its picture is needed."""
-KEPT_BYTES: Final = 1 << 18
+KEPT_BYTES: Final = 16 << 20
+"""Bytes of a topic's messages to keep, small ones: a label's stamp is looked at before its turn,
+and its chunk, mostly of other topics, is long forgotten when its picture is needed."""
 SMALL: Final = 50_000_000
 """Bytes of a log that is read whole where that is of use: it takes a moment."""
 CLOUDS: Final = ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
@@ -231,7 +230,10 @@ class TopicReader:
         """Of each message the offset, the number of its channel here, and that of its chunk."""
         # An array of Python's own: each image asks for some thirty stamps, one by one.
         self._stamps = array("q", [UNREAD]) * len(table)
+        self.delays: tuple[int, int] | None = None
+        """The least and the greatest time from stamp to log time, of those that were read."""
         self._kept: dict[int, Message] = {}
+        self._kept_bytes = 0
 
     def __len__(self) -> int:
         return len(self.log_times)
@@ -246,12 +248,13 @@ class TopicReader:
             message = self._read(position)
         if message is None:
             raise self._error(position, "no message where the index says")
-        if len(message.data) <= KEPT_BYTES:
+        if len(message.data) <= KEPT_BYTES >> 6:
             # A copy: its own bytes hold the whole chunk in memory.
             message = message._replace(data=memoryview(bytes(message.data)))
             self._kept[position] = message
-            if len(self._kept) > KEPT:
-                del self._kept[next(iter(self._kept))]
+            self._kept_bytes += len(message.data)
+            while self._kept_bytes > KEPT_BYTES:
+                self._kept_bytes -= len(self._kept.pop(next(iter(self._kept))).data)
         return message
 
     def _read(self, position: int) -> Message | None:
@@ -304,8 +307,16 @@ class TopicReader:
                 stamp = UNREADABLE
             if not UNREADABLE <= stamp < 2**63:  # no time that a table could hold
                 stamp = UNREADABLE
+            if stamp != UNREADABLE:
+                delay = int(self.log_times[position]) - stamp
+                least, greatest = self.delays or (delay, delay)
+                self.delays = min(least, delay), max(greatest, delay)
             self._stamps[position] = stamp
         return stamp
+
+    def knows(self, position: int) -> bool:
+        """Return whether the header stamp of a message was read before."""
+        return self._stamps[position] != UNREAD
 
     def frame_id(self, position: int) -> str:
         """Return the camera's name in a message's header; empty if it has none or is damaged."""

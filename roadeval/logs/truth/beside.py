@@ -22,7 +22,7 @@ from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPictu
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, LabelFormat, Meant, Size, settled
-from roadeval.logs.truth.pairing import LabelSet, NamedLabel
+from roadeval.logs.truth.names import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
 from roadeval.runtime.discovery import found_in
 from roadeval.runtime.documents import read_bounded, read_json

@@ -35,17 +35,18 @@ from roadeval.logs.messages.pixels import (
 from roadeval.logs.settings import Color, LabelPlace, LabelSettings, MaskSettings
 from roadeval.logs.topics.choose import lossy_labels
 from roadeval.logs.topics.reader import TopicReader
+from roadeval.logs.truth.names import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
     Camera,
     LabelPictures,
-    LabelSet,
-    NamedLabels,
     Pairing,
     Partners,
     by_number,
     by_time,
     check_times,
+    first_positions,
+    frames_of,
 )
 
 UNKNOWN: Final = 254
@@ -372,9 +373,10 @@ class LabelSource:
         """Whether they are thresholds on how probable road is."""
         return isinstance(self.meaning, Confidence)
 
-    def partners(self, logged_ns: int) -> Partners:
-        """Pair images with labels, beginning at an image of that log time."""
-        return Partners(self.pairing, int(np.searchsorted(self.pictures.log_times, logged_ns)))
+    def partners(self, logged_ns: int, *, few: bool = False) -> Partners:
+        """Pair images, perhaps only a few, with labels, beginning at an image of that log time."""
+        near = int(np.searchsorted(self.pictures.log_times, logged_ns))
+        return Partners(self.pairing, near, few=few)
 
     def label(self, position: int) -> Label:
         """Read the label at a position; it is not decoded yet."""
@@ -414,9 +416,11 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
     """
     count = len(pictures)
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
-    for position in sorted({*range(min(LOOKED_AT, count)), *spread}):
+    for position in sorted({*first_positions(pictures), *spread}):
         with suppress(FrameError):
-            yield position, pictures.picture(position)
+            picture = pictures.picture(position)
+            pictures.stamp(position)  # now or never is known how late labels are logged
+            yield position, picture
 
 
 def beside_log(
@@ -445,7 +449,7 @@ def beside_log(
         raise LogError(f"`topics.sync_offset_ms` is for stamps, and {where} is paired by {by}")
     if by == "stamp":
         pairing = by_time(labels, camera, offset_ms)
-        check_times(pairing, labels.name, camera.clock)
+        check_times(pairing, labels.name)
     else:
         pairing = by_number(labels, settings, camera.images)
     notes: tuple[str, ...] = ()
@@ -508,7 +512,7 @@ def check_size(
     wanted = camera.topic.size
     if size is None or wanted is None or size == wanted:
         return
-    image = Partners(replace(own, images=own.labels, labels=own.images)).of(position)
+    image = next(frames_of(own, position, position + 1), None)
     if image is not None:
         with suppress(BadMessage, FrameError):
             wanted = size_of(camera.images.picture(image), camera.images.limits) or wanted

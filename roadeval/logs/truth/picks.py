@@ -20,7 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 from roadeval.data import ROAD, Truth
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import some
-from roadeval.logs.truth.pairing import NamedLabels
+from roadeval.logs.truth.names import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
 PICK: Final = "pick.json"

@@ -13,7 +13,7 @@ from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth.beside import labels_in, npy_picture
 from roadeval.logs.truth.labels import Confidence, log_and_topic
-from roadeval.logs.truth.pairing import NamedLabels, with_keys
+from roadeval.logs.truth.names import NamedLabels, with_keys
 from tests.logs.making import png
 
 

@@ -17,7 +17,7 @@ from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import LabelSettings, MaskSettings
 from roadeval.logs.truth.beside import file_label
 from roadeval.logs.truth.labels import meaning_of, seen_in, understand
-from roadeval.logs.truth.pairing import LabelSet, with_keys
+from roadeval.logs.truth.names import LabelSet, with_keys
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()

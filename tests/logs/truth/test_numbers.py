@@ -14,7 +14,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.settings import LabelPlace
 from roadeval.logs.topics.choose import check_names
 from roadeval.logs.topics.reader import TopicInfo
-from roadeval.logs.truth.pairing import LabelSet, NamedLabel, with_keys
+from roadeval.logs.truth.names import LabelSet, NamedLabel, with_keys
 
 
 def frames_of(labelled, frames, **settings):

@@ -1,0 +1,247 @@
+"""Labels that have names, beside the log: which frame each belongs to.
+
+A name has the frame's number, or its time, or is that of an image.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.images.formats import ImageError, Limits
+from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.files import (
+    IMAGES,
+    NUMBER,
+    bare,
+    images_of,
+    listed,
+    matching,
+    ordered,
+    some,
+    time_in,
+    without_hashes,
+)
+from roadeval.logs.messages.pictures import Picture
+from roadeval.logs.settings import LabelPlace
+from roadeval.runtime.text import visible
+
+SHORT: Final = 10
+"""Digits of what may be a time in seconds, or a frame's number with zeros before it."""
+_DIGITS: Final = 18
+"""Most digits of a number that 64 bits hold."""
+
+
+@dataclass(frozen=True)
+class NamedLabel:
+    """One label beside the log. All that a label format has to give is a list of them."""
+
+    path: Path
+    """The file that it is named after, whether it is there or not; messages show it."""
+    content: Callable[[], bytes]
+    """Read what the label is made of; an OSError if that fails."""
+    picture: Callable[[bytes, Limits], Picture]
+    """Return the picture of that content; a `BadMessage` or `ImageError` if there is none."""
+
+
+@dataclass(frozen=True)
+class LabelSet:
+    """The labels of a folder or a file, and the names of their classes."""
+
+    labels: Sequence[NamedLabel]
+    classes: Mapping[str, int] = field(default_factory=dict)
+    """Values of the classes by their names, where the format has names."""
+    occurring: Mapping[str, int] = field(default_factory=dict)
+    """In how many labels each class occurs, if that is known without decoding them."""
+    notes: tuple[str, ...] = ()
+    """Warnings about the labels, a sentence each."""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedLabels:
+    """Labels in the order of their keys: the number, or the stamp, of each one's frame."""
+
+    name: str
+    """The folder or file, for messages."""
+    labels: tuple[NamedLabel, ...]
+    origin: LabelSet
+    """Where they come from, with the names of their classes."""
+    log_times: npt.NDArray[np.int64]
+    """``(n,)``: the keys, rising."""
+    by: str
+    """``number``, ``stamp`` or ``name``: where the keys come from."""
+    limits: Limits
+    """On the images."""
+    first: int = 0
+    """The number in the name of the first frame's label."""
+    nameless: int = 0
+    """Further labels, whose name no image has."""
+    images: int | None = None
+    """How many images the folder holds whose names they have; None where names mean nothing."""
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    @property
+    def sure(self) -> int:
+        """How many of them certainly have their key: all."""
+        return len(self.labels)
+
+    def stamp(self, position: int) -> int:
+        """Return the key of a label."""
+        return int(self.log_times[position])
+
+    def picture(self, position: int) -> Picture:
+        """Read a label; a `FrameError` if that fails."""
+        label = self.labels[position]
+        try:
+            return label.picture(label.content(), self.limits)
+        except (OSError, BadMessage, ImageError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise FrameError(f"{self.place(position)}: {reason}") from error
+
+    def place(self, position: int) -> str:
+        """Return a label's path, for messages to people."""
+        return visible(str(self.labels[position].path))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all keys and labels, in hexadecimal; a `LogError` if one cannot be read."""
+        digest = hashlib.sha256()
+        for key, label in zip(self.log_times.tolist(), self.labels, strict=True):
+            try:
+                content = label.content()
+            except OSError as error:
+                raise LogError(f"{label.path}: {error.strerror}") from error
+            digest.update(f"{key} {hashlib.sha256(content).hexdigest()}\n".encode())
+        return digest.hexdigest()
+
+
+def with_keys(
+    origin: LabelSet, name: str, settings: LabelPlace, limits: Limits, frames: int | None = None
+) -> NamedLabels:
+    """Find the key of each label by its name, as the settings ask.
+
+    ``frames`` is the number of frames of the log, if no loss leaves it open. A `LogError` if a name
+    has no key, two labels have the same, or it is not plain which digits or which first number
+    count.
+    """
+    shown = {label.path: shown_name(label.path, name) for label in origin.labels}
+    names = {path: text for path, text in shown.items() if matching(settings.names, text)}
+    if not names:
+        theirs = some([*shown.values()])
+        raise LogError(f"{name}: no label has a name as `truth.names` {settings.names}: {theirs}")
+    images = None if settings.images is None else _images(Path(settings.images))
+    by, keys = _keys(names, settings, images)
+    if images is not None and not keys:
+        raise LogError(
+            f"{name}: none of them has the name of an image in {settings.images}: theirs are "
+            f"{some([*names])}, the images' {some(images)}; without `truth.images` numbers or "
+            "stamps pair them"
+        )
+    labels = [label for label in origin.labels if label.path in keys]
+    labels.sort(key=lambda label: keys[label.path])
+    for one, other in pairwise(label.path for label in labels):
+        if keys[one] == keys[other]:
+            first, second = (one, other) if one.name == other.name else (one.name, other.name)
+            both = f"{visible(str(first))} and {visible(str(second))}"
+            raise LogError(f"{name}: {both} belong to the same frame, by {by}")
+    rising = np.array([keys[label.path] for label in labels], np.int64)
+    number = settings.first or 0
+    if by == "number":
+        number = _first_number(rising, frames, name) if settings.first is None else number
+        rising -= number
+    return NamedLabels(
+        visible(name),
+        tuple(labels),
+        origin,
+        rising,
+        by,
+        limits,
+        number,
+        nameless=sum(label.path in names for label in origin.labels) - len(labels),
+        images=None if images is None else len(images),
+    )
+
+
+def shown_name(file: Path, folder: str) -> str:
+    """Return the name of a label's file as seen from the folder of all."""
+    inside = file.relative_to(folder) if file.is_relative_to(folder) else file
+    return inside.as_posix()
+
+
+def _images(folder: Path) -> list[Path]:
+    """Return the images of a folder in the order in which `pack` logs them."""
+    images, _ = ordered(listed(folder, IMAGES))
+    if len({image.stem for image in images}) < len(images):
+        raise LogError(f"{folder}: two of its images have the same name")
+    return images
+
+
+def _keys(
+    files: Mapping[Path, str], settings: LabelPlace, images: Sequence[Path] | None
+) -> tuple[str, dict[Path, int]]:
+    """Return what the keys are, and the key of each file that has one."""
+    if images is not None:
+        places = {image: place for place, image in enumerate(images)}
+        return "name", {file: places[image] for file, image in images_of([*files], images).items()}
+    times = {file: time for file in files if (time := time_in(bare(file))) is not None}
+    are_times = len(times) == len(files) and all(len(bare(file)) > SHORT for file in files)
+    if settings.pair == "number" or (settings.pair is None and not are_times):
+        return "number", _numbers(files, settings.names)
+    for file in files:
+        if file not in times:
+            raise LogError(f"{file}: its name is not a time, so its frame cannot be found")
+    return "stamp", times
+
+
+def _numbers(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
+    """Return the number in the name of each file: the group of digits by which the names differ.
+
+    A pattern with `NUMBER` says where it is. A `LogError` if the names differ otherwise, too.
+    """
+    first, *_, last = *files, *files
+    if NUMBER in pattern:
+        digits = (*(match[1] for name in files.values() if (match := matching(pattern, name))),)
+    else:
+        parts = [re.split(r"(\d+)", name) for name in without_hashes([*map(bare, files)])]
+        groups = [*zip(*(part[1::2] for part in parts), strict=False)]
+        varied = [group for group in groups if len({text.lstrip("0") for text in group}) > 1]
+        digits, *others = varied or groups[-1 if len(files) > 1 else 0 :] or [()]
+        texts = zip(files, parts, strict=True)
+        odd_one = next((file for file, part in texts if part[::2] != parts[0][::2]), None)
+        if others or odd_one:
+            raise LogError(
+                f"{some(sorted({first, odd_one or last}))}: the names do not tell which digits are "
+                f"the frame's number: show them by `truth.names`, as frame_{NUMBER}_*; or name the "
+                "folder of the log's images by `truth.images`"
+            )
+    if max(map(len, digits), default=_DIGITS + 1) > _DIGITS:
+        raise LogError(f"{first}: its name has no number: pair by names, with `truth.images`")
+    return dict(zip(files, map(int, digits), strict=True))
+
+
+def _first_number(numbers: npt.NDArray[np.int64], frames: int | None, name: str) -> int:
+    """Return the number of the first frame, by the numbers of labels in rising order.
+
+    A label of number 0 tells it, and labels up to as many as there are frames do, and a label for
+    every frame. A `LogError` if nothing does.
+    """
+    low, high = int(numbers[0]), int(numbers[-1])
+    if low == 0:
+        return 0
+    if frames is not None and (high == frames or len(numbers) == frames == high - low + 1):
+        return high - frames + 1
+    raise LogError(
+        f"{name}: its labels have the numbers {low} to {high}, which does not tell whether the "
+        "first frame is number 0 or 1: give `truth.first` 0 or `truth.first` 1"
+    )
