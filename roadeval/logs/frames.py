@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from heapq import heappushpop
 from itertools import islice
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,6 @@ from roadeval.logs.topics.calibration import calibration_of, is_rectified
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.labels import (
-    Label,
     Labels,
     LabelSource,
     check_size,
@@ -371,6 +370,15 @@ def _named(frames: Iterable[int]) -> str:
     return first_of([*map(str, sorted(frames))], NAMED)
 
 
+class Label(NamedTuple):
+    """A label of a frame as logged, not decoded yet."""
+
+    picture: Picture | FrameError
+    """The picture, or why it cannot be read."""
+    place: str
+    """Where it lies: its topic, or its own file."""
+
+
 @dataclass(frozen=True, eq=False)
 class LoggedFrame:
     """A frame as logged, not decoded yet."""
@@ -418,7 +426,7 @@ class LoggedFrame:
         if level := _blank(image):
             self.accounting.blank[self.number] = level
         size = scaled_size(logged, self.selection.scale)
-        labels = {name: self._label(label, logged, size) for name, label in self.labels.items()}
+        labels = {name: self._label(name, logged, size) for name in self.labels}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
         is_file = isinstance(picture, CompressedPicture) and self.selection.scale == 1
         is_file = is_file and orientation_of(picture.data) == 1  # viewers of recordings turn none
@@ -441,14 +449,18 @@ class LoggedFrame:
             },
         )
 
-    def _label(self, label: Label, *sizes: tuple[int, int]) -> Labels:
+    def _label(self, name: str, *sizes: tuple[int, int]) -> Labels:
         """Decode a label, and bring it to the size of the image: as logged, then as read."""
+        picture, place = self.labels[name]
+        if isinstance(picture, FrameError):
+            raise picture
+        camera = self.selection.camera
         try:
-            found = label.read(self.selection.camera.images.limits)
+            found = self.selection.labels[name].meaning.read(picture, camera.images.limits)
         except BadMessage as error:
-            raise FrameError(f"{label.place}: {error}") from error
-        told = label.place, found.truth.shape[1::-1], "its image", sizes[0]
-        if problem := size_problem(*told, resize=self.selection.camera.resize_labels):
+            raise FrameError(f"{place}: {error}") from error
+        told = place, found.truth.shape[1::-1], "its image", sizes[0]
+        if problem := size_problem(*told, resize=camera.resize_labels):
             raise FrameError(problem)
         for size in sizes:
             if found.truth.shape[1::-1] != size:
@@ -536,9 +548,9 @@ class FrameStream:
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
-            name: source.label(position)
+            name: Label(read_or_error(source.pictures, at), source.pictures.place(at))
             for name, (source, partners) in self._labels.items()
-            if (position := partners.of(number)) is not None
+            if (at := partners.of(number)) is not None
         }
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from itertools import chain, islice
@@ -13,7 +13,6 @@ from typing import Any, Final
 from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
@@ -39,7 +38,7 @@ _NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, O
 _WRONG: Final = (*_NOT_SO, LogError, BadMessage, ImageError)
 
 
-def labels_in(path: Path, size: Size | None, asked: MaskSettings | None = None) -> LabelSet:
+def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = None) -> LabelSet:
     """List the labels in a folder or a file; of picked frames those in their folder of labels.
 
     In a folder, files of an annotation tool come before images: these may be the ones that were
@@ -50,58 +49,52 @@ def labels_in(path: Path, size: Size | None, asked: MaskSettings | None = None) 
     """
     if (path / PICK).is_file():
         path /= LABELS
-    if path.is_file() and path.suffix.lower() not in _readers():
-        known = ", ".join(sorted({each.name for own in _readers().values() for each in own}))
+    if path.is_file() and path.suffix.lower() not in _formats():
+        names = sorted({format_.name for formats in _formats().values() for format_ in formats})
+        known = ", ".join(names)
         raise LogError(f"{path}: no file of labels; known are folders of images, and {known}")
-    endings = IMAGES | {NPY} | _readers().keys()
+    endings = IMAGES | {NPY} | _formats().keys()
     files = [path] if path.is_file() else listed(path, endings, below=True)
-    own = [file for file in files if path in (file, file.parent)]
     problems: list[LogError] = []
-    for some_files in (own, files):
-        labels = _labels_of(some_files, size, asked or MaskSettings(), problems)
+    for some_files in ([file for file in files if path in (file, file.parent)], files):
+        labels = _labels_of(some_files, size, settings or MaskSettings(), problems)
         if labels is not None:
             return labels
     raise next(iter(problems), LogError(f"{path}: no label in it that roadeval can read"))
 
 
 def _labels_of(
-    files: Sequence[Path], size: Size | None, asked: MaskSettings, problems: list[LogError]
+    files: Sequence[Path], size: Size | None, settings: MaskSettings, problems: list[LogError]
 ) -> LabelSet | None:
     """Return the labels that some files hold; None if they hold none, with the problems of some."""
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
     with_ids = of_ids(images)
     # Cityscapes has polygons beside the ids that were made of them.
-    for ending in _readers() if with_ids is images else ():
-        own = [file for file in files if file.suffix.lower() == ending]
-        filled = (file for file in own if file.is_file() and file.stat().st_size)
+    for ending, known in _formats().items() if with_ids is images else ():
+        of_ending = [file for file in files if file.suffix.lower() == ending]
+        filled = (file for file in of_ending if file.is_file() and file.stat().st_size)
         for file in islice(filled, _TRIED):
             try:
-                format_ = _format_of(file)
+                content = _parsed(file)
             except LogError as error:
                 problems.append(error)
-            else:
-                return _drawn(own, format_, size, asked)
-    labels = tuple(map(file_label, with_ids))
-    return LabelSet(labels) if labels else None
+                continue
+            for format_ in known:
+                with suppress(*_NOT_SO):
+                    if format_.holds(file, content):
+                        return _drawn(of_ending, {file: content}, format_, size, settings)
+            names = " or ".join(format_.name for format_ in known)
+            problems.append(LogError(f"{file}: not labels of {names}"))
+    return LabelSet(tuple(map(file_label, with_ids))) if with_ids else None
 
 
 @cache
-def _readers() -> dict[str, list[LabelFormat]]:
+def _formats() -> dict[str, list[LabelFormat]]:
     """Return the formats by the endings of their files."""
-    found: dict[str, list[LabelFormat]] = {}
-    for each in chain(*found_in(formats, "FORMATS")):
-        found.setdefault(each.ending, []).append(each)
-    return found
-
-
-def _format_of(file: Path) -> LabelFormat:
-    """Return the format of a file; a `LogError` if it is of no known one."""
-    content, known = _parsed(file), _readers()[file.suffix.lower()]
-    for each in known:
-        with suppress(*_NOT_SO):
-            if each.holds(file, content):
-                return each
-    raise LogError(f"{file}: not labels of {' or '.join(each.name for each in known)}")
+    by_ending: dict[str, list[LabelFormat]] = {}
+    for format_ in chain(*found_in(formats, "FORMATS")):
+        by_ending.setdefault(format_.ending, []).append(format_)
+    return by_ending
 
 
 def _parsed(file: Path) -> Any:
@@ -121,75 +114,74 @@ def _parsed(file: Path) -> Any:
     except OSError as error:
         raise LogError(f"{file}: {error.strerror}") from error
     except (ValueError, ParseError) as error:
-        raise LogError(f"{file}: cannot be read as labels: {_damage(error)}") from error
-
-
-def _damage(error: Exception) -> str:
-    """Return in words what a parser found."""
-    match error:
-        case ParseError(position=(line, column)):
-            return f"it is no XML, or ends early (line {line}, column {column + 1})"
-        case UnicodeDecodeError():
-            return "it is not in UTF-8"
-    return str(error)
+        reason = str(error)
+        if isinstance(error, ParseError):
+            line, column = error.position
+            reason = f"it is no XML, or ends early (line {line}, column {column + 1})"
+        elif isinstance(error, UnicodeDecodeError):
+            reason = "it is not in UTF-8"
+        raise LogError(f"{file}: cannot be read as labels: {reason}") from error
 
 
 def _drawn(
-    files: Sequence[Path], format_: LabelFormat, size: Size | None, asked: MaskSettings
+    files: Sequence[Path],
+    parsed: Mapping[Path, Any],
+    format_: LabelFormat,
+    size: Size | None,
+    settings: MaskSettings,
 ) -> LabelSet:
-    """Return the labels of all files of a format; a `LogError` if there is none."""
-    drawn, broken, others = _images_in(files, format_, size)
-    labelled = [drawing for drawing in drawn if drawing.shapes]
+    """Return the labels of all files of a format, some parsed before; a `LogError` if none is."""
+    drawings, broken, others = _images_in(files, parsed, format_, size)
     notes = []
+    lost = len(broken)
+    labelled = [drawing for drawing in drawings if drawing.shapes]
     if others:
         notes.append(f"{some(others)}: of another format than the other labels, not read")
-    if bare := len(drawn) - len(labelled):
-        notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
+    if bare := len(drawings) - len(labelled):
+        notes.append(f"{bare} of {len(drawings)} images have no shape, and count as not labelled")
     occurring = Counter(sorted(name for drawing in labelled for name in drawing.classes))
-    road = asked.labels.road or (tuple(occurring) if len(occurring) == 1 else ())
-    meant = Meant({*map(str, road)}, {*map(str, asked.labels.ignore)}, asked.skip_roadless)
+    road = settings.labels.road or (tuple(occurring) if len(occurring) == 1 else ())
+    ignored = {*map(str, settings.labels.ignore)}
+    meant = Meant({*map(str, road)}, ignored, settings.skip_roadless)
     labelled = settled(labelled, meant, broken, notes)
     if not labelled:
         image, problem = next(iter(broken.items()), (files[0], f"{format_.name} without a shape"))
         where = "" if str(files[0]) == str(image) else f"{files[0]}: "
         raise LogError(f"{where}{image}: {problem}")
     classes = {name: value for value, name in enumerate(occurring, 1)}
-    unread = [NamedLabel(Path(name), bytes, partial(_raise, why)) for name, why in broken.items()]
-    labels = [*(_label(drawing, classes, format_) for drawing in labelled), *unread]
-    return LabelSet(labels, classes, occurring=occurring, notes=tuple(notes))
+    labels = [_label(drawing, classes, format_) for drawing in labelled]
+    labels += [NamedLabel(Path(name), bytes, partial(_raise, why)) for name, why in broken.items()]
+    return LabelSet(labels, classes, occurring, lost, tuple(notes))
 
 
 def _images_in(
-    files: Sequence[Path], format_: LabelFormat, size: Size | None
+    files: Sequence[Path], parsed: Mapping[Path, Any], format_: LabelFormat, size: Size | None
 ) -> tuple[list[Drawing], dict[str, str], list[str]]:
     """Return the images in some files, those whose labels cannot be read, and files of others.
 
-    A file that cannot be read is such an image where each file has one. A `LogError` if they have
-    several.
+    A file that cannot be read is such an image where each file has one; else a `LogError`.
     """
-    drawn: list[Drawing] = []
-    whole, damaged = Counter[Path](), dict[Path, str]()
-    broken: dict[str, str] = {}
-    others: list[str] = []
+    drawings, broken, others = list[Drawing](), dict[str, str](), list[str]()
+    damaged, images_in = dict[Path, str](), Counter[Path]()
     for file in files:
         try:
-            content = _parsed(file)
+            content = parsed[file] if file in parsed else _parsed(file)
             if not format_.holds(file, content):
                 others.append(file.name)
                 continue
             for drawing in format_.read(file, content, size):
-                whole[file] += 1
+                images_in[file] += 1
                 try:
-                    drawn.append(drawing.whole(size))
+                    drawings.append(drawing.whole(size))
                 except _WRONG as error:
                     broken[drawing.image] = _in_words(error, format_)
         except _WRONG as error:
             damaged[file] = _in_words(error, format_).removeprefix(f"{file}: ")
     for file, problem in damaged.items():
-        if file in whole or max(whole.values(), default=0) > 1:
+        if file in images_in or max(images_in.values(), default=0) > 1:
             raise LogError(f"{file}: {problem}")
         broken[str(file)] = problem
-    return drawn, broken, others
+    return drawings, broken, others
 
 
 def _in_words(error: Exception, format_: LabelFormat) -> str:
@@ -204,17 +196,17 @@ def _raise(problem: str, *_: Any) -> Picture:
     raise BadMessage(problem)
 
 
-def _label(drawn: Drawing, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
+def _label(drawing: Drawing, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
     def picture(_content: bytes, limits: Limits) -> Picture:
         try:
-            pixels = drawn.pixels(classes, limits)
+            pixels = drawing.pixels(classes, limits)
         except _NOT_SO as error:
             raise BadMessage(_in_words(error, format_)) from error
         height, width = pixels.shape
         data = pixels.astype("<u2").tobytes()
         return RawPicture(0, width, height, "mono16", 0, big_endian=False, data=data)
 
-    return NamedLabel(Path(drawn.image), drawn.content, picture)
+    return NamedLabel(Path(drawing.image), drawing.content, picture)
 
 
 NPY: Final = ".npy"
@@ -222,19 +214,14 @@ NPY: Final = ".npy"
 
 def file_label(file: Path) -> NamedLabel:
     """Return the label of an image or NPY file."""
+
+    def content() -> bytes:
+        check_input(file)
+        return file.read_bytes()
+
     ending = file.suffix.lower()
-
-    def picture(data: bytes, limits: Limits) -> Picture:
-        return (
-            npy_picture(data, limits) if ending == NPY else CompressedPicture(0, ending[1:], data)
-        )
-
-    return NamedLabel(file, partial(_content, file), picture)
-
-
-def _content(file: Path) -> bytes:
-    check_input(file)
-    return file.read_bytes()
+    image = partial(CompressedPicture, 0, ending[1:])
+    return NamedLabel(file, content, npy_picture if ending == NPY else lambda data, _: image(data))
 
 
 def npy_picture(data: bytes, limits: Limits) -> RawPicture:
@@ -253,24 +240,18 @@ def npy_picture(data: bytes, limits: Limits) -> RawPicture:
         raise BadMessage(f"{what}, not of numbers, rows by columns")
     height, width = array.shape
     limits.check(width, height)
-    encoding, samples = _samples(array)
-    return RawPicture(0, width, height, encoding, 0, big_endian=False, data=samples.tobytes())
-
-
-def _samples(pixels: npt.NDArray[Any]) -> tuple[str, npt.NDArray[Any]]:
-    """Return the name of an encoding, and the numbers in it; refuse what no label can be."""
-    is_fraction, greatest = pixels.dtype.kind == "f", np.iinfo(np.uint16).max
+    kind, greatest = array.dtype.kind, np.iinfo(np.uint16).max
     with np.errstate(invalid="ignore"):
-        fits = np.isfinite(pixels) & (pixels >= 0) if is_fraction else pixels <= greatest
-        wrong = pixels[~fits]
-    if wrong.size and is_fraction:
-        raise BadMessage(f"it holds {wrong[0]}, which is neither a class nor a confidence")
-    if wrong.size:
-        raise BadMessage(f"it holds {wrong[0]}, which is neither at most 65535 nor a fraction")
-    if is_fraction:
-        return "32FC1", pixels.astype("<f4")
-    if pixels.dtype.kind == "i" and (pixels < 0).any():
-        return "32SC1", np.maximum(pixels, np.iinfo(np.int32).min).astype("<i4")
-    if pixels.dtype.itemsize == 1:
-        return "mono8", pixels.astype("u1")
-    return "mono16", pixels.astype("<u2")
+        fits = np.isfinite(array) & (array >= 0) if kind == "f" else array <= greatest
+    if wrong := array[~fits].tolist():
+        what = "a class nor a confidence" if kind == "f" else "at most 65535 nor a fraction"
+        raise BadMessage(f"it holds {wrong[0]}, which is neither {what}")
+    if kind == "f":
+        encoding, samples = "32FC1", array.astype("<f4")
+    elif kind == "i" and (array < 0).any():
+        encoding, samples = "32SC1", np.maximum(array, np.iinfo(np.int32).min).astype("<i4")
+    elif array.dtype.itemsize == 1:
+        encoding, samples = "mono8", array.astype("u1")
+    else:
+        encoding, samples = "mono16", array.astype("<u2")
+    return RawPicture(0, width, height, encoding, 0, big_endian=False, data=samples.tobytes())

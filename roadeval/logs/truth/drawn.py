@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import dropwhile
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -32,6 +33,15 @@ FARTHEST: Final = 1e6
 """Pixels from the image's corner at which a point may lie."""
 _CORNERS: Final = 90
 """Points of an ellipse."""
+
+
+@dataclass(frozen=True)
+class Meant:
+    """The meaning of the classes of drawn labels, by the settings."""
+
+    road: Set[str]
+    ignored: Set[str]
+    skip_roadless: bool
 
 
 class Outline(NamedTuple):
@@ -162,6 +172,10 @@ class Undrawn(NamedTuple):
         """Return the ``(H, W)`` pixels of its box; none if that is not known."""
         return np.zeros(size[::-1], np.bool_) if self.box is None else self.box.fill(size)
 
+    def is_box_of(self, meant: Meant) -> bool:
+        """Return whether its box stands for it: that of a class that is ignored."""
+        return self.box is not None and self.label in meant.ignored
+
 
 Shape = Outline | Runs | Undrawn
 
@@ -232,6 +246,12 @@ class Proposal(NamedTuple):
         return lengths
 
 
+def painted(label: str, pixels: Mask, left: int = 0, top: int = 0) -> Runs:
+    """Return the area of a mask whose first pixel has this place in the image."""
+    area = Proposal("", pixels)
+    return Runs(label, area.runs(), (left, top, *area.size))
+
+
 @dataclass(frozen=True)
 class LabelFormat:
     """A kind of files that hold labels.
@@ -251,62 +271,50 @@ class LabelFormat:
     ValueError means that the file, or the image, is not as the format asks."""
 
 
-@dataclass(frozen=True)
-class Meant:
-    """The meaning of the classes of drawn labels, by the settings."""
-
-    road: Set[str]
-    ignored: Set[str]
-    skip_roadless: bool
-
-
 def settled(
-    drawn: Sequence[Drawing], meant: Meant, broken: dict[str, str], notes: list[str]
+    drawings: Sequence[Drawing], meant: Meant, broken: dict[str, str], notes: list[str]
 ) -> list[Drawing]:
     """Return the images whose shapes are known, ignored ones on top.
 
     Images that are lost for a shape are added to the ``broken`` ones, with the reason, and
     warnings, a sentence each, to the ``notes``.
     """
-    whole = [known for drawing in drawn if (known := _with_known(drawing, meant, broken))]
-    shapes = [shape for drawing in drawn for shape in drawing.shapes]
-    undrawn = [s for s in shapes if isinstance(s, Undrawn) and s.label not in meant.road]
+    whole: list[Drawing] = []
+    for drawing in drawings:
+        unknown = [s for s in drawing.shapes if isinstance(s, Undrawn) and not s.is_box_of(meant)]
+        if lost := [s for s in unknown if s.label in meant.road | meant.ignored]:
+            broken[drawing.image] = f"{lost[0].label} is drawn as a {lost[0].what}"
+            continue
+        filled = [s for s in drawing.shapes if not isinstance(s, Undrawn) or s.is_box_of(meant)]
+        filled.sort(key=lambda shape: shape.label in meant.ignored)
+        whole.append(replace(drawing, shapes=tuple(filled)))
+    shapes = [shape for drawing in drawings for shape in drawing.shapes]
     for what, is_ignored in (
         ("not drawn: where they lie on the road, it counts as road", False),
         ("ignored as the boxes around them, for they have no outline", True),
     ):
-        some_of = [s for s in undrawn if (s.label in meant.ignored) is is_ignored]
-        kinds = Counter(f"{shape.label} ({shape.what})" for shape in some_of).most_common()
+        kinds = Counter(
+            f"{shape.label} ({shape.what})"
+            for shape in shapes
+            if isinstance(shape, Undrawn) and shape.label not in meant.road
+            if (shape.label in meant.ignored) is is_ignored
+        )
         if kinds:
-            named = ", ".join(f"{count} of {kind}" for kind, count in kinds)
-            notes.append(f"{len(some_of)} of {len(shapes)} shapes are {what}: {named}")
-    without = [drawing for drawing in whole if meant.road.isdisjoint(drawing.classes)]
+            named = ", ".join(f"{count} of {kind}" for kind, count in kinds.most_common())
+            notes.append(f"{kinds.total()} of {len(shapes)} shapes are {what}: {named}")
+    without = [d.image for d in whole if meant.road.isdisjoint(d.classes)]
     if without and meant.road:
         counted = "left out" if meant.skip_roadless else "counted as images without road"
         advice = "" if meant.skip_roadless else "; `truth.skip_roadless` leaves them out"
         notes.append(
-            f"{len(without)} of {len(drawn)} images have shapes, but none of road, and are "
-            f"{counted} ({some([drawing.image for drawing in without])}){advice}"
+            f"{len(without)} of {len(drawings)} images have shapes, but none of road, and are "
+            f"{counted} ({some(without)}){advice}"
         )
         # Where no image has road its class is named wrongly, which is told later.
         if meant.skip_roadless and len(without) < len(whole):
             whole = [d for d in whole if not meant.road.isdisjoint(d.classes)]
     notes += _hidden(whole, meant)
     return whole
-
-
-def _with_known(drawing: Drawing, meant: Meant, broken: dict[str, str]) -> Drawing | None:
-    """Return an image with the shapes whose pixels are known; None if it is lost for another."""
-    shapes: list[Shape] = []
-    for shape in drawing.shapes:
-        if isinstance(shape, Undrawn) and (shape.box is None or shape.label not in meant.ignored):
-            if shape.label in meant.road | meant.ignored:
-                broken[drawing.image] = f"{shape.label} is drawn as a {shape.what}"
-                return None
-        else:
-            shapes.append(shape)
-    shapes.sort(key=lambda shape: shape.label in meant.ignored)
-    return replace(drawing, shapes=tuple(shapes))
 
 
 LOOKED_AT: Final = 20
@@ -316,9 +324,13 @@ TOUCHING: Final = 0.005
 """Share of the road's pixels that may cover another shape without a word: outlines that touch."""
 
 
-def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
+def _hidden(drawings: Sequence[Drawing], meant: Meant) -> Iterator[str]:
     """Yield a warning where road covers earlier shapes of other classes, which count as road."""
-    crossed = [drawing for drawing in drawn if _is_over(drawing, meant)]
+    crossed = []
+    for drawing in drawings:
+        labels = [shape.label for shape in drawing.shapes if shape.label not in meant.ignored]
+        if not meant.road.isdisjoint(dropwhile(meant.road.__contains__, labels)):
+            crossed.append(drawing)
     area = max((math.prod(drawing.size or (1, 1)) for drawing in crossed), default=1)
     looked = crossed[:: -(-len(crossed) // max(LOOKED_AT, PIXELS // max(area, 1))) or 1]
     shares, classes = list[float](), Counter[str]()
@@ -326,18 +338,17 @@ def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
         names = ["", *drawing.classes]
         values = {name: value for value, name in enumerate(names)}
         road = [values[name] for name in names if name in meant.road]
-        below = replace(
-            drawing, shapes=sorted(drawing.shapes, key=lambda shape: shape.label not in meant.road)
-        )
+        below = sorted(drawing.shapes, key=lambda shape: shape.label not in meant.road)
         with suppress(BadMessage, ValueError, TypeError, OverflowError):
-            top, under = (way.pixels(values, Limits()) for way in (drawing, below))
+            top = drawing.pixels(values, Limits())
+            under = replace(drawing, shapes=below).pixels(values, Limits())
             is_road = np.isin(top, road)
             hidden = under[is_road & ~np.isin(under, road)]
             if len(hidden) > TOUCHING * np.count_nonzero(is_road):
                 shares.append(len(hidden) / np.count_nonzero(is_road))
                 classes.update(names[value] for value in np.unique(hidden).tolist())
     if shares:
-        images = f"{len(drawn)} images"
+        images = f"{len(drawings)} images"
         if len(looked) < len(crossed):
             images = f"{len(looked)} images that were looked at"
         yield (
@@ -345,10 +356,3 @@ def _hidden(drawn: Sequence[Drawing], meant: Meant) -> Iterator[str]:
             f"{len(shares)} of {images}: {100 * np.mean(shares):.1f} % of the road's pixels "
             "there, which count as road; draw road first, or name these classes in `labels.ignore`"
         )
-
-
-def _is_over(drawing: Drawing, meant: Meant) -> bool:
-    """Whether a shape of road follows one of a class that is neither road nor ignored."""
-    labels = [shape.label for shape in drawing.shapes if shape.label not in meant.ignored]
-    first = next((n for n, label in enumerate(labels) if label not in meant.road), len(labels))
-    return not meant.road.isdisjoint(labels[first:])

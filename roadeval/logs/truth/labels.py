@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Truth
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Rgb, Truth
 from roadeval.data.words import counted
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
@@ -34,7 +34,6 @@ from roadeval.logs.messages.pixels import (
 )
 from roadeval.logs.settings import Color, LabelPlace, LabelSettings, MaskSettings
 from roadeval.logs.topics.choose import lossy_labels
-from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.names import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -64,6 +63,11 @@ TWO_KINDS: Final = (
     "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road with "
     "`labels.road`, both where both do"
 )
+NAME_THEM: Final = (
+    "name those that mean road with `labels.road`, and those to leave out with `labels.ignore`"
+)
+ALONE: Final = "road"
+"""The class that means road where labels have no other."""
 RARE: Final = 0.05
 """Share of the labelled pixels below which what was named is hardly the road before a vehicle."""
 
@@ -193,18 +197,19 @@ def seen_in(
     holds colours, and values are looked for; or is compressed in a way that changes values.
     """
     if format_ := lossy_format(picture):
-        raise LogError(
-            _of_lossy(picture, labels, name, limits, file) or lossy_labels(name, format_)
-        )
+        if file is not None and labels == LabelSettings() and _is_blurred(to_rgb(picture, limits)):
+            command = f"mkdir png && python -c '{_MENDING % file.suffix}' {shlex.quote(name)}"
+            reason = "holds masks whose compression blurs their edges; make a new folder"
+            raise LogError(f"{name} {reason}: {command}")
+        raise LogError(lossy_labels(name, format_))
     pixels = to_rgb(picture, limits) if labels.road_colors else to_labels(picture, limits)
     packed = pixels if pixels.ndim == 2 else pack_colors(pixels)
     packed = np.maximum(packed, LEAST) if packed.dtype.kind == "i" else packed
     values, counts = np.unique(packed, return_counts=True)
     if pixels.ndim != 2 and not labels.road_colors:
-        colors = map(_color_name, values.tolist())
         raise LogError(
-            f"{name} holds the colours {_listed(colors)}: name those that mean road with "
-            "`labels.road_colors`"
+            f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}: name those "
+            "that mean road with `labels.road_colors`"
         )
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
@@ -215,82 +220,44 @@ _MENDING: Final = (
 )
 
 
-def _of_lossy(
-    picture: Picture, labels: LabelSettings, name: str, limits: Limits, file: Path | None
-) -> str:
-    """Return how a mask of black and white whose edges are blurred is mended; else nothing."""
-    colours = to_rgb(picture, limits)
+def _is_blurred(colours: Rgb) -> bool:
+    """Whether an image is a mask of black and white, but for levels between them at its edges."""
     levels = colours[..., 0]
     is_grey = np.ptp(colours.astype(np.int16), axis=2).max() <= BLURRED
     is_white = levels >= 255 - BLURRED
-    is_mask = is_grey and is_white.any() and np.mean((levels > BLURRED) & ~is_white) <= RARE
-    if file is None or not is_mask or labels != LabelSettings():
-        return ""
-    command = f"mkdir png && python -c '{_MENDING % file.suffix}' {shlex.quote(name)}"
-    return f"{name} holds masks whose compression blurs their edges; make a new folder: {command}"
+    return bool(is_grey and is_white.any() and np.mean((levels > BLURRED) & ~is_white) <= RARE)
 
 
 def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name: str) -> ClassMap:
     """Decide what the values of label pictures mean.
 
     ``pictures`` are the values, or packed colours, that occur in each of some pictures. A
-    `LogError` if a given value does not occur, or none is given and the values are class ids, or
-    do not mean the same in all pictures.
+    `LogError` if a value that is named does not occur, or none is named and the values are class
+    ids, or do not mean the same in all pictures.
     """
     values = sorted({value for picture in pictures for value in picture})
+    has_negatives, remedy = values[:1] < [0], NAME_THEM
     if labels.road or labels.road_colors:
-        by_color = bool(labels.road_colors)
-        text = _color_name if by_color else str
-        wanted = labels.road, labels.ignore
-        if by_color:
-            wanted = (*map(_packed, labels.road_colors),), (*map(_packed, labels.ignore_colors),)
-        there = f"{name}, whose frames hold {_listed(map(text, values))}"
-        given = _as_given(wanted, {value: value for value in values}, there, by_color=by_color)
-        return _without_negatives(given, values)
-    remedy = (
-        "name those that mean road with `labels.road`, and those to leave out with `labels.ignore`"
-    )
-    for meaning in _MASKS:
-        if {value for value in values if value >= 0} <= meaning.keys():
-            white = next(value for value, truth in meaning.items() if truth == ROAD)
+        codes = {value: value for value in values}
+        there = f"{name}, whose frames hold "
+        if labels.road_colors:
+            names = (map(_packed, labels.road_colors), map(_packed, labels.ignore_colors))
+            there += _listed(map(_color_name, values))
+            return _as_named(*names, codes, there, text=_color_name, ending="_colors")
+        meaning = _as_named(labels.road, labels.ignore, codes, there + _listed(map(str, values)))
+        unnamed = any(value < 0 and value not in meaning.meaning for value in values)
+        return replace(meaning, words=f"{meaning.words}; {NO_LABEL}") if unnamed else meaning
+    for truths in _MASKS:
+        if {value for value in values if value >= 0} <= truths.keys():
+            white = next(value for value, truth in truths.items() if truth == ROAD)
             if white == 1 and any(255 in picture and 1 not in picture for picture in pictures):
                 remedy = TWO_KINDS
                 break
-            ignored = [str(value) for value in values if meaning.get(value) == IGNORE]
+            ignored = [str(value) for value in values if truths.get(value) == IGNORE]
             words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
-            return _without_negatives(ClassMap(meaning, UNKNOWN, False, words), values)
+            words += f"; {NO_LABEL}" if has_negatives else ""
+            return ClassMap(truths, UNKNOWN, False, words)
     raise LogError(f"{name} holds the values {_listed(map(str, values))}: {remedy}")
-
-
-def _without_negatives(classes: ClassMap, values: Iterable[int]) -> ClassMap:
-    """Return the meaning, with a note that values below 0 are ignored if such occur unnamed."""
-    negative = any(value < 0 and value not in classes.meaning for value in values)
-    return replace(classes, words=f"{classes.words}; {NO_LABEL}") if negative else classes
-
-
-def _as_given(
-    wanted: tuple[Iterable[Any], Iterable[Any]],
-    codes: Mapping[Any, int],
-    there: str,
-    *,
-    by_color: bool = False,
-) -> ClassMap:
-    """Return the meaning of values, colours or classes, by what is road and what is ignored.
-
-    ``codes`` has the value of each that occurs, ``there`` says of whom and which.
-    """
-    ending, text = ("_colors", _color_name) if by_color else ("", str)
-    meaning: dict[int, int] = {}
-    for setting, given, truth in zip(("road", "ignore"), wanted, (ROAD, IGNORE), strict=True):
-        for each in given:
-            if each not in codes:
-                raise LogError(f"`labels.{setting}{ending}` {text(each)} does not occur in {there}")
-            meaning[codes[each]] = truth
-    return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, each) for each in wanted)))
-
-
-ALONE: Final = "road"
-"""The class that means road where labels have no other."""
 
 
 def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
@@ -301,26 +268,50 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     """
     classes = origin.classes
     road = labels.road or ((ALONE,) if {*classes} == {ALONE} else ())
-    known = _counted(origin, classes)
+    there = _counted(origin, classes)
     if not road:
-        raise LogError(
-            f"{name} has the classes {known}: name those that mean road with `labels.road`, and "
-            "those to leave out with `labels.ignore`"
-        )
+        raise LogError(f"{name} has the classes {there}: {NAME_THEM}")
+    if origin.lost:
+        there += f"; {counted(origin.lost, 'label')} of it cannot be read"
     # A class may be called 7.
-    wanted = [*map(str, road)], [*map(str, labels.ignore)]
-    found = _as_given(wanted, classes, f"{name}, which has the classes {known}")
-    rest = [each for each in classes if classes[each] not in found.meaning]
+    names = map(str, road), map(str, labels.ignore)
+    meaning = _as_named(*names, classes, f"{name}, which has the classes {there}")
+    rest = [label for label in classes if classes[label] not in meaning.meaning]
     words = f"; non-road is all else, {_counted(origin, rest)}" if rest else ""
-    return replace(found, words=found.words + words)
+    return replace(meaning, words=meaning.words + words)
+
+
+def _as_named(
+    road: Iterable[Any],
+    ignored: Iterable[Any],
+    codes: Mapping[Any, int],
+    there: str,
+    *,
+    text: Callable[[Any], str] = str,
+    ending: str = "",
+) -> ClassMap:
+    """Return the meaning of values, colours or classes of which some are named.
+
+    ``codes`` has the value of each that occurs, ``there`` says of whom and which; ``ending`` is
+    that of the settings' names. A `LogError` if one that is named does not occur.
+    """
+    meaning: dict[int, int] = {}
+    words: list[list[str]] = []
+    for setting, named, truth in (("road", road, ROAD), ("ignore", ignored, IGNORE)):
+        words.append([])
+        for name in named:
+            if name not in codes:
+                raise LogError(f"`labels.{setting}{ending}` {text(name)} does not occur in {there}")
+            meaning[codes[name]] = truth
+            words[-1].append(text(name))
+    return ClassMap(meaning, NON_ROAD, bool(ending), _words(*words))
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
     """Name the most usual of some classes, each with the number of labels in which it occurs."""
-    every = sorted(classes, key=lambda name: -origin.occurring[name])
-    more = f", and {len(every) - limit} more" if len(every) > limit else ""
-    shown = (f"{name} ({counted(origin.occurring[name], 'label')})" for name in every[:limit])
-    return ", ".join(shown) + more
+    usual = sorted(classes, key=lambda name: -origin.occurring[name])
+    shown = [f"{name} ({counted(origin.occurring[name], 'label')})" for name in usual[:limit]]
+    return ", ".join(shown) + (f", and {len(usual) - limit} more" if len(usual) > limit else "")
 
 
 def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
@@ -378,28 +369,6 @@ class LabelSource:
         near = int(np.searchsorted(self.pictures.log_times, logged_ns))
         return Partners(self.pairing, near, few=few)
 
-    def label(self, position: int) -> Label:
-        """Read the label at a position; it is not decoded yet."""
-        picture = read_or_error(self.pictures, position)
-        return Label(self, picture, self.pictures.place(position))
-
-
-@dataclass(frozen=True, eq=False)
-class Label:
-    """A label of a frame as logged, which any thread can decode."""
-
-    source: LabelSource
-    picture: Picture | FrameError
-    """The picture, or why it cannot be read."""
-    place: str
-    """Where it lies: its topic, or its own file."""
-
-    def read(self, limits: Limits) -> Labels:
-        """Decode the label; a `BadMessage` or `FrameError` if that is impossible."""
-        if isinstance(self.picture, FrameError):
-            raise self.picture
-        return self.source.meaning.read(self.picture, limits)
-
 
 def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameError:
     """Return a picture, or the error if it cannot be read."""
@@ -438,28 +407,26 @@ def beside_log(
 
     A `LogError` if none belongs to a frame, they cannot be understood, or are of another size.
     """
-    if not isinstance(labels, TopicReader):
-        by, count, where = labels.by, f"{len(labels)} labels", labels.name
+    notes: tuple[str, ...] = ()
+    if isinstance(labels, NamedLabels):
+        by, what, where, notes = labels.by, "labels", labels.name, labels.origin.notes
+        words = f"{by}, from {labels.first}" if labels.first else by
     elif settings.images is None:
-        by, where = settings.pair or "stamp", f"{labels.name} of {log}" if log else labels.name
-        count = f"{len(labels)} messages"
+        by, what = settings.pair or "stamp", "messages"
+        where, words = f"{labels.name} of {log}" if log else labels.name, by
+        words = words if settings.pair else camera.clock
     else:
         raise LogError("`truth.images` is for labels with names: those of a log have none")
-    if by != "stamp" and offset_ms:
-        raise LogError(f"`topics.sync_offset_ms` is for stamps, and {where} is paired by {by}")
     if by == "stamp":
         pairing = by_time(labels, camera, offset_ms)
         check_times(pairing, labels.name)
+    elif offset_ms:
+        raise LogError(f"`topics.sync_offset_ms` is for stamps, and {where} is paired by {by}")
     else:
         pairing = by_number(labels, settings, camera.images)
-    notes: tuple[str, ...] = ()
-    if isinstance(labels, NamedLabels):
-        words, notes = f"{by}, from {labels.first}" if labels.first else by, labels.origin.notes
-    else:
-        words = by if settings.pair else camera.clock
     meaning = meaning_of(labels, settings, camera, pairing)
     notes += (pairing.note,) if pairing.note else ()
-    why = f"{count}, paired by {words}"
+    why = f"{len(labels)} {what}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
 
 
@@ -479,9 +446,9 @@ def label_files(settings: LabelPlace) -> list[Path]:
 
     An OSError if a folder cannot be listed.
     """
-    named = (log_and_topic(settings.path)[0] or settings.path, settings.images)
-    paths = [Path(each) for each in named if each is not None]
-    files = [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
+    paths = [Path(log_and_topic(settings.path)[0] or settings.path)]
+    paths += [] if settings.images is None else [Path(settings.images)]
+    files = [f for path in paths for f in (sorted(path.rglob("*")) if path.is_dir() else [path])]
     return [*filter(is_shown, files)]
 
 
@@ -506,18 +473,18 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
 
 
 def check_size(
-    size: Size | None, labels: LabelPictures, position: int, camera: Camera, own: Pairing
+    size: Size | None, labels: LabelPictures, position: int, camera: Camera, pairing: Pairing
 ) -> None:
     """Refuse a label of another size than its own image, unless they are resized; a `LogError`."""
-    wanted = camera.topic.size
-    if size is None or wanted is None or size == wanted:
+    expected = camera.topic.size
+    if size is None or expected is None or size == expected:
         return
-    image = next(frames_of(own, position, position + 1), None)
+    image = next(frames_of(pairing, position, position + 1), None)
     if image is not None:
         with suppress(BadMessage, FrameError):
-            wanted = size_of(camera.images.picture(image), camera.images.limits) or wanted
-    told = labels.place(position), size, f"but {camera.topic.name} is", wanted
-    if problem := size_problem(*told, resize=camera.resize_labels):
+            expected = size_of(camera.images.picture(image), camera.images.limits) or expected
+    sizes = labels.place(position), size, f"but {camera.topic.name} is", expected
+    if problem := size_problem(*sizes, resize=camera.resize_labels):
         raise LogError(problem)
 
 
@@ -539,8 +506,6 @@ def meaning_of(
 
     A `LogError` if their values cannot be understood.
     """
-    origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
-    wanted = settings.labels
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[Mapping[int, int]] = []
     problem = ""
@@ -550,7 +515,7 @@ def meaning_of(
             if camera and pairing:
                 check_size(size_of(picture, labels.limits), labels, position, camera, pairing)
             if confidence is None:
-                seen.append(seen_in(picture, wanted, labels.name, labels.limits, file))
+                seen.append(seen_in(picture, settings.labels, labels.name, labels.limits, file))
             else:
                 seen.append({int(confidence.codes(picture, labels.limits).max()): 1})
         except BadMessage as error:
@@ -559,33 +524,28 @@ def meaning_of(
         raise nothing_of(labels, problem)
     if confidence is not None:
         return confidence
+    origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
     if origin.occurring:
-        meaning = of_classes(wanted, origin, labels.name)
+        meaning = of_classes(settings.labels, origin, labels.name)
     else:
-        meaning = understand(wanted, seen, labels.name)
-    names = {value: name for name, value in origin.classes.items()} | {0: "no shape"}
-    return replace(meaning, notes=_doubts(wanted, meaning, seen, names if origin.classes else {}))
-
-
-def _doubts(
-    asked: LabelSettings,
-    meaning: ClassMap,
-    pictures: Sequence[Mapping[int, int]],
-    names: Mapping[int, str],
-) -> tuple[str, ...]:
-    """Return a warning where what was said to be road is hardly anywhere in some pictures."""
-    pixels = sum(map(Counter, pictures), Counter[int]())
-    truth = {value: meaning.meaning.get(value, meaning.others) for value in pixels}
-    counted = sum(n for value, n in pixels.items() if truth[value] != IGNORE)
-    road = sum(n for value, n in pixels.items() if truth[value] == ROAD)
-    if not (asked.road or asked.road_colors) or road >= RARE * counted:
-        return ()
+        meaning = understand(settings.labels, seen, labels.name)
+    pixels = sum(map(Counter, seen), Counter[int]())
+    of_truth = Counter[int]()
+    for value, count in pixels.items():
+        of_truth[meaning.meaning.get(value, meaning.others)] += count
+    road, known = of_truth[ROAD], pixels.total() - of_truth[IGNORE]
+    named = settings.labels.road or settings.labels.road_colors
+    if not named or road >= RARE * known:
+        return meaning
+    names = {value: name for name, value in origin.classes.items()}
+    names |= {0: "no shape"} if names else {}
     shares = ", ".join(
         f"{names.get(value) or (_color_name(value) if meaning.by_color else value)} "
-        f"({100 * n / pixels.total():.1f} %)"
-        for value, n in pixels.most_common(8)
+        f"({100 * count / pixels.total():.1f} %)"
+        for value, count in pixels.most_common(8)
     )
-    return (
-        f"road is {100 * road / counted:.2f} % of the labelled pixels that were looked at, which "
-        f"are {shares}: does `labels.road` name the road?",
+    doubt = (
+        f"road is {100 * road / known:.2f} % of the labelled pixels that were looked at, which "
+        f"are {shares}: does `labels.road` name the road?"
     )
+    return replace(meaning, notes=(doubt,))

@@ -125,8 +125,7 @@ def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
         return _brushed(label, region["rle"], size)
     if "imageDataURL" in region:
         pixels = to_labels(b64decode(region["imageDataURL"].partition(",")[2]), Limits())
-        area = drawn.Proposal("", pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
-        return drawn.Runs(label, area.runs(), (0, 0, *area.size))
+        return drawn.painted(label, pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
     if "points" in region:
         return drawn.Outline(label, drawn.flat((x * across, y * down) for x, y in region["points"]))
     x, y = region["x"] * across, region["y"] * down
@@ -168,8 +167,7 @@ def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs
         start = end
     if start != total:
         raise BadMessage(f"a mask of {label} that does not fit its image")
-    area = drawn.Proposal("", values.reshape(size[1], size[0], 4)[..., 3] > OPAQUE)
-    return drawn.Runs(label, area.runs())
+    return drawn.painted(label, values.reshape(size[1], size[0], 4)[..., 3] > OPAQUE)
 
 
 FORMATS: Final = (drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio),)

@@ -42,8 +42,7 @@ def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
             return drawn.hull(label, points)
         case "mask", [left, top, _, _]:
             pixels = to_rgb(b64decode(shape["mask"]), Limits())[..., 0] > 0
-            area = drawn.Proposal("", pixels)
-            return drawn.Runs(label, area.runs(), (int(left), int(top), *area.size))
+            return drawn.painted(label, pixels, int(left), int(top))
         case other, _:
             return drawn.Undrawn(label, f"{other} of {len(points) // 2} points")
 
