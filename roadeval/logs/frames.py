@@ -16,7 +16,6 @@ import numpy.typing as npt
 from roadeval.data import ROAD, Calibration, Frame, Rgb
 from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
-from roadeval.geometry.settings import GroundSettings
 from roadeval.images.decoding import orientation_of
 from roadeval.images.formats import format_of
 from roadeval.logs.errors import BadMessage, FrameError, LogError, LostMessageError
@@ -45,7 +44,9 @@ from roadeval.logs.truth.pairing import (
     NamedLabels,
     Partners,
     by_time,
+    clock_of,
     frames_of,
+    tolerance,
 )
 from roadeval.runtime.text import visible
 
@@ -202,7 +203,9 @@ def settle(
         choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         if choices[name].topic == truth.topic:
             raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
-    camera = Camera.of(readers[image.name], image, asked)
+    images = readers[image.name]
+    most_ns = tolerance(images, asked.sync_tolerance_ms)
+    camera = Camera(images, image, clock_of(images), most_ns, asked.resize_truth)
     labels = {}
     for name, (chosen, reason) in choices.items():
         if chosen is not None:
@@ -212,22 +215,23 @@ def settle(
             check_size(chosen.size, reader, 0, camera, pairing)
             meaning = meaning_of(reader, own)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
-    no_truth = "" if truth.topic else truth.why
     known = calibration_of(image, topics, readers)
     if any(known) and image.turned != 1 and camera.images.limits.turn:
         known = None, "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
-    ground = _ground_of(image, known[0], config.ground)
-    white = _white_of(readers[image.name], config.frames.white)
-    return Selection(camera, why, labels, config.frames.scale, no_truth, *known, *ground, white)
-
-
-def _ground_of(
-    image: TopicInfo, known: Calibration | None, asked: GroundSettings
-) -> tuple[Ground | None, str]:
-    ground, how = ground_of(known, asked, image.size)
-    if any(asked.distortion) and is_rectified(image.name):
-        how += "; `ground.distortion` is applied although the topic's name says rectified"
-    return ground, how
+    ground, ground_why = ground_of(known[0], config.ground, image.size)
+    if any(config.ground.distortion) and is_rectified(image.name):
+        ground_why += "; `ground.distortion` is applied although the topic's name says rectified"
+    return Selection(
+        camera,
+        why,
+        labels,
+        config.frames.scale,
+        "" if truth.topic else truth.why,
+        *known,
+        ground,
+        ground_why,
+        _white_of(images, config.frames.white),
+    )
 
 
 def _of_camera(topic: TopicInfo, reader: TopicReader, frame_id: str | None) -> TopicInfo:
@@ -416,7 +420,9 @@ class LoggedFrame:
             raise FrameError(reason) from error
 
     def _decode(self) -> Frame:
-        picture = self.picture
+        import cv2
+
+        picture, scale = self.picture, self.selection.scale
         if isinstance(picture, FrameError):
             raise picture
         image = to_rgb(picture, self.selection.camera.images.limits, self.selection.white)
@@ -425,51 +431,49 @@ class LoggedFrame:
             self.accounting.odd_sizes[self.number] = logged
         if level := _blank(image):
             self.accounting.blank[self.number] = level
-        size = scaled_size(logged, self.selection.scale)
+        size = scaled_size(logged, scale)
         labels = {name: self._label(name, logged, size) for name in self.labels}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
-        is_file = isinstance(picture, CompressedPicture) and self.selection.scale == 1
-        is_file = is_file and orientation_of(picture.data) == 1  # viewers of recordings turn none
-        format_ = format_of(picture.data) if is_file else None
+        format_ = None
+        if isinstance(picture, CompressedPicture) and scale == 1:
+            # Viewers of recordings turn none.
+            format_ = format_of(picture.data) if orientation_of(picture.data) == 1 else None
         return Frame(
             self.number,
             self.stamp_ns,
             self.log_time_ns,
-            image if size == logged else _averaged(image, size),
+            # Colours are averaged over the area of a new pixel.
+            image if size == logged else _resized(image, size, cv2.INTER_AREA),
             picture.data,
             format_.media_type if format_ else None,
             None if truth is None else truth.truth,
             None if shadow is None else shadow.truth,
             # A mask has no third value.
             {name: (label.truth == ROAD).astype(np.uint8) for name, label in labels.items()},
-            {
-                name: label.probability
-                for name, label in labels.items()
-                if label.probability is not None
-            },
+            {n: label.probability for n, label in labels.items() if label.probability is not None},
         )
 
     def _label(self, name: str, *sizes: tuple[int, int]) -> Labels:
         """Decode a label, and bring it to the size of the image: as logged, then as read."""
+        import cv2
+
         picture, place = self.labels[name]
         if isinstance(picture, FrameError):
             raise picture
         camera = self.selection.camera
         try:
-            found = self.selection.labels[name].meaning.read(picture, camera.images.limits)
+            label = self.selection.labels[name].meaning.read(picture, camera.images.limits)
         except BadMessage as error:
             raise FrameError(f"{place}: {error}") from error
-        told = place, found.truth.shape[1::-1], "its image", sizes[0]
+        told = place, label.truth.shape[1::-1], "its image", sizes[0]
         if problem := size_problem(*told, resize=camera.resize_labels):
             raise FrameError(problem)
+        truth, codes = label.truth, label.probability
         for size in sizes:
-            if found.truth.shape[1::-1] != size:
-                probability = found.probability
-                found = Labels(
-                    _nearest(found.truth, size),
-                    None if probability is None else _nearest(probability, size),
-                )
-        return found
+            if truth.shape[1::-1] != size:
+                truth = _resized(truth, size, cv2.INTER_NEAREST_EXACT)
+                codes = None if codes is None else _resized(codes, size, cv2.INTER_NEAREST_EXACT)
+        return Labels(truth, codes)
 
 
 class FrameStream:
@@ -486,28 +490,27 @@ class FrameStream:
         Of those that have no truth not even the chunks are read if only ``labelled`` ones are
         asked for.
         """
-        images = selection.camera.images
-        self._pictures: PictureSequence = images
-        if selection.image.kind is TopicKind.VIDEO:
-            self._pictures = Video(images, images.limits)
+        images, truth = selection.camera.images, selection.truth
         self._selection = selection
         self.numbers: Final = numbers
         """The numbers of the frames that are asked for, in order."""
+        self.accounting = Accounting(in_log=len(images), in_range=in_range)
+        self._pictures: PictureSequence = images
+        if selection.image.kind is TopicKind.VIDEO:
+            self._pictures = video = Video(images, images.limits)
+            self.accounting.of_video = video.notes
         begin, few = int(images.log_times[numbers[0]]), are_few(images, numbers)
         self._labels: dict[str, tuple[LabelSource, Partners]] = {
             name: (source, source.partners(begin, few=few))
             for name, source in selection.labels.items()
         }
-        self.accounting = Accounting(in_log=len(images), in_range=in_range)
-        if isinstance(self._pictures, Video):
-            self.accounting.of_video = self._pictures.notes
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
         self._contents: dict[int, int] = {}
         """The stamp of the first label of each content that was read, by its hash."""
         read: Iterable[int] = numbers
         if labelled:
-            read = with_label(truth, images, numbers) if (truth := selection.truth) else ()
+            read = with_label(truth, images, numbers) if truth else ()
         self._iterator = map(self._frame, read)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
@@ -559,33 +562,29 @@ class FrameStream:
         picture = read_or_error(self._pictures, number)
         if name := getattr(picture, "frame_id", ""):
             self.accounting.frame_ids[name] += 1
-        camera = self._selection.camera
-        log_time = int(camera.images.log_times[number])
-        stamp = camera.images.stamp(number) if camera.clock is Clock.STAMP else UNREADABLE
+        images, clock = self._selection.camera.images, self._selection.camera.clock
+        log_time = int(images.log_times[number])
+        stamp = images.stamp(number) if clock is Clock.STAMP else UNREADABLE
         stamp = log_time if stamp == UNREADABLE else stamp
-        self.accounting.repeated += self._repeats(number, stamp)
+        first = self._first.setdefault(stamp, number)
+        with suppress(FrameError):
+            is_again = first != number and images.message(first).data == images.message(number).data
+            self.accounting.repeated += is_again
         if (label := labels.get(TRUTH)) and not isinstance(label.picture, FrameError):
-            first = self._contents.setdefault(hash(bytes(label.picture.data)), stamp)
-            self.accounting.labels_repeated += first != stamp
+            before = self._contents.setdefault(hash(bytes(label.picture.data)), stamp)
+            self.accounting.labels_repeated += before != stamp
         return LoggedFrame(
             number, stamp, log_time, picture, labels, self._selection, self.accounting
         )
-
-    def _repeats(self, number: int, stamp: int) -> bool:
-        """Return whether a frame's message is that of the first frame with its stamp, too."""
-        first, images = self._first.setdefault(stamp, number), self._selection.camera.images
-        with suppress(FrameError):
-            return first != number and images.message(first).data == images.message(number).data
-        return False
 
 
 def looked_at(selection: Selection) -> Iterator[str]:
     """Yield what some images of a camera show a user to know before a replay, a sentence each."""
     images = selection.camera.images
-    count, places = len(images), [*range(min(LOOKED_AT, len(images)))]
+    places = [*range(min(LOOKED_AT, len(images)))]
     if images.is_small and selection.image.kind is not TopicKind.VIDEO:
-        places = sorted({*np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist()})
-    stream = FrameStream(replace(selection, labels={}), count, places, labelled=False)
+        places = sorted({*np.linspace(0, len(images) - 1, LOOKED_AT, dtype=int).tolist()})
+    stream = FrameStream(replace(selection, labels={}), len(images), places, labelled=False)
     for logged in stream:
         with suppress(FrameError):
             logged.decode()
@@ -642,22 +641,12 @@ ALL: Final = 0.99
 def _blank(image: Rgb) -> str:
     """Return ``black`` or ``white`` for an image that is nothing else; else empty."""
     some = image[::4, ::4]
-    for level, share in (("black", (some <= DARK).mean()), ("white", (some >= LIGHT).mean())):
-        if share >= ALL:
-            return level
-    return ""
+    shares = {"black": (some <= DARK).mean(), "white": (some >= LIGHT).mean()}
+    return next((level for level, share in shares.items() if share >= ALL), "")
 
 
-def _averaged(image: Rgb, size: tuple[int, int]) -> Rgb:
-    """Reduce an image to a width and height: colours are averaged over the area of a new pixel."""
+def _resized(pixels: Pixels, size: tuple[int, int], how: int) -> Pixels:
+    """Resize an image, or labels, to a width and height."""
     import cv2
 
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def _nearest(labels: Pixels, size: tuple[int, int]) -> Pixels:
-    """Resize labels, or probabilities, to a width and height, by the nearest pixel."""
-    import cv2
-
-    how = cv2.INTER_NEAREST_EXACT
-    return np.asarray(cv2.resize(labels, size, interpolation=how), labels.dtype)
+    return np.asarray(cv2.resize(pixels, size, interpolation=how), pixels.dtype)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from copy import copy
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 
 from roadeval.images.formats import Limits
-from roadeval.logs.container.file import Damage, containers_in, damage_of
+from roadeval.logs.container.file import Container, Damage, containers_in, damage_of
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import check_content, files_of
@@ -25,7 +24,13 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
-from roadeval.logs.topics.reader import SMALL, TopicInfo, describe_topic, topic_readers
+from roadeval.logs.topics.reader import (
+    SMALL,
+    TopicInfo,
+    TopicReader,
+    describe_topic,
+    topic_readers,
+)
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
 from roadeval.logs.truth.names import shown_name, with_keys
@@ -48,6 +53,7 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
 
     A `LogError` if it is missing, unreadable, or no MCAP log.
     """
+    config = config or LogConfig()
     if isinstance(path, RemoteLog):
         opened, source, path = path.file, path.source, path.path
         check_content(path, opened)
@@ -55,64 +61,11 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
     else:
         opened, source, path = None, str(path), Path(path)
         files, damage = files_of(path)
+    states = {} if opened else _states(files)
+    asked = config.frames
+    limits = Limits(asked.max_pixels, turn=not asked.unturned, full_range=asked.full_range)
     try:
-        return Log(path, files, damage, config or LogConfig(), opened=opened, source=source)
-    except (BadRecord, OSError) as error:
-        raise LogError(f"{path}: {error}") from error
-
-
-def _states(files: Sequence[Path]) -> dict[Path, tuple[int, ...]]:
-    """Return what tells that a file was written anew, of those that no recorder still writes."""
-    states: dict[Path, tuple[int, ...]] = {}
-    for file in files:
-        with suppress(OSError), file.open("rb") as content:
-            content.seek(-len(MAGIC), os.SEEK_END)
-            if content.read() == MAGIC:
-                facts = os.fstat(content.fileno())
-                states[file] = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
-    return states
-
-
-class Log:
-    """An open log; close it, or use it in a ``with`` statement.
-
-    Attributes
-    ----------
-    path, name, source
-        Where it lies, its name without folder and suffix, and where it lies as a URL if it lies
-        elsewhere; the latter two fit to be shown.
-    config
-        All that is asked of it.
-    topics
-        Every topic, by name.
-    start_ns, end_ns
-        Log times of the first and the last message of all topics; 0 in an empty log.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        files: Sequence[Path],
-        damage: Sequence[Damage],
-        config: LogConfig,
-        *,
-        opened: IO[bytes] | None,
-        source: str,
-    ) -> None:
-        self.path, self.source = path, source
-        is_file = path.is_file() or opened is not None
-        self.name = visible(path.stem if is_file else path.resolve().name)
-        self.config = config
-        self._as_opened = {} if opened else _states(files)
-        self._limits = Limits(
-            config.frames.max_pixels,
-            turn=not config.frames.unturned,
-            full_range=config.frames.full_range,
-        )
-        self._lost_files = damage
-        self._beside: list[Log] = []
-        self._of_rig = False
-        self._containers = [
+        containers = [
             container
             for file in files
             for container in containers_in(
@@ -122,21 +75,73 @@ class Log:
                 opened=opened,
             )
         ]
-        self._readers = topic_readers(self._containers, self._limits, lacks_files=bool(damage))
-        self.topics: tuple[TopicInfo, ...] = tuple(
-            describe_topic(reader) for _, reader in sorted(self._readers.items())
-        )
-        starts = [topic.first_ns for topic in self.topics if topic.first_ns is not None]
-        ends = [topic.last_ns for topic in self.topics if topic.last_ns is not None]
-        self.start_ns = min(starts, default=0)
-        self.end_ns = max(ends, default=0)
+        readers = topic_readers(containers, limits, lacks_files=bool(damage))
+        topics = tuple(describe_topic(reader) for _, reader in sorted(readers.items()))
+    except (BadRecord, OSError) as error:
+        raise LogError(f"{path}: {error}") from error
+    name = path.stem if path.is_file() or opened is not None else path.resolve().name
+    return Log(path, source, visible(name), config, topics, readers, containers, damage, states)
+
+
+def _states(files: Sequence[Path]) -> dict[Path, tuple[int, ...]]:
+    """Return what tells that a file was written anew, of those that no recorder still writes."""
+    states: dict[Path, tuple[int, ...]] = {}
+    for file in files:
+        with suppress(OSError), file.open("rb") as content:
+            content.seek(-len(MAGIC), os.SEEK_END)
+            if content.read() == MAGIC:
+                states[file] = _state(os.fstat(content.fileno()))
+    return states
+
+
+def _state(facts: os.stat_result) -> tuple[int, ...]:
+    return facts.st_ino, facts.st_size, facts.st_mtime_ns
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """An open log; close it, or use it in a ``with`` statement."""
+
+    path: Path
+    source: str
+    """Where it lies, as a URL if it lies elsewhere; fit to be shown."""
+    name: str
+    """Its name without folder and suffix, fit to be shown."""
+    config: LogConfig
+    """All that is asked of it."""
+    topics: tuple[TopicInfo, ...]
+    """Every topic, by name."""
+    readers: Mapping[str, TopicReader]
+    """The messages of each topic."""
+    containers: Sequence[Container]
+    """Its files; several logs may follow each other in one."""
+    lost_files: Sequence[Damage]
+    """Files that cannot be read at all."""
+    states: Mapping[Path, tuple[int, ...]]
+    """What tells that a file was written anew."""
+    of_rig: bool = False
+    """Whether other cameras of it are replayed, too."""
+    beside: list[Log] = field(default_factory=list)
+    """Other logs that hold labels; they stay open as long as this one."""
+
+    @cached_property
+    def start_ns(self) -> int:
+        """Log time of the first message of all topics; 0 in an empty log."""
+        starts = (topic.first_ns for topic in self.topics if topic.first_ns is not None)
+        return min(starts, default=0)
+
+    @cached_property
+    def end_ns(self) -> int:
+        """Log time of the last message of all topics; 0 in an empty log."""
+        ends = (topic.last_ns for topic in self.topics if topic.last_ns is not None)
+        return max(ends, default=0)
 
     @property
     def damage(self) -> tuple[Damage, ...]:
         """What could not be read, in the order of the files."""
-        found = [damage for container in self._containers for damage in damage_of(container)]
+        found = [damage for container in self.containers for damage in damage_of(container)]
         return tuple(
-            replace(damage, log_start_ns=self.start_ns) for damage in (*self._lost_files, *found)
+            replace(damage, log_start_ns=self.start_ns) for damage in (*self.lost_files, *found)
         )
 
     @property
@@ -147,13 +152,12 @@ class Log:
         is looked at where chunks have none of their own, and in a log of at most `SMALL` bytes. A
         `LogError` if one of its files was written anew since it was opened.
         """
-        for file, before in self._as_opened.items():
+        for file, before in self.states.items():
             with suppress(OSError):
-                facts = file.stat()
-                now = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
+                now = _state(file.stat())
                 if now != before and now[0] == before[0]:  # one of another inode is not read
                     raise LogError(f"{file}: it changed while it was read; run again")
-        for container in self._containers:
+        for container in self.containers:
             if self.size <= SMALL or not container.is_covered:
                 container.verify_data()
         lost = [str(damage) for damage in self.damage if damage.lossy]
@@ -163,10 +167,10 @@ class Log:
     @property
     def size(self) -> int:
         """Bytes of all its files."""
-        return sum(len(container.source) for container in self._containers)
+        return sum(len(container.source) for container in self.containers)
 
     def _kept(self, topic: TopicInfo) -> str:
-        reader = self._readers[topic.name]
+        reader = self.readers[topic.name]
         total = max(reader.expected(), len(reader))
         known = f" of {total}" if total > reader.readable() else ""
         until = (topic.last_ns or self.start_ns) - self.start_ns
@@ -180,7 +184,7 @@ class Log:
         Equal wherever the log lies. A `LogError` if the disk fails.
         """
         try:
-            parts = [container.fingerprint() for container in self._containers]
+            parts = [container.fingerprint() for container in self.containers]
         except BadRecord as error:
             raise LogError(f"{self.path}: {error}") from error
         return hashlib.sha256(b"\n".join(parts)).hexdigest()
@@ -191,9 +195,9 @@ class Log:
         Of a folder it is the SHA-256 of its files' sums; None if the disk fails. ``on_bytes`` is
         called now and then with the bytes that were read, and with all that will be.
         """
-        sums = {container.path: hashlib.sha256() for container in self._containers}
+        sums = {container.path: hashlib.sha256() for container in self.containers}
         done = 0
-        for container in self._containers:
+        for container in self.containers:
             try:
                 for size, block in container.verify():
                     sums[container.path].update(block)
@@ -213,72 +217,67 @@ class Log:
         label image has another size, or no mask belongs to a frame.
         """
         try:
-            found = settle(self.topics, self._readers, self.config, of_rig=self._of_rig)
+            found = settle(self.topics, self.readers, self.config, of_rig=self.of_rig)
             if (place := self.config.truth).path:
                 settings = MaskSettings(**vars(place), labels=self.config.labels)
                 truth = self._beside_log(settings, found, self.config.topics.sync_offset_ms)
                 found = replace(found, labels={TRUTH: truth, **found.labels})
-            beside = {
-                name: self._masks(name, own, found) for name, own in self.config.masks.items()
-            }
+            masks = {name: self._masks(name, m, found) for name, m in self.config.masks.items()}
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
-        return replace(found, labels={**found.labels, **beside})
+        return replace(found, labels={**found.labels, **masks})
 
     def _masks(self, name: str, settings: MaskSettings, found: Selection) -> LabelSource:
-        """Settle masks that lie beside the log; errors begin with their variant's name."""
+        """Settle masks that lie beside the log; words on them name their variant's settings."""
+
+        def of_variant(text: str) -> str:
+            text = text.replace("`labels.", f"`masks.{name}.labels.")
+            return text.replace("`truth.", f"`masks.{name}.")
+
         try:
             if (log := log_and_topic(settings.path)[0]) == settings.path:
                 raise LogError(f"{log}: a log; name a topic of it, as {log}:/topic")
             masks = self._beside_log(settings, found)
             if found.truth is not None and masks.where == found.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
-            notes = (*(note.replace("`truth.", f"`masks.{name}.") for note in masks.notes),)
-            masks = replace(masks, notes=notes)
         except LogError as error:
             reason = str(error)
             if "`labels.road`" in reason and not settings.labels.road:
                 reason += "; or, for confidences, their threshold"
-            reason = reason.replace("`labels.", f"`masks.{name}.labels.")
             one_or_other = "give `truth.first` 0 or `truth.first` 1"
             reason = reason.replace(one_or_other, "set `truth.first` to 0 or to 1")
-            reason = reason.replace("`truth.", f"`masks.{name}.")
-            raise LogError(f"`masks` {name}: {reason}") from error
-        return masks
+            raise LogError(f"`masks` {name}: {of_variant(reason)}") from error
+        meaning = replace(masks.meaning, notes=(*map(of_variant, masks.meaning.notes),))
+        return replace(masks, meaning=meaning, notes=(*map(of_variant, masks.notes),))
 
     def _beside_log(
         self, settings: MaskSettings, found: Selection, offset_ms: float = 0.0
     ) -> LabelSource:
         """Settle labels of a folder, of an annotation tool's file, or of another log."""
         log, topic = log_and_topic(settings.path)
-        camera = found.camera
+        camera, images = found.camera, found.camera.images
         if log is None:
             origin = labels_in(Path(settings.path), camera.topic.size, settings)
             if settings.names == "*" and settings.images is None:
                 names = [shown_name(label.path, settings.path) for label in origin.labels]
                 check_names(names, camera.topic, self.topics)
-            images = camera.images
-            is_whole = images.sure == images.expected() == len(images)
-            count = len(images) if is_whole else None
-            labels = with_keys(origin, settings.path, settings, self._limits, count)
+            count = len(images) if images.sure == images.expected() == len(images) else None
+            labels = with_keys(origin, settings.path, settings, images.limits, count)
             return beside_log(labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms)
         other = open_log(log, LogConfig(frames=self.config.frames))
-        self._beside.append(other)
+        self.beside.append(other)
         if topic is None:
             choice = choose_truth(other.topics, camera.topic, None, settings.labels)
             if choice.topic is None:
                 raise LogError(f"{log}: {choice.why}; name its topic, as {log}:/topic")
             topic = choice.topic.name
-        reader = other._readers[named(other.topics, topic, "topic").name]
-        same = other.path.resolve() == self.path.resolve()
-        name = "" if same else other.name
+        reader = other.readers[named(other.topics, topic, "topic").name]
+        name = "" if other.path.resolve() == self.path.resolve() else other.name
         return beside_log(reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms)
 
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with what is asked of one camera of several."""
-        other = copy(self)
-        other.config, other._of_rig = config, True
-        return other
+        return replace(self, config=config, of_rig=True)
 
     def frames(
         self,
@@ -292,12 +291,12 @@ class Log:
         ``only`` are the numbers of some of them, which alone are read then; or the ``labelled``
         ones alone. A `LogError` if there is none in the range.
         """
-        asked, times = self.config.frames, selection.camera.images.log_times
-        first, last = 0, len(times)
-        if asked.start is not None:
-            first = int(np.searchsorted(times, parse_time(asked.start, self.start_ns)))
-        if asked.end is not None:
-            last = int(np.searchsorted(times, parse_time(asked.end, self.start_ns)))
+        asked, images, truth = self.config.frames, selection.camera.images, selection.truth
+        times, bounds = images.log_times, [0, len(images)]
+        for place, time in enumerate((asked.start, asked.end)):
+            if time is not None:
+                bounds[place] = int(np.searchsorted(times, parse_time(time, self.start_ns)))
+        first, last = bounds
         if first >= last:
             begin, end = ((int(time) - self.start_ns) / NS for time in (times[0], times[-1]))
             raise LogError(
@@ -305,32 +304,30 @@ class Log:
                 f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
             )
         numbers: Sequence[int] = range(first, last)
+        most = asked.every * (asked.max_frames or last)
         if (camera := self.config.topics.frame_id) is not None:
-            reader, count = selection.camera.images, asked.every * (asked.max_frames or last)
-            of_camera = (number for number in numbers if reader.frame_id(number) == camera)
-            numbers = [*(of_camera if asked.labelled else islice(of_camera, count))]
+            of_camera = (number for number in numbers if images.frame_id(number) == camera)
+            numbers = [*(of_camera if asked.labelled else islice(of_camera, most))]
             if not numbers:
                 raise LogError(
                     f"{self.path.name}: `topics.frame_id` {camera}: no image of the range has it; "
-                    f"the first has {reader.frame_id(first) or 'none'}"
+                    f"the first has {images.frame_id(first) or 'none'}"
                 )
         if asked.labelled:
-            truth, most = selection.truth, asked.every * (asked.max_frames or last)
-            found = with_label(truth, selection.camera.images, numbers) if truth else ()
-            numbers = [*islice(found, most)]
+            numbers = [*islice(with_label(truth, images, numbers), most)] if truth else []
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
         numbers = numbers[:: asked.every][: asked.max_frames]
         if only is not None:
-            numbers = [each for each in numbers if each in only]
+            numbers = [number for number in numbers if number in only]
         return FrameStream(selection, last - first, numbers, labelled=labelled)
 
     def close(self) -> None:
         """Close the log's files, and those of logs beside it."""
-        for container in self._containers:
+        for container in self.containers:
             container.close()
-        for other in self._beside:
+        for other in self.beside:
             other.close()
 
     def __enter__(self) -> Log:
@@ -386,14 +383,13 @@ def describe(
     be. A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     with open_log(path, config) as log:
-        picks: tuple[str, ...] = ()
-        problem = ""
-        verified = verify or log.size <= SMALL
+        picks, problem = tuple[str, ...](), ""
         try:
             selection = log.select()
             picks = (*selection.reasons, *looked_at(selection))
         except LogError as error:
             problem = str(error)
+        verified = verify or log.size <= SMALL
         sha256 = log.verify(on_bytes) if verified else None
         return LogDescription(
             path=log.source,

@@ -98,7 +98,7 @@ def test_a_stamp_beyond_all_clocks_cannot_be_read(
 ) -> None:
     path = ros2_log(tmp_path / "drive.mcap", [("/cam", 1, compressed(1, jpeg(grey(9))))])
     with open_log(path) as log:
-        camera = log._readers["/cam"]
+        camera = log.readers["/cam"]
         monkeypatch.setattr(
             camera, "_decoder", lambda _: SimpleNamespace(stamp=lambda _data: stamp)
         )
@@ -124,7 +124,7 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, ap
 def chunks_read(log: Log, monkeypatch: pytest.MonkeyPatch) -> set[int]:
     """Return a set that fills with the places of the chunks that are read from now on."""
     read, whole = set[int](), records.ChunkReader.read
-    log._containers[0].reader._cache.clear()
+    log.containers[0].reader._cache.clear()
 
     def noted(reader: records.ChunkReader, chunk: records.Chunk) -> records.Bytes:
         read.add(chunk.offset)

@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
-from itertools import islice, pairwise, takewhile
+from itertools import islice, pairwise, takewhile, zip_longest
 from typing import Final, Protocol
 
 import numpy as np
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.files import some
 from roadeval.logs.messages.pictures import codec_of
-from roadeval.logs.settings import NS, LabelPlace, TopicSettings
+from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.logs.truth.names import NamedLabels as NamedLabels  # noqa: PLC0414  (jobs use it)
 
@@ -132,12 +132,6 @@ class Camera:
     """Largest time between an image and its label."""
     resize_labels: bool
     """Whether labels of another size are scaled to the image's (nearest pixel)."""
-
-    @classmethod
-    def of(cls, images: TopicReader, topic: TopicInfo, settings: TopicSettings) -> Camera:
-        """Find the rules for a camera; the tolerance defaults to half the frame period."""
-        tolerance_ns = tolerance(images, settings.sync_tolerance_ms)
-        return cls(images, topic, clock_of(images), tolerance_ns, settings.resize_truth)
 
 
 def clock_of(reader: TopicReader) -> Clock:
@@ -250,10 +244,8 @@ class Partners:
         middle = _seek(labels, stamp, _expected(labels, stamp, self.near))
         equal = _equal(labels, stamp, middle, reach)
         if self._pairing.is_small and (not equal or equal[0] in self.used):
-            # It may lie anywhere.
-            anywhere, ranks = self._labels_of.get(stamp, []), self._images_of.get(stamp, [])
-            if anywhere:
-                return dict(zip(ranks, anywhere, strict=False)).get(image)
+            if image in self._anywhere:
+                return self._anywhere[image]
         elif not equal:
             equal = _equal(labels, stamp, min(self.near + 1, len(labels) - 1), reach)
         if equal:
@@ -286,12 +278,17 @@ class Partners:
         return images, labels
 
     @cached_property
-    def _labels_of(self) -> dict[int, list[int]]:
-        return _places(self._pairing.labels)
-
-    @cached_property
-    def _images_of(self) -> dict[int, list[int]]:
-        return _places(self._pairing.images)
+    def _anywhere(self) -> dict[int, int | None]:
+        """The label of each image with whose stamp there is one, wherever both lie."""
+        of_stamp: tuple[dict[int, list[int]], dict[int, list[int]]] = ({}, {})
+        for stamps, places in zip(
+            (self._pairing.images, self._pairing.labels), of_stamp, strict=True
+        ):
+            for place in range(len(stamps)):
+                places.setdefault(stamps.stamp(place), []).append(place)
+        images, labels = of_stamp
+        pairs = (zip_longest(images.get(stamp, ()), labels[stamp]) for stamp in labels)
+        return {image: label for both in pairs for image, label in both if image is not None}
 
     def unpaired(self, *, of_all: bool) -> tuple[int, int]:
         """Count the labels that no image found: of all, or of those between labels that one did.
@@ -309,14 +306,6 @@ class Partners:
         middle = _seek(images, stamps[0], 0)
         nearest = _closest(images, stamps[0], middle, self._pairing.reach_ns)
         return len(stamps), abs(images.stamp(nearest) - stamps[0])
-
-
-def _places(stamps: Stamps) -> dict[int, list[int]]:
-    """Return the positions of each stamp."""
-    places: dict[int, list[int]] = {}
-    for place in range(len(stamps)):
-        places.setdefault(stamps.stamp(place), []).append(place)
-    return places
 
 
 def frames_of(
@@ -420,10 +409,10 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
     if clock is Clock.LOG_TIME:
         times = Times(images.log_times), Times(labels.log_times + offset)
         return Pairing(*times, camera.tolerance_ns, by=clock, note=note)
-    count = min(labels.sure, len(labels) if len(images) == len(labels) else 0)
+    count = labels.sure if len(images) == len(labels) else 0
     unsure = len(images) - min(images.sure, labels.sure)
-    frames = Times(range(len(images)), images.sure)
-    return Pairing(frames, Times(range(count)), camera.tolerance_ns, by=clock, unsure=unsure)
+    numbers = Times(range(len(images)), images.sure), Times(range(count))
+    return Pairing(*numbers, camera.tolerance_ns, by=clock, unsure=unsure)
 
 
 def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
