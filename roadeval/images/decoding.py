@@ -31,6 +31,9 @@ _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 _SCAN: Final = b"\xff\xda"
 _TWELVE_BITS: Final = re.compile(rb"\xff[\xc0-\xc2]\x00[\x0b\x11]\x0c", re.DOTALL)
 """The head of a frame of one or three colours."""
+_PNG: Final = b"\x89PNG\r\n\x1a\n"
+_DEEP: Final = (b"\x10\2", b"\x10\6")
+"""Bits a sample, and kind, of a PNG of 16 bits with colours, without and with opacity."""
 OPAQUE: Final = 128
 """Opacity from which a pixel of a mask counts as painted."""
 MOST_SCANS: Final = 100
@@ -49,9 +52,32 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
         pixels = image
     elif image.mode in _SAMPLES:
         pixels = np.repeat(eight_bits(_samples(image), white)[..., None], 3, axis=2)
+    elif (deep := _deep_colours(data)) is not None:
+        pixels = eight_bits(deep, white)
     else:
         pixels = np.array(image.convert("RGB"))
     return upright(pixels, _left_to_turn(data, limits))
+
+
+def deep_samples(data: File, limits: Limits) -> Array | None:
+    """Return the samples of an image that has more than eight bits; None of any other.
+
+    Errors as of `to_rgb`.
+    """
+    image = _decoded(data, limits)
+    is_grey = not isinstance(image, np.ndarray) and image.mode in _SAMPLES
+    samples = _samples(image) if is_grey else _deep_colours(data)
+    return None if samples is None or samples.dtype == np.uint8 else samples
+
+
+def _deep_colours(data: File) -> Array | None:
+    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits: Pillow would keep eight of them."""
+    import cv2
+
+    if bytes(data[:8]) != _PNG or bytes(data[24:26]) not in _DEEP:
+        return None
+    colours: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    return np.ascontiguousarray(colours[..., 2::-1])
 
 
 def to_labels(data: File, limits: Limits) -> Array:

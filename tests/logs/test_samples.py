@@ -67,22 +67,23 @@ def test_labels_in_a_depth_transport_are_those_of_its_png(tmp_path: Path) -> Non
     assert labels_of(labelled(tmp_path, label), LabelSettings(road=(3,)))[0] == [0, 1, 0, 1]
 
 
-def twelve_bits(count: int) -> list[dict[str, Any]]:
+def twelve_bits(channels: int) -> list[dict[str, Any]]:
     """Return frames of a rising level, the first of which would fit into fewer bits."""
-    return [
-        raw(at, np.full((6, 8), 200 * (1 + i), "<u2"), "mono16")
-        for i, at in zip(range(count), STAMPS, strict=False)
-    ]
+    images = [np.full((6, 8, channels), 200 * (1 + i), "<u2") for i in range(len(STAMPS))]
+    if channels == 1:
+        return [raw(at, i[..., 0], "mono16") for at, i in zip(STAMPS, images, strict=True)]
+    return [compressed(at, png(i), "png") for at, i in zip(STAMPS, images, strict=True)]
 
 
+@pytest.mark.parametrize("channels", [1, 3, 4], ids=["grey", "RGB", "RGBA"])
 @pytest.mark.parametrize(
     ("white", "expected", "said"),
     [(None, 200 // 16, "4095"), (1023, 200 // 4, "1023"), (65535, 0, "")],
 )
 def test_the_sample_that_is_white_is_the_topics_whatever_the_range(
-    tmp_path: Path, white: float | None, expected: int, said: str
+    tmp_path: Path, white: float | None, expected: int, said: str, channels: int
 ) -> None:
-    path = camera(tmp_path, twelve_bits(20))
+    path = camera(tmp_path, twelve_bits(channels))
     frames = FrameSettings(max_frames=1, white=white)
     with open_log(path, LogConfig(frames=frames)) as log:
         selection = log.select()

@@ -176,8 +176,8 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
         return rows_of(picture, limits) if is_deep else None
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return None
-    samples = to_labels(picture, limits)
-    return None if samples.dtype == np.uint8 else samples
+    with _bad_message():
+        return decoding.deep_samples(file_of(picture), limits)
 
 
 def to_labels(picture: Picture, limits: Limits) -> Array:

@@ -7,6 +7,7 @@ where they are needed: around the stamp that is looked for.
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -280,13 +281,10 @@ class Partners:
     @cached_property
     def _anywhere(self) -> dict[int, int | None]:
         """The label of each image with whose stamp there is one, wherever both lie."""
-        of_stamp: tuple[dict[int, list[int]], dict[int, list[int]]] = ({}, {})
-        for stamps, places in zip(
-            (self._pairing.images, self._pairing.labels), of_stamp, strict=True
-        ):
+        images, labels = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
+        for stamps, places in ((self._pairing.images, images), (self._pairing.labels, labels)):
             for place in range(len(stamps)):
-                places.setdefault(stamps.stamp(place), []).append(place)
-        images, labels = of_stamp
+                places[stamps.stamp(place)].append(place)
         pairs = (zip_longest(images.get(stamp, ()), labels[stamp]) for stamp in labels)
         return {image: label for both in pairs for image, label in both if image is not None}
 
@@ -296,10 +294,9 @@ class Partners:
         Also return the nanoseconds between the first of them and the nearest image.
         """
         images, labels = self._pairing.images, self._pairing.labels
-        ends = (
-            (0, len(labels)) if of_all else (min(self.used, default=0), max(self.used, default=0))
-        )
-        stamps = [labels.stamp(place) for place in range(*ends) if place not in self.used]
+        first, last = min(self.used, default=0), max(self.used, default=0)
+        places = range(len(labels)) if of_all else range(first, last)
+        stamps = [labels.stamp(place) for place in places if place not in self.used]
         stamps = [stamp for stamp in stamps if stamp != UNREADABLE]
         if not stamps:
             return 0, 0
