@@ -1,12 +1,13 @@
 """Masks that numbers pair with frames, in logs that have lost some of their images."""
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from roadeval.data import Frame
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LogConfig, MaskSettings
@@ -26,13 +27,6 @@ from tests.fixtures.writing import START
 from tests.logs.making import png
 
 BITS = 6
-WHOLE = ("ok", "unchunked", "noindex", "nostats", "dataend_crc_bad", "trunc_last1")
-NUMBERED = ("chunk_crc_field_bad", "chunk_data_flip_lz4")
-"""Damage of which the index tells how many messages it took."""
-CUT = {"trunc_midchunk": 36, "trunc_unchunked": 28}
-HOLES = {"zero_hole": (6, 32), "huge_len_msg_unchunked": (5, 34)}
-"""Damage that took an unknown number of messages: the first frame that is lost, and how many are
-left after it."""
 
 
 def marked(number: int) -> bytes:
@@ -43,35 +37,29 @@ def marked(number: int) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def masks(tmp_path_factory: pytest.TempPathFactory) -> MaskSettings:
     folder = tmp_path_factory.mktemp("masks")
     for number in range(FRAMES):
         (folder / f"{number:04}.png").write_bytes(marked(number))
-    return folder
+    return MaskSettings(path=str(folder))
 
 
-def paired(path: Path, settings: MaskSettings) -> tuple[dict[int, int], int]:
-    """Return the number of each frame's mask by the number that its stamp is, and `unsure`."""
-    found = {}
+def paired(path: Path, settings: MaskSettings) -> tuple[list[int], int]:
+    """Return the frames, by the number that each stamp is, that have a mask, and `unsure`.
+
+    The mask must be the frame's own.
+    """
+    numbers = []
     with open_log(path, LogConfig(masks={"net": settings})) as log:
         selection = log.select()
         for logged in log.frames(selection):
-            try:
+            with suppress(FrameError):
                 frame = logged.decode()
-            except FrameError:
-                continue
-            if "net" in frame.external:
-                found[_number(frame)] = _told(frame)
-        return found, selection.masks["net"].pairing.unsure
-
-
-def _number(frame: Frame) -> int:
-    return (frame.stamp_ns - START) // broken.PERIOD
-
-
-def _told(frame: Frame) -> int:
-    bits = frame.external["net"][0, :BITS].tolist()
-    return sum(bit << place for place, bit in enumerate(bits))
+                if "net" in frame.external:
+                    numbers.append((frame.stamp_ns - START) // broken.PERIOD)
+                    bits = frame.external["net"][0, :BITS].tolist()
+                    assert numbers[-1] == sum(bit << place for place, bit in enumerate(bits))
+        return numbers, selection.masks["net"].pairing.unsure
 
 
 def saved(folder: Path, data: bytes) -> Path:
@@ -80,64 +68,48 @@ def saved(folder: Path, data: bytes) -> Path:
     return path
 
 
-def damaged(folder: Path, name: str) -> Path:
-    return saved(folder, broken.BROKEN[name][1]().data)
-
-
-def by_number(masks: Path) -> MaskSettings:
-    return MaskSettings(path=str(masks))
-
-
-@pytest.mark.parametrize("name", WHOLE)
-def test_every_frame_of_a_log_that_lacks_nothing_has_its_mask(masks, tmp_path, name):
-    own = {number: number for number in range(FRAMES)}
-    assert paired(damaged(tmp_path, name), by_number(masks)) == (own, 0)
-
-
-@pytest.mark.parametrize("name", NUMBERED)
-def test_lost_images_that_are_counted_shift_no_number(masks, tmp_path, name):
-    own = {number: number for number in range(FRAMES) if number not in (6, 7)}
-    assert paired(damaged(tmp_path, name), by_number(masks)) == (own, 0)
-
-
-@pytest.mark.parametrize("name", CUT)
-def test_what_is_cut_off_shifts_no_number(masks, tmp_path, name):
-    own = {number: number for number in range(CUT[name])}
-    assert paired(damaged(tmp_path, name), by_number(masks)) == (own, 0)
-
-
-@pytest.mark.parametrize("name", HOLES)
-def test_after_a_loss_of_unknown_length_no_frame_has_a_mask(masks, tmp_path, name):
-    first, left = HOLES[name]
-    own = {number: number for number in range(first)}
-    assert paired(damaged(tmp_path, name), by_number(masks)) == (own, left)
-
-
-@pytest.mark.parametrize("twice", [False, True])
-def test_a_chunk_that_lacks_or_is_there_twice_leaves_no_number_sure(masks, tmp_path, twice):
+def without_a_chunk(times: int) -> bytes:
     data = good()
     at = chunk(3, data)
     end = at + length_of(data, at)
-    path = saved(tmp_path, data[:at] + data[at:end] * (2 * twice) + data[end:])
-    assert paired(path, by_number(masks))[0] == {}
+    return data[:at] + data[at:end] * times + data[end:]
 
 
-def test_a_hole_among_chunks_out_of_order_leaves_no_number_sure_that_lies_behind_it(
-    masks, tmp_path
-):
-    numbers = [10, 11, 0, 1, 12, 13, *range(2, 10), *range(14, FRAMES)]
-    data = broken.log(numbers).bytes()
+def out_of_order() -> bytes:
+    data = broken.log([10, 11, 0, 1, 12, 13, *range(2, 10), *range(14, FRAMES)]).bytes()
     begin, end, last = chunk(1, data), chunk(2, data), chunk(19, data)
-    without_summary = over(data, begin, bytes(end - begin))[:last]
-    assert paired(saved(tmp_path, without_summary), by_number(masks))[0] == {}
+    return over(data, begin, bytes(end - begin))[:last]
 
 
-def test_a_message_whose_channel_is_damaged_leaves_no_number_after_it_sure(masks, tmp_path):
+def foreign_message() -> bytes:
     data = good("unchunked")
-    found, _ = paired(
-        saved(tmp_path, over(data, message(13, data) + HEAD, b"\7")), by_number(masks)
-    )
-    assert found == {number: number for number in range(13)}
+    return over(data, message(13, data) + HEAD, b"\7")
+
+
+WHOLE = ("ok", "unchunked", "noindex", "nostats", "dataend_crc_bad", "trunc_last1")
+COUNTED = ("chunk_crc_field_bad", "chunk_data_flip_lz4")
+CASES: dict[str, tuple[Any, list[int], int | None]] = {
+    **{name: (name, [*range(FRAMES)], 0) for name in WHOLE},
+    # The index tells how many messages the damage took.
+    **{name: (name, [n for n in range(FRAMES) if n not in {6, 7}], 0) for name in COUNTED},
+    "trunc_midchunk": ("trunc_midchunk", [*range(36)], 0),
+    "trunc_unchunked": ("trunc_unchunked", [*range(28)], 0),
+    # It took an unknown number, before so many frames that are left.
+    "zero_hole": ("zero_hole", [*range(6)], 32),
+    "huge_len_msg_unchunked": ("huge_len_msg_unchunked", [*range(5)], 34),
+    "a chunk lacks": (lambda: without_a_chunk(0), [], None),
+    "a chunk is there twice": (lambda: without_a_chunk(2), [], None),
+    "a hole among chunks out of order": (out_of_order, [], None),
+    "a message of another channel": (foreign_message, [*range(13)], None),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_frame_has_its_own_mask_or_none_whatever_was_lost_before_it(masks, tmp_path, case):
+    made, expected, unsure = CASES[case]
+    data = made() if callable(made) else broken.BROKEN[made][1]().data
+    found = paired(saved(tmp_path, data), masks)
+    assert found == (expected, found[1] if unsure is None else unsure)
 
 
 @pytest.mark.parametrize(
@@ -156,23 +128,18 @@ def test_a_file_of_a_split_log_that_is_lost_leaves_no_number_sure(masks, tmp_pat
     parts = [range(14), range(14, 28), range(28, FRAMES)]
     for place, part in enumerate(parts):
         data = broken.log([*part]).bytes()
-        whole = tmp_path / f"drive_{place}.mcap"
-        if place != spoilt:
-            whole.write_bytes(data)
-        elif content is not None:
-            whole.write_bytes(content(data))
-    found, unsure = paired(tmp_path, by_number(masks))
-    assert (found, unsure) == ({}, FRAMES - len(parts[spoilt]))
+        if place != spoilt or content is not None:
+            data = content(data) if place == spoilt else data
+            (tmp_path / f"drive_{place}.mcap").write_bytes(data)
+    assert paired(tmp_path, masks) == ([], FRAMES - len(parts[spoilt]))
 
 
 def test_what_a_split_log_lost_at_the_end_of_a_file_shifts_no_number_before_it(masks, tmp_path):
     for place, part in enumerate((range(14), range(14, FRAMES))):
         data = broken.log([*part]).bytes()
-        whole = tmp_path / f"drive_{place}.mcap"
-        whole.write_bytes(data[: chunk(3, data) - 1] if place == 0 else data)
-    found, unsure = paired(tmp_path, by_number(masks))
-    assert found == {number: number for number in range(6)}
-    assert unsure == FRAMES - 14
+        data = data[: chunk(3, data) - 1] if place == 0 else data
+        (tmp_path / f"drive_{place}.mcap").write_bytes(data)
+    assert paired(tmp_path, masks) == ([*range(6)], FRAMES - 14)
 
 
 @pytest.mark.parametrize("later_ns", [0, -(10**12), 10**12])
@@ -204,18 +171,12 @@ def test_the_truth_is_not_held_against_itself_by_the_log_s_own_path(tmp_path):
 
 @pytest.mark.parametrize("count", [FRAMES - 1, FRAMES + 1])
 def test_a_log_that_was_not_made_of_the_images_is_refused(masks, tmp_path, count):
-    images = _images(tmp_path, count)
-    settings = MaskSettings(path=str(masks), images=str(images))
-    with pytest.raises(LogError, match=f"holds {count} images and the log 40, so it was not made"):
-        paired(damaged(tmp_path, "ok"), settings)
-
-
-def _images(folder: Path, count: int) -> Path:
-    images = folder / "images"
-    images.mkdir()
+    (tmp_path / "images").mkdir()
     for number in range(count):
-        (images / f"{number:04}.jpg").touch()
-    return images
+        (tmp_path / "images" / f"{number:04}.jpg").touch()
+    settings = replace(masks, images=str(tmp_path / "images"))
+    with pytest.raises(LogError, match=f"holds {count} images and the log 40, so it was not made"):
+        paired(saved(tmp_path, good()), settings)
 
 
 @pytest.mark.parametrize("chunked", [True, False])
