@@ -12,7 +12,8 @@ import pytest
 
 from roadeval.logs.settings import LabelSettings, MaskSettings
 from tests.logs.truth.test_formats import HEIGHT, WIDTH
-from tests.logs.truth.test_shapes import labels_of, percent
+from tests.logs.truth.test_shapes import labelme as square_of_labelme
+from tests.logs.truth.test_shapes import labels_of, percent, task
 
 IMAGES = 5
 FILES = 125
@@ -25,11 +26,9 @@ def flat(points):
 
 
 def coco(drawing):
+    size = {"width": WIDTH, "height": HEIGHT}
     return {
-        "images": [
-            {"id": n, "file_name": f"{n}.png", "width": WIDTH, "height": HEIGHT}
-            for n in range(IMAGES)
-        ],
+        "images": [{"id": n, "file_name": f"{n}.png", **size} for n in range(IMAGES)],
         "categories": [{"id": 1, "name": "road"}, {"id": 2, "name": "car"}],
         "annotations": [
             {
@@ -45,71 +44,77 @@ def coco(drawing):
 
 
 def label_studio(drawing):
-    size = {"original_width": WIDTH, "original_height": HEIGHT, "to_name": "image"}
+    def region(place, label, points):
+        value = {"points": percent(points), "polygonlabels": [label]}
+        return {"id": f"{label}{place}", "value": value}
+
     return [
-        {
-            "id": n,
-            "data": {"image": f"{n}.png"},
-            "annotations": [
-                {
-                    "result": [
-                        {
-                            "id": f"{label}{place}",
-                            "value": {"points": percent(points), "polygonlabels": [label]},
-                            **size,
-                        }
-                        for place, (label, points) in enumerate(shapes)
-                    ]
-                }
-            ],
-        }
+        task(*(region(i, *shape) for i, shape in enumerate(shapes)), data={"image": f"{n}.png"})
         for n, shapes in enumerate(drawing)
     ]
 
 
 def via(drawing):
+    def region(label, points):
+        x, y = ([point[axis] for point in points] for axis in (0, 1))
+        at = {"name": "polygon", "all_points_x": x, "all_points_y": y}
+        return {"shape_attributes": at, "region_attributes": {"class": label}}
+
     return {
-        f"{n}.png9": {
-            "filename": f"{n}.png",
-            "regions": [
-                {
-                    "shape_attributes": {
-                        "name": "polygon",
-                        "all_points_x": [x for x, _ in points],
-                        "all_points_y": [y for _, y in points],
-                    },
-                    "region_attributes": {"class": label},
-                }
-                for label, points in shapes
-            ],
-        }
+        f"{n}.png9": {"filename": f"{n}.png", "regions": [region(*shape) for shape in shapes]}
         for n, shapes in enumerate(drawing)
     }
 
 
 def scalabel(drawing):
-    return [
-        {
-            "name": f"{n}.png",
-            "labels": [
-                {"category": label, "poly2d": [{"vertices": points, "types": "L" * len(points)}]}
-                for label, points in shapes
-            ],
+    def part(label, points):
+        return {
+            "category": label,
+            "poly2d": [{"vertices": points, "types": "L" * len(points)}],
         }
+
+    return [
+        {"name": f"{n}.png", "labels": [part(*shape) for shape in shapes]}
         for n, shapes in enumerate(drawing)
     ]
 
 
 def labelme(shapes):
-    drawn = [
-        {"label": label, "shape_type": "polygon", "points": points} for label, points in shapes
-    ]
-    return {"shapes": drawn, "imageWidth": WIDTH, "imageHeight": HEIGHT}
+    return square_of_labelme(*((label, "polygon", points) for label, points in shapes))
 
 
 def cityscapes(shapes):
     drawn = [{"label": label, "polygon": points} for label, points in shapes]
     return {"objects": drawn, "imgWidth": WIDTH, "imgHeight": HEIGHT}
+
+
+def cvat(drawing):
+    return {
+        f"{n}.png": [
+            {"label": label, "points": ";".join(f"{x},{y}" for x, y in points)}
+            for label, points in shapes
+        ]
+        for n, shapes in enumerate(drawing)
+    }
+
+
+def xml(content):
+    """Write what `cvat` makes as CVAT does; an attribute that was taken away is not there."""
+    root = ElementTree.Element("annotations")
+    for name, shapes in content.items():
+        size = {"width": str(WIDTH), "height": str(HEIGHT)}
+        image = ElementTree.SubElement(root, "image", {"name": name, **size})
+        for shape in shapes:
+            ElementTree.SubElement(image, "polygon", shape)
+    return ElementTree.tostring(root, "unicode")
+
+
+def yolo(shapes):
+    lines = [
+        " ".join(map(str, [int(label == "car"), *(n / 100 for n in flat(percent(points)))]))
+        for label, points in shapes
+    ]
+    return "\n".join(lines)
 
 
 ANNOTATIONS = {
@@ -119,7 +124,10 @@ ANNOTATIONS = {
     scalabel: lambda content, n: content[n]["labels"],
     labelme: lambda content, _: content["shapes"],
     cityscapes: lambda content, _: content["objects"],
+    cvat: lambda content, n: content[f"{n}.png"],
 }
+ENDINGS = {yolo: ".txt", cvat: ".xml"}
+ONE_IMAGE = (labelme, cityscapes, yolo)
 
 
 def drawings(rng):
@@ -155,25 +163,6 @@ def spoilt_text(text, rng):
     return "".join(numbers)
 
 
-def cvat(drawing):
-    root = ElementTree.Element("annotations")
-    for n, shapes in enumerate(drawing):
-        size = {"width": str(WIDTH), "height": str(HEIGHT)}
-        image = ElementTree.SubElement(root, "image", {"name": f"{n}.png", **size})
-        for label, points in shapes:
-            text = ";".join(f"{x},{y}" for x, y in points)
-            ElementTree.SubElement(image, "polygon", {"label": label, "points": text})
-    return root
-
-
-def yolo(shapes):
-    lines = [
-        " ".join(map(str, [int(label == "car"), *(n / 100 for n in flat(percent(points)))]))
-        for label, points in shapes
-    ]
-    return "\n".join(lines)
-
-
 def judged(before, after, notes, image):
     """Whether the image is lost of which an annotation was spoilt; all others must be as before."""
     assert after.keys() == before.keys()
@@ -192,13 +181,13 @@ def judged(before, after, notes, image):
 
 def files_of(make, drawing):
     whole = [make(shapes) for shapes in drawing] if make in ONE_IMAGE else [make(drawing)]
-    return {f"{n}{'.txt' if make is yolo else '.json'}": content for n, content in enumerate(whole)}
+    return {f"{n}{ENDINGS.get(make, '.json')}": content for n, content in enumerate(whole)}
 
 
 def write(folder, files):
     for name, content in files.items():
         text = content if isinstance(content, str) else json.dumps(content)
-        (folder / name).write_text(text)
+        (folder / name).write_text(xml(content) if name.endswith(".xml") else text)
     path = folder if len(files) > 1 else folder / name
     road = ("0",) if name.endswith(".txt") else ("road",)
     return labels_of(path, MaskSettings(str(path), labels=LabelSettings(road)))
@@ -208,12 +197,15 @@ def spoil(files, make, image, rng):
     name = [*files][image if make in ONE_IMAGE else 0]
     if make is yolo:
         files[name] = spoilt_text(files[name], rng)
+        return name
+    annotation = rng.choice(ANNOTATIONS[make](files[name], image))
+    if make is not cvat:
+        spoilt(annotation, rng)
     else:
-        spoilt(rng.choice(ANNOTATIONS[make](files[name], image)), rng)
+        key = rng.choice(["points", "points", "label"])
+        text = spoilt_text(annotation.pop(key), rng)
+        annotation |= {key: text} if rng.random() < 0.8 and key == "points" else {}
     return name if make in ONE_IMAGE else f"{image}.png"
-
-
-ONE_IMAGE = (labelme, cityscapes, yolo)
 
 
 @pytest.mark.parametrize("make", [*ANNOTATIONS, yolo])
@@ -226,23 +218,4 @@ def test_a_bad_annotation_costs_its_image_alone(tmp_path, make):
         image = rng.randrange(IMAGES)
         name = spoil(files, make, image, rng)
         lost += judged(before, *write(tmp_path, files), name)
-    assert lost > FILES / 4
-
-
-def test_a_bad_annotation_of_cvat_costs_its_image_alone(tmp_path):
-    rng = random.Random(7)
-    path = tmp_path / "a.xml"
-    asked = MaskSettings(str(path), labels=LabelSettings(("road",)))
-    lost = 0
-    for _ in range(FILES):
-        root, image = cvat(drawings(rng)), rng.randrange(IMAGES)
-        ElementTree.ElementTree(root).write(path)
-        before, _ = labels_of(path, asked)
-        shape = rng.choice([*root[image]])
-        key = rng.choice(["points", "points", "label"])
-        text = spoilt_text(shape.attrib.pop(key), rng)
-        if rng.random() < 0.8 and key == "points":
-            shape.set(key, text)
-        ElementTree.ElementTree(root).write(path)
-        lost += judged(before, *labels_of(path, asked), f"{image}.png")
     assert lost > FILES / 4

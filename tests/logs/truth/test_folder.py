@@ -38,13 +38,6 @@ def keys(path, **settings):
     return found.by, dict(zip(names, found.log_times.tolist(), strict=True))
 
 
-def test_the_number_by_which_names_differ_is_the_frame(tmp_path):
-    path = folder(tmp_path, "0016E5_10.png", "0016E5_2_mask.png", "0016E5_007_L.npy", "notes.txt")
-    expected = {"0016E5_2_mask.png": 2, "0016E5_007_L.npy": 7, "0016E5_10.png": 10}
-    assert keys(path) == ("number", expected)
-    assert list(keys(path)[1]) == list(expected)
-
-
 def test_names_that_are_times_are_stamps(tmp_path):
     path = folder(tmp_path, "1700000000.25.png", "1700000000123.png", "1700000000500000001_gt.png")
     assert keys(path) == (
@@ -109,18 +102,17 @@ def test_a_topic_of_a_log_is_told_from_a_folder(path, expected):
     assert log_and_topic(path) == expected
 
 
-def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same(tmp_path):
+def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same():
     levels = np.arange(256, dtype=np.uint8).reshape(16, 16)
-    confidence = Confidence(0.5)
-    pictures = [
+    wide, confidence = levels.astype(np.uint16) * 257, Confidence(0.5)
+    for picture in (
         CompressedPicture(0, "png", png(levels)),
-        CompressedPicture(0, "png", png(levels.astype(np.uint16) * 257)),
+        CompressedPicture(0, "png", png(wide)),
         npy_picture(file_of(levels / 255), Limits()),
         npy_picture(file_of((levels / 255).astype(np.float32)), Limits()),
-    ]
-    for picture in pictures:
+    ):
         codes = confidence.codes(picture, Limits())
-        np.testing.assert_array_equal(codes, levels.astype(np.uint16) * 257)
+        np.testing.assert_array_equal(codes, wide)
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
 
 
@@ -142,43 +134,33 @@ def test_whole_numbers_keep_their_values(dtype, order):
     np.testing.assert_array_equal(to_labels(npy_picture(file_of(array), LIMITS), LIMITS), array)
 
 
+class Bomb:
+    def __reduce__(self):
+        return pytest.fail, ("it ran",)
+
+
+NEITHER = "neither a class nor a confidence"
+WHOLE = file_of(np.zeros((2, 3), "u1"))
+
+
 @pytest.mark.parametrize(
-    ("array", "message"),
+    ("content", "message"),
     [
-        (np.zeros((2, 3, 1)), r"of shape \(2, 3, 1\)"),
-        (np.zeros(3), r"of shape \(3,\)"),
-        (np.array([["a"]]), "not of numbers"),
-        (np.array([[-1.5]]), "it holds -1.5"),
-        (np.array([[70_000]]), "it holds 70000"),
-        (np.zeros((1, 1), complex), "not of numbers"),
+        (file_of(np.zeros((2, 3, 1))), r"of shape \(2, 3, 1\)"),
+        (file_of(np.zeros(3)), r"of shape \(3,\)"),
+        (file_of(np.array([["a"]])), "not of numbers"),
+        (file_of(np.array([[70_000]])), "it holds 70000"),
+        (file_of(np.zeros((1, 1), complex)), "not of numbers"),
+        *((file_of(np.array([[0.5, n]])), NEITHER) for n in (np.nan, np.inf, -np.inf, -1.5)),
+        (file_of(np.array([[Bomb()]], object), allow_pickle=True), "no NPY file of numbers"),
+        *((WHOLE[:length], "a damaged one") for length in (0, 5, 40, 128, 133)),
     ],
 )
-def test_another_array_is_refused(array, message):
+def test_what_is_no_array_of_labels_is_refused_and_nothing_of_it_is_run(content, message):
     with pytest.raises(BadMessage, match=message):
-        npy_picture(file_of(array), LIMITS)
-
-
-def test_objects_are_refused_and_nothing_of_them_is_run():
-    class Bomb:
-        def __reduce__(self):
-            return pytest.fail, ("it ran",)
-
-    with pytest.raises(BadMessage, match="no NPY file of numbers"):
-        npy_picture(file_of(np.array([[Bomb()]], dtype=object), allow_pickle=True), LIMITS)
-
-
-@pytest.mark.parametrize("length", [0, 5, 40, 128, 133])
-def test_a_file_that_is_cut_off_is_refused(length):
-    with pytest.raises(BadMessage, match="a damaged one"):
-        npy_picture(file_of(np.zeros((2, 3), "u1"))[:length], LIMITS)
+        npy_picture(content, LIMITS)
 
 
 def test_more_pixels_than_are_allowed_are_refused():
     with pytest.raises(ImageError, match="more than the 1000 pixels"):
         npy_picture(file_of(np.zeros((40, 30), "u1")), LIMITS)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1.0])
-def test_a_fraction_that_is_no_confidence_is_refused(value):
-    with pytest.raises(BadMessage, match="neither a class nor a confidence"):
-        npy_picture(file_of(np.array([[0.5, value]])), LIMITS)
