@@ -10,72 +10,69 @@ from mcap.writer import CompressionType
 
 from roadeval.logs.container import records
 from roadeval.logs.errors import LogError
+from roadeval.logs.frames import LoggedFrame, Selection
 from roadeval.logs.log import Log, open_log
 from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
-from roadeval.logs.writing.writer import LogWriter
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789
 STAMPS = [START + i * SECOND // 10 for i in range(10)]
 
 
-def numbers(path: Path, **asked: Any) -> list[int]:
-    with open_log(path, LogConfig(frames=FrameSettings(**asked))) as log:
-        return [frame.number for frame in log.frames(log.select())]
+def read(path: Path, **settings: Any) -> tuple[Selection, list[LoggedFrame]]:
+    with open_log(path, LogConfig(**settings)) as log:
+        selection = log.select()
+        return selection, [*log.frames(selection)]
 
 
-def test_a_topic_is_not_scored_against_itself(tmp_path: Path) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
-    for asked, reason in (
+@pytest.mark.parametrize(
+    ("topics", "reason"),
+    [
         ({"image": "/labels", "truth": "/labels"}, "`topics.truth` /labels: it is the image's own"),
         ({"masks": {"net": "/labels"}}, "`topics.masks` net: /labels is the truth"),
-    ):
-        with (
-            open_log(path, LogConfig(topics=TopicSettings(**asked))) as log,
-            pytest.raises(LogError, match=reason),
-        ):
-            log.select()
+    ],
+)
+def test_a_topic_is_not_scored_against_itself(tmp_path: Path, topics: Any, reason: str) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
+    with pytest.raises(LogError, match=reason):
+        read(path, topics=TopicSettings(**topics))
 
 
-def test_a_range_is_half_open_and_keeps_the_numbers(tmp_path: Path) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS)
-    assert numbers(path, start="0.2", end="0.5") == [2, 3, 4]
-    assert numbers(path, start=str(STAMPS[7])) == [7, 8, 9]
-    assert numbers(path, start="0.1", every=3, max_frames=2) == [1, 4]
+@pytest.mark.parametrize(
+    ("frames", "numbers"),
+    [
+        ({"start": "0.2", "end": "0.5"}, [2, 3, 4]),
+        ({"start": str(STAMPS[7])}, [7, 8, 9]),
+        ({"start": "0.1", "every": 3, "max_frames": 2}, [1, 4]),
+    ],
+)
+def test_a_range_is_half_open_and_keeps_the_numbers(
+    tmp_path: Path, frames: Any, numbers: list[int]
+) -> None:
+    _, logged = read(drive(tmp_path / "drive.mcap", STAMPS), frames=FrameSettings(**frames))
+    assert [frame.number for frame in logged] == numbers
 
 
-def test_log_times_take_the_place_of_zero_stamps(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("images", "labels", "stamps", "told"),
+    [
+        ([10, 20, 30], [12, 22, 32], [10, 20, 30], "in place of them: log times"),
+        ([7, 7, 7], [9, 9, 9], [7, 7, 7], "in place of them: their order"),
+        ([7, 7], [7], [], "in place of them: their order"),
+    ],
+)
+def test_log_times_or_the_order_take_the_place_of_zero_stamps(
+    tmp_path: Path, images: list[int], labels: list[int], stamps: list[int], told: str
+) -> None:
     mask = png(grey(255))
-    messages = []
-    for time in (10, 20, 30):
-        messages += [("/cam", time, compressed(0, jpeg(grey(9))))]
-        messages += [("/labels", time + 2, compressed(0, mask, "png"))]
-    path = ros2_log(tmp_path / "zero.mcap", messages)
-    with open_log(path) as log:
-        selection = log.select()
-        frames = list(log.frames(selection))
-    assert [(f.stamp_ns, f.labelled) for f in frames] == [(10, True), (20, True), (30, True)]
-    assert any("in place of them: log times" in reason for reason in selection.reasons)
-
-
-def test_without_any_time_images_and_labels_pair_in_their_order(tmp_path: Path) -> None:
-    mask = png(grey(255))
-    messages = []
-    for _ in range(3):
-        messages += [("/cam", 7, compressed(0, jpeg(grey(9))))]
-        messages += [("/labels", 9, compressed(0, mask, "png"))]
-    path = ros2_log(tmp_path / "zero.mcap", messages)
-    with open_log(path) as log:
-        selection = log.select()
-        assert any("in place of them: their order" in reason for reason in selection.reasons)
-        assert [frame.labelled for frame in log.frames(selection)] == [True] * 3
-    with LogWriter(tmp_path / "few.mcap") as few:
-        for topic in ("/cam", "/cam", "/labels"):
-            few.image(topic, 0, mask, "png", log_time_ns=7)
-    with open_log(tmp_path / "few.mcap") as log:
-        assert [frame.labelled for frame in log.frames(log.select())] == [False] * 2
+    messages = [("/cam", time, compressed(0, jpeg(grey(9)))) for time in images]
+    messages += [("/labels", time, compressed(0, mask, "png")) for time in labels]
+    path = ros2_log(tmp_path / "zero.mcap", sorted(messages, key=lambda message: message[1]))
+    selection, frames = read(path)
+    assert [frame.stamp_ns for frame in frames if frame.labelled] == stamps
+    assert any(told in reason for reason in selection.reasons)
 
 
 @pytest.mark.parametrize("kind", list(CompressionType))
@@ -114,10 +111,8 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, ap
     messages = [("/camera", 1 + i + again * apart, images[i]) for again in (0, 1) for i in range(3)]
     messages.append(("/camera", 100, compressed(3, jpeg(grey(200)))))  # an old stamp
     path = ros2_log(tmp_path / "a.mcap", sorted(messages, key=lambda message: message[1]))
-    with open_log(path) as log:
-        stream = log.frames(log.select())
-        assert sum(1 for _ in stream) == 7
-        (told,) = stream.accounting.notes
+    (*_, last) = read(path)[1]
+    (told,) = last.accounting.notes
     assert told.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
 
 
@@ -240,27 +235,22 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(
     tmp_path: Path, names: list[str]
 ) -> None:
     path = two_cameras(tmp_path / "a.mcap", names)
-    with open_log(path) as log:
-        stream = log.frames(log.select())
-        assert sum(1 for _ in stream) == len(names)
-        (told,) = (note for note in stream.accounting.notes if "several cameras" in note)
-        assert f"{names[0]} ({names.count(names[0])})" in told
-        assert "`topics.frame_id` chooses one" in told
+    _, frames = read(path)
+    assert len(frames) == len(names)
+    (told,) = (note for note in frames[0].accounting.notes if "several cameras" in note)
+    assert f"{names[0]} ({names.count(names[0])})" in told
+    assert "`topics.frame_id` chooses one" in told
     for name in {*names}:
-        own = [number for number, other in enumerate(names) if other == name]
-        asked = LogConfig(topics=TopicSettings(frame_id=name, truth="/labels"))
-        with open_log(path, asked) as log:
-            stream = log.frames(log.select())
-            assert [frame.number for frame in stream] == own
-            assert not any("several cameras" in note for note in stream.accounting.notes)
+        _, frames = read(path, topics=TopicSettings(frame_id=name, truth="/labels"))
+        numbers = [number for number, other in enumerate(names) if other == name]
+        assert [frame.number for frame in frames] == numbers
+        assert not any("several cameras" in note for note in frames[0].accounting.notes)
 
 
 def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:
-    asked = LogConfig(topics=TopicSettings(frame_id="left", truth=""))
     path = two_cameras(tmp_path / "a.mcap", ["front", "rear"])
-    why = "left: no image of the range has it; the first has front"
-    with open_log(path, asked) as log, pytest.raises(LogError, match=why):
-        log.frames(log.select())
+    with pytest.raises(LogError, match="left: no image of the range has it; the first has front"):
+        read(path, topics=TopicSettings(frame_id="left", truth=""))
 
 
 @pytest.mark.parametrize(("apart", "repeated"), [(1, 0), (2, 6), (3, 8)])
@@ -272,8 +262,6 @@ def test_a_label_under_several_stamps_is_told(tmp_path: Path, apart: int, repeat
         mask[: 1 + number // apart % 6, : 1 + number // apart] = 255
         messages.append(("/camera", number + 1, compressed(number + 1, png(grey(number)))))
         messages.append(("/labels", number + 1, compressed(number + 1, png(mask))))
-    with open_log(ros2_log(tmp_path / "a.mcap", messages)) as log:
-        stream = log.frames(log.select())
-        assert len([*stream]) == 12
-        told = [note for note in stream.accounting.notes if "labels repeat" in note]
+    _, frames = read(ros2_log(tmp_path / "a.mcap", messages))
+    told = [note for note in frames[-1].accounting.notes if "labels repeat" in note]
     assert [note.split(" labels")[0] for note in told] == [f"{repeated} of the 12"] * (repeated > 0)

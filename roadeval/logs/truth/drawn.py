@@ -271,6 +271,11 @@ class LabelFormat:
     ValueError means that the file, or the image, is not as the format asks."""
 
 
+def has(*keys: str) -> Callable[[Path, Any], bool]:
+    """Return what tells a file whose content is a table with these keys, among others."""
+    return lambda _, content: isinstance(content, dict) and {*keys} <= content.keys()
+
+
 def settled(
     drawings: Sequence[Drawing], meant: Meant, broken: dict[str, str], notes: list[str]
 ) -> list[Drawing]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
@@ -106,18 +105,20 @@ class Picks:
 
     def _contradiction(self) -> str:
         """Return which of the numbers contradict each other; empty if none."""
-        own = Counter(each.why for each in self.picked)
-        known = dict(zip(self.stamps, self.frames, strict=False))
-        sizes = {len(self.frames), len(self.stamps), len(self.scores), len(known)}
+        random = sum(frame.why is Why.RANDOM for frame in self.picked)
+        frame_of = dict(zip(self.stamps, self.frames, strict=False))
+        sizes = {len(self.frames), len(self.stamps), len(self.scores), len(frame_of)}
         if self.format != FORMAT or len(sizes) > 1 or not self.frames:
             return "its lists of frames, stamps and scores do not fit together"
         if len(self.by_stamp) < len(self.picked):
             return "a frame is picked twice"
-        if any(known.get(each.stamp_ns) != each.frame for each in self.picked):
+        if any(frame_of.get(frame.stamp_ns) != frame.frame for frame in self.picked):
             return "a picked frame is not in the list of all"
-        if own[Why.RANDOM] != self.drawn:
-            return f"{own[Why.RANDOM]} frames are random, but {self.drawn} were drawn"
-        return ""
+        return (
+            ""
+            if random == self.drawn
+            else f"{random} frames are random, but {self.drawn} were drawn"
+        )
 
     # Stamps are compared as floats, for programs that rewrite JSON round them to such.
 

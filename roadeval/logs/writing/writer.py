@@ -20,7 +20,7 @@ from typing import Any, Final, Self
 import numpy as np
 from mcap.writer import Writer
 
-from roadeval.data import Frame, FrameResult, Layer, Tally
+from roadeval.data import FrameResult
 from roadeval.data.arrays import Image
 from roadeval.images.decoding import orientation_of, png_of, size_of, upright
 from roadeval.images.formats import ImageError, Limits, format_of
@@ -170,37 +170,38 @@ class SidecarWriter(LogWriter):
         full.
         """
         root = "/".join(filter(None, (ROOT, camera.strip("/"))))
-        stamp, log_time = result.frame.stamp_ns, result.frame.log_time_ns
+        frame = result.frame
+        stamp, log_time = frame.stamp_ns, frame.log_time_ns
         images: dict[str, Image] = {}
         for variant in result.variants:
             for stage, mask in variant.masks():
                 images[f"{root}/{variant.variant}/{stage}"] = mask.pixels() * np.uint8(255)
         for name, errors in result.errors.items():
-            images[f"{root}/{name}/{errors.spec.name}"] = _coloured(errors)
+            palette = np.zeros((256, 4), np.uint8)
+            for label in errors.spec.classes:
+                palette[label.value] = label.rgba
+            images[f"{root}/{name}/{errors.spec.name}"] = palette[
+                np.asarray(errors.array, np.uint8)
+            ]
         for topic, image in images.items():
             self.mask(topic, stamp, image, log_time_ns=log_time, frame_id=frame_id or FRAME_ID)
         for tally in result.tallies:
-            topic = f"{root}/metrics/{tally.variant}/{tally.stage}"
-            message = _message(result.frame, tally)
+            counts = tally.counts
+            message: dict[str, Any] = {
+                "timestamp": {"sec": stamp // NS, "nsec": stamp % NS},
+                "frame": frame.number,
+                "variant": tally.variant,
+                "stage": tally.stage,
+                "TP": counts.tp,
+                "TN": counts.tn,
+                "FP": counts.fp,
+                "FN": counts.fn,
+                "N": counts.n,
+                **{name: None if math.isnan(rate) else rate for name, rate in tally.rates.items()},
+            }
             data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
+            topic = f"{root}/metrics/{tally.variant}/{tally.stage}"
             self._write(topic, _schema(tuple(tally.rates)), stamp, log_time, data)
-
-
-def _message(frame: Frame, tally: Tally) -> dict[str, Any]:
-    counts = tally.counts
-    rates = {name: None if math.isnan(rate) else rate for name, rate in tally.rates.items()}
-    return {
-        "timestamp": {"sec": frame.stamp_ns // 10**9, "nsec": frame.stamp_ns % 10**9},
-        "frame": frame.number,
-        "variant": tally.variant,
-        "stage": tally.stage,
-        "TP": counts.tp,
-        "TN": counts.tn,
-        "FP": counts.fp,
-        "FN": counts.fn,
-        "N": counts.n,
-        **rates,
-    }
 
 
 class NoSidecar:
@@ -219,14 +220,6 @@ class NoSidecar:
 
     def __exit__(self, *error: object) -> None:
         """Nothing is open."""
-
-
-def _coloured(layer: Layer) -> Image:
-    """Paint a label layer in its classes' colours: ``(H, W, 4)`` RGBA."""
-    palette = np.zeros((256, 4), np.uint8)
-    for label in layer.spec.classes:
-        palette[label.value] = label.rgba
-    return palette[np.asarray(layer.array, np.uint8)]
 
 
 @cache
@@ -335,13 +328,8 @@ def _pack_folder(
         "masks without an image": [label for label in labels if label not in belong],
         "images that their EXIF orientation turns, in replay as in viewers": turned,
     }
-    return PackResult(
-        output,
-        len(files),
-        len(by_image),
-        words,
-        tuple(f"{what}: {some(own)} ({len(own)} in all)" for what, own in unpaired.items() if own),
-    )
+    told = (f"{what}: {some(odd)} ({len(odd)} in all)" for what, odd in unpaired.items() if odd)
+    return PackResult(output, len(files), len(by_image), words, tuple(told))
 
 
 def _label_images(masks: Path, images: Path) -> Sequence[Path]:

@@ -29,17 +29,20 @@ def truth(values: list[int], labels: LabelSettings | None = None) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ("values", "expected"),
+    ("values", "expected", "labels"),
     [
-        ([0, 255], [0, 1]),
-        ([0, 128, 255], [0, 255, 1]),
-        ([0, 1], [0, 1]),
-        ([0, 1, 255], [0, 1, 255]),
-        ([0], [0]),
+        ([0, 255], [0, 1], {}),
+        ([0, 128, 255], [0, 255, 1], {}),
+        ([0, 1], [0, 1], {}),
+        ([0, 1, 255], [0, 1, 255], {}),
+        ([0], [0], {}),
+        ([0, 3, 4, 11, 255], [0, 1, 1, 255, 0], {"road": (3, 4), "ignore": (11,)}),
     ],
 )
-def test_a_mask_is_understood_by_itself(values: list[int], expected: list[int]) -> None:
-    assert truth(values) == expected
+def test_a_mask_is_understood_by_itself_and_other_values_as_they_are_named(
+    values, expected, labels
+) -> None:
+    assert truth(values, LabelSettings(**labels)) == expected
 
 
 @pytest.mark.parametrize(
@@ -54,52 +57,48 @@ def test_values_that_mean_road_in_some_pictures_and_ignored_in_others_are_asked_
     assert given.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
 
 
-def test_a_picture_whose_values_mean_something_else_than_those_looked_at_is_no_label():
-    table = understand(LabelSettings(), [{0, 1}], "/mask")
-    with pytest.raises(BadMessage, match="it holds 255 but no 1: 255 is road in masks of 0 and"):
-        table.of_values(np.array([[0, 255]], np.uint8))
-    assert table.of_values(np.array([[1, 255]], np.uint8)).tolist() == [[1, 255]]
-
-
-def test_class_ids_are_asked_for_with_the_values_seen() -> None:
-    with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*`labels.road`"):
-        truth([0, 3, 11])
-
-
-def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
-    labels = LabelSettings(road=(3, 4), ignore=(11,))
-    assert truth([0, 3, 4, 11, 255], labels) == [0, 1, 1, 255, 0]
-
-
-@pytest.mark.parametrize("setting", ["road", "ignore"])
-def test_a_name_for_labels_without_names_is_refused(setting: str) -> None:
-    with pytest.raises(LogError, match=f"`labels.{setting}` sky does not occur in /labels"):
-        understand(LabelSettings(**{"road": (3,), setting: ("sky",)}), [[0, 3]], "/labels")
+@pytest.mark.parametrize(
+    ("values", "other", "problem"),
+    [
+        ({0, 1}, [0, 255], "it holds 255 but no 1: 255 is road in masks of 0 and"),
+        ({0, 255}, [0, 7], "holds the value 7"),
+    ],
+)
+def test_a_picture_whose_values_mean_something_else_than_those_looked_at_is_no_label(
+    values, other, problem
+):
+    table = understand(LabelSettings(), [values], "/mask")
+    with pytest.raises(BadMessage, match=problem):
+        table.of_values(np.array([other], np.uint8))
+    assert table.of_values(np.array([[*values]], np.uint8)).tolist() == [[0, 1]]
 
 
 @pytest.mark.parametrize(
-    ("labels", "setting"),
+    ("labels", "problem"),
     [
-        (LabelSettings(road=(7,)), "`labels.road` 7"),
-        (LabelSettings(road=(3,), ignore=(9,)), "`labels.ignore` 9"),
+        (LabelSettings(), r"/labels holds the values 0 3 11: .*`labels.road`"),
+        (LabelSettings(road=("sky",)), "`labels.road` sky does not occur in /labels"),
+        (LabelSettings(road=(3,), ignore=("sky",)), "`labels.ignore` sky does not occur in"),
+        (LabelSettings(road=(7,)), r"`labels.road` 7 does not occur in /labels.* 0 3 11"),
+        (LabelSettings(road=(3,), ignore=(9,)), "`labels.ignore` 9 does not occur in /labels"),
     ],
 )
-def test_a_given_value_that_never_occurs_is_refused(labels: LabelSettings, setting: str) -> None:
-    with pytest.raises(LogError, match=rf"{setting} does not occur in /labels.* 0 3"):
-        truth([0, 3], labels)
+def test_a_value_that_is_not_named_or_does_not_occur_is_refused(labels, problem) -> None:
+    with pytest.raises(LogError, match=problem):
+        truth([0, 3, 11], labels)
 
 
-def test_ignore_needs_road() -> None:
-    with pytest.raises(ValueError, match=r"`labels\.ignore` needs `labels\.road`"):
-        LabelSettings(ignore=(3,))
-    with pytest.raises(ValueError, match=r"`labels\.ignore_colors` needs `labels\.road_colors`"):
-        LabelSettings(ignore_colors=(ROAD,))
-
-
-def test_a_mask_that_later_holds_another_value_is_not_guessed_at() -> None:
-    table = understand(LabelSettings(), [[0, 255]], "/mask")
-    with pytest.raises(BadMessage, match="holds the value 7"):
-        table.of_values(np.array([[0, 7]], np.uint8))
+@pytest.mark.parametrize(
+    ("settings", "problem"),
+    [
+        ({"ignore": (3,)}, r"`labels\.ignore` needs `labels\.road`"),
+        ({"ignore_colors": ((1, 2, 3),)}, r"`labels\.ignore_colors` needs `labels\.road_colors`"),
+        ({"road": (1,), "road_colors": ((1, 2, 3),)}, "as values or as colours"),
+    ],
+)
+def test_settings_that_contradict_each_other_are_refused(settings, problem) -> None:
+    with pytest.raises(ValueError, match=problem):
+        LabelSettings(**settings)
 
 
 def colors(*rows: list[tuple[int, int, int]]) -> CompressedPicture:
@@ -130,11 +129,6 @@ def test_colours_are_asked_for_with_those_seen() -> None:
         LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*`labels.road_colors`"
     ):
         seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels", LIMITS)
-
-
-def test_values_and_colours_cannot_be_mixed() -> None:
-    with pytest.raises(ValueError, match="as values or as colours"):
-        LabelSettings(road=(1,), road_colors=(ROAD,))
 
 
 def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:

@@ -1,6 +1,7 @@
 """Folders of images and videos become logs."""
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from roadeval.data import Frame
 from roadeval.logs.errors import LogError
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LabelSettings, LogConfig
@@ -25,11 +27,15 @@ def folder(path: Path, files: dict[str, bytes]) -> Path:
     return path
 
 
+def frames_of(path: Path, **settings: Any) -> list[Frame]:
+    with open_log(path, LogConfig(**settings)) as log:
+        return [frame.decode() for frame in log.frames(log.select())]
+
+
 def test_images_go_in_as_they_are_in_natural_order(tmp_path: Path) -> None:
     files = {f"{i}.jpg": jpeg(grey(20 * i)) for i in (10, 9, 2)}
     packed = pack(folder(tmp_path / "images", files), tmp_path / "a.mcap", rate_hz=2)
-    with open_log(packed.path) as log:
-        frames = [frame.decode() for frame in log.frames(log.select())]
+    frames = frames_of(packed.path)
     assert [bytes(frame.payload) for frame in frames] == [files[f"{i}.jpg"] for i in (2, 9, 10)]
     assert [frame.stamp_ns for frame in frames] == [0, HALF_SECOND, 2 * HALF_SECOND]
 
@@ -43,8 +49,7 @@ def test_masks_belong_to_the_image_of_their_name(tmp_path: Path) -> None:
         "images without a mask: c.jpg (1 in all)",
         "masks without an image: x.png (1 in all)",
     )
-    with open_log(packed.path) as log:
-        truths = [frame.decode().truth for frame in log.frames(log.select())]
+    truths = [frame.truth for frame in frames_of(packed.path)]
     assert [None if truth is None else int(truth[0, 0]) for truth in truths] == [1, 0, None]
 
 
@@ -53,35 +58,34 @@ def test_times_in_names_become_stamps(tmp_path: Path) -> None:
     images = folder(tmp_path / "images", {f"{name}.jpg": jpeg(grey(9)) for name in names})
     packed = pack(images, tmp_path / "a.mcap")
     assert packed.stamps == "the times in the files' names"
-    with open_log(packed.path) as log:
-        stamps = [frame.stamp_ns for frame in log.frames(log.select())]
-    assert stamps == [1_700_000_000_250_000_000, 1_700_000_000_500_000_000]
+    assert [frame.stamp_ns for frame in frames_of(packed.path)] == [
+        1_700_000_000_250_000_000,
+        1_700_000_000_500_000_000,
+    ]
 
 
-def test_what_viewers_do_not_know_is_refused(tmp_path: Path) -> None:
-    image = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
-    images = folder(tmp_path / "images", {"a.bmp": cv2.imencode(".bmp", image)[1].tobytes()})
-    with pytest.raises(LogError, match=r"a\.bmp: BMP, .*: save it as PNG"):
-        pack(images, tmp_path / "a.mcap")
+BMP = cv2.imencode(".bmp", np.arange(48, dtype=np.uint8).reshape(4, 4, 3))[1].tobytes()
 
 
-def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
-    images = folder(tmp_path / "images", {"a.jpg": jpeg(grey(9)), "b.txt": b""})
-    lossy = folder(tmp_path / "lossy", {"a.jpg": jpeg(grey(9))})
-    other = folder(tmp_path / "other", {"x.png": png(grey(9))})
-    empty = folder(tmp_path / "empty", {"b.txt": b""})
-    out = tmp_path / "a.mcap"
-    for arguments, said in (
-        ({"masks": lossy}, "JPEG changes label values"),
-        ({"masks": other}, "no mask has the name of an image"),
-        ({"masks": empty}, "no image in it"),
-        ({"rate_hz": 0}, "0 images a second"),
-    ):
-        with pytest.raises(LogError, match=said):
-            pack(images, out, **arguments)
-    with pytest.raises(LogError, match="neither a folder of images nor a video"):
-        pack(tmp_path / "missing", out)
-    assert not out.exists()
+@pytest.mark.parametrize(
+    ("image", "masks", "rate_hz", "said"),
+    [
+        ({"a.bmp": BMP}, None, None, r"a\.bmp: BMP, .*: save it as PNG"),
+        ({"a.jpg": jpeg(grey(9))}, {"a.jpg": jpeg(grey(9))}, None, "JPEG changes label values"),
+        ({"a.jpg": jpeg(grey(9))}, {"x.png": png(grey(9))}, None, "no mask has the name of an im"),
+        ({"a.jpg": jpeg(grey(9))}, {"b.txt": b""}, None, "no image in it"),
+        ({"a.jpg": jpeg(grey(9))}, None, 0, "0 images a second"),
+        (None, None, None, "neither a folder of images nor a video"),
+    ],
+)
+def test_what_cannot_be_packed_is_refused(
+    tmp_path: Path, image: Any, masks: Any, rate_hz: float | None, said: str
+) -> None:
+    images = folder(tmp_path / "images", image) if image else tmp_path / "missing"
+    labels = folder(tmp_path / "masks", masks) if masks else None
+    with pytest.raises(LogError, match=said):
+        pack(images, tmp_path / "a.mcap", masks=labels, rate_hz=rate_hz)
+    assert not (tmp_path / "a.mcap").exists()
 
 
 @pytest.mark.parametrize(
@@ -121,11 +125,9 @@ def painted(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 def test_images_and_colour_masks_of_the_road(painted: Path, tmp_path: Path) -> None:
     packed = pack(painted / "imgs", tmp_path / "comma.mcap", masks=painted / "masks")
     labels = LabelSettings(road_colors=(ROAD, MARKING), ignore_colors=(OWN_CAR,))
-    asks = pytest.raises(LogError, match=r"/truth/road.*`labels\.road_colors`")
-    with open_log(packed.path) as log, asks:
-        log.select()
-    with open_log(packed.path, LogConfig(labels=labels)) as log:
-        frames = [frame.decode() for frame in log.frames(log.select())]
+    with pytest.raises(LogError, match=r"/truth/road.*`labels\.road_colors`"):
+        frames_of(packed.path)
+    frames = frames_of(packed.path, labels=labels)
     first = cv2.imread(str(min((painted / "masks").glob("*.png"))))[..., ::-1]
     road = (first == ROAD).all(2) | (first == MARKING).all(2)
     assert len(frames) == 11

@@ -9,10 +9,6 @@ from typing import Any, Final
 from roadeval.logs.truth import drawn
 
 
-def _is_cityscapes(_: Path, content: Any) -> bool:
-    return isinstance(content, dict) and {"imgWidth", "imgHeight", "objects"} <= content.keys()
-
-
 def _cityscapes(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
 ) -> Iterator[drawn.Drawing]:
@@ -24,5 +20,8 @@ def _cityscapes(
     yield drawn.Drawing(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
 
 
-CITYSCAPES: Final = drawn.LabelFormat("Cityscapes", ".json", _is_cityscapes, _cityscapes)
-FORMATS: Final = (CITYSCAPES,)
+FORMATS: Final = (
+    drawn.LabelFormat(
+        "Cityscapes", ".json", drawn.has("imgWidth", "imgHeight", "objects"), _cityscapes
+    ),
+)

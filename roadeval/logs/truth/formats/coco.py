@@ -14,11 +14,6 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import drawn
 
 
-def _is_coco(_: Path, content: Any) -> bool:
-    keys = {"images", "annotations", "categories"}
-    return isinstance(content, dict) and keys <= content.keys()
-
-
 def _coco(path: Path, content: Mapping[str, Any], _: drawn.Size | None) -> Iterator[drawn.Drawing]:
     categories = _by_id(path, "category", content["categories"])
     names = {number: str(category["name"]) for number, category in categories.items()}
@@ -122,4 +117,6 @@ def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
     return {"instances.json": json.dumps(content).encode()}
 
 
-FORMATS: Final = (drawn.LabelFormat("COCO", ".json", _is_coco, _coco),)
+FORMATS: Final = (
+    drawn.LabelFormat("COCO", ".json", drawn.has("images", "annotations", "categories"), _coco),
+)

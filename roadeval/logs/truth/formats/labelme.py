@@ -16,10 +16,6 @@ _LINES: Final = ("point", "points", "line", "linestrip")
 _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "quadrilateral")
 
 
-def _is_labelme(_: Path, content: Any) -> bool:
-    return isinstance(content, dict) and {"shapes", "imageWidth", "imageHeight"} <= content.keys()
-
-
 def _labelme(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
 ) -> Iterator[drawn.Drawing]:
@@ -47,4 +43,8 @@ def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
             return drawn.Undrawn(label, f"{other} of {len(points) // 2} points")
 
 
-FORMATS: Final = (drawn.LabelFormat("LabelMe", ".json", _is_labelme, _labelme),)
+FORMATS: Final = (
+    drawn.LabelFormat(
+        "LabelMe", ".json", drawn.has("shapes", "imageWidth", "imageHeight"), _labelme
+    ),
+)

@@ -53,5 +53,4 @@ def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
             yield drawn.Outline(label, flat)
 
 
-YOLO: Final = drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo)
-FORMATS: Final = (YOLO,)
+FORMATS: Final = (drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo),)
