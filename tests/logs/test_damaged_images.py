@@ -63,26 +63,20 @@ def test_a_log_of_damaged_images_is_refused(tmp_path: Path) -> None:
 
 
 def test_one_limit_holds_for_raw_and_compressed_images(tmp_path: Path) -> None:
-    small, large = raw(0, grey(9, 8, 8), "mono8"), raw(1, grey(9, 9, 8), "mono8")
-    path = ros2_log(tmp_path / "a.mcap", [("/camera", 0, small), ("/camera", 1, large)])
-    (_, refused), _ = read(path, max_pixels=64)
-    assert "an image of 9x8, more than the 64 pixels" in refused
-    path = ros2_log(tmp_path / "b.mcap", camera(jpeg(grey(9, 8, 8)), jpeg(grey(9, 9, 8))))
-    (_, refused), _ = read(path, max_pixels=64)
-    assert "an image of 9x8, more than the 64 pixels" in refused
+    small, large = grey(9, 8, 8), grey(9, 9, 8)
+    both = [("/camera", i, raw(i, image, "mono8")) for i, image in enumerate((small, large))]
+    for name, messages in (("a", both), ("b", camera(jpeg(small), jpeg(large)))):
+        (_, refused), _ = read(ros2_log(tmp_path / f"{name}.mcap", messages), max_pixels=64)
+        assert "an image of 9x8, more than the 64 pixels" in refused
 
 
 @pytest.mark.parametrize(
-    ("encoding", "size", "reason"),
-    [
-        ("yuv422", (15, 12), "an even width"),
-        ("nv21", (16, 11), "an even width and height"),
-    ],
+    ("encoding", "width", "height", "reason"),
+    [("yuv422", 15, 12, "an even width"), ("nv21", 16, 11, "an even width and height")],
 )
 def test_colours_shared_by_pixels_need_an_even_size(
-    tmp_path: Path, encoding: str, size: tuple[int, int], reason: str
+    tmp_path: Path, encoding: str, width: int, height: int, reason: str
 ) -> None:
-    width, height = size
     data = {"width": width, "height": height, "step": 2 * width, "data": bytes(4 * width * height)}
     image = raw(0, grey(0), encoding, **data)
     path = ros2_log(tmp_path / "a.mcap", [("/camera", 0, image)])

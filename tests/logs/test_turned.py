@@ -24,13 +24,16 @@ from tests.fixtures.shared import shared
 from tests.images.making import scene
 from tests.logs.making import compressed, png, ros2_log
 
-ORIENTATION = 0x0112
+
+def exif(orientation: int) -> Image.Exif:
+    made = Image.Exif()
+    made[0x0112] = orientation
+    return made
 
 
 def turned(orientation: int, name: str = "JPEG", **options: bool) -> bytes:
-    exif, made = Image.Exif(), io.BytesIO()
-    exif[ORIENTATION] = orientation
-    Image.fromarray(scene()).save(made, name, exif=exif, **options)
+    made = io.BytesIO()
+    Image.fromarray(scene()).save(made, name, exif=exif(orientation), **options)
     return made.getvalue()
 
 
@@ -40,10 +43,8 @@ def test_an_orientation_turns_an_image_as_exif_defines_it(name: str, orientation
     data = turned(orientation, name)
     stored = to_rgb(data, Limits())
     assert stored.shape == scene().shape
-    exif = Image.Exif()
-    exif[ORIENTATION] = orientation
     expected = Image.fromarray(stored)
-    expected.info["exif"] = exif.tobytes()
+    expected.info["exif"] = exif(orientation).tobytes()
     shown = np.array(ImageOps.exif_transpose(expected))
     found = to_rgb(data, Limits(turn=True))
     np.testing.assert_array_equal(found, shown)
@@ -88,14 +89,13 @@ def test_pack_turns_a_video_as_players_do_and_says_so(
 
 
 def drive(tmp_path: Path, orientation: int) -> Path:
-    height, width, _ = scene().shape
-    mask = np.zeros((height, width), np.uint8)
-    mask[:, : width // 2] = 255
-    messages = [
-        ("/camera", 100 * i + 1, compressed(100 * i, turned(orientation))) for i in range(3)
-    ]
-    messages += [("/labels", 100 * i + 2, compressed(100 * i, png(mask), "png")) for i in range(3)]
-    return ros2_log(tmp_path / "a.mcap", sorted(messages, key=lambda message: message[1]))
+    mask = np.zeros(scene().shape[:2], np.uint8)
+    mask[:, : mask.shape[1] // 2] = 255
+    messages = []
+    for at in (0, 100, 200):
+        messages.append(("/camera", at + 1, compressed(at, turned(orientation))))
+        messages.append(("/labels", at + 2, compressed(at, png(mask), "png")))
+    return ros2_log(tmp_path / "a.mcap", messages)
 
 
 def test_a_replay_turns_images_unless_it_is_asked_not_to_and_says_both(tmp_path: Path) -> None:

@@ -265,16 +265,18 @@ class Partners:
 
     def _around(self, moment: int) -> tuple[Stamps, Stamps]:
         """Return the stamps of images and labels around a moment."""
-        both = self._pairing.images, self._pairing.labels
-        moved = [own if isinstance(own, Later) else Later(own, 0) for own in both]
-        topics = [own.stamps for own in moved if isinstance(own.stamps, TopicReader)]
-        if not self._few or len(topics) < len(both):
-            return both
-        spreads = [topic.delays[1] - topic.delays[0] for topic in topics if topic.delays]
+        images, labels = self._pairing.images, self._pairing.labels
+        if not self._few:
+            return images, labels
+        moved = [own if isinstance(own, Later) else Later(own, 0) for own in (images, labels)]
+        delays = [own.stamps.delays for own in moved if isinstance(own.stamps, TopicReader)]
+        spreads = [most - least for least, most in filter(None, delays)]
         doubt = self._pairing.tolerance + max([*spreads, self._pairing.tolerance // 2])
         images, labels = (
-            Later(Nearby(topic, moment - own.offset, doubt), own.offset)
-            for topic, own in zip(topics, moved, strict=True)
+            Later(Nearby(own.stamps, moment - own.offset, doubt), own.offset)
+            if isinstance(own.stamps, TopicReader)
+            else own
+            for own in moved
         )
         return images, labels
 

@@ -26,38 +26,31 @@ def frames_of(labelled, frames, **settings):
 
 
 @pytest.mark.parametrize(
-    ("given", "first"),
+    ("numbers", "frames", "first"),
     [
-        ([*range(30)], 0),
-        ([0, 5, 17], 0),
-        ([*range(1, 31)], 1),
-        ([number for number in range(1, 31) if number != 16], 1),
-        ([3, 30], 1),
-        ([*range(100, 130)], 100),
+        ([*range(30)], 30, 0),
+        ([0, 5, 17], 30, 0),
+        ([*range(1, 31)], 30, 1),
+        ([number for number in range(1, 31) if number != 16], 30, 1),
+        ([3, 30], 30, 1),
+        ([*range(100, 130)], 30, 100),
+        # The last one lacks, every third, few, beyond the log, an unsure log.
+        ([*range(1, 30)], 30, None),
+        ([*range(1, 30, 3)], 30, None),
+        ([5, 17, 24], 30, None),
+        ([5, 40], 30, None),
+        ([*range(1, 31)], None, None),
     ],
 )
-def test_what_the_numbers_say_of_the_first_frame_is_taken(given, first):
-    found = frames_of([f"{number:04}.png" for number in given], 30)
-    assert [*found.values()] == [number - first for number in given]
-
-
-@pytest.mark.parametrize(
-    ("given", "frames"),
-    [
-        ([*range(1, 30)], 30),
-        ([*range(1, 30, 3)], 30),
-        ([5, 17, 24], 30),
-        ([5, 40], 30),
-        ([*range(1, 31)], None),
-    ],
-    ids=["the last one lacks", "every third", "few", "beyond the log", "an unsure log"],
-)
-def test_where_nothing_tells_the_first_number_it_is_asked(given, frames):
-    names = [f"frame_{number}.png" for number in given]
+def test_what_the_numbers_say_of_the_first_frame_is_taken_or_else_asked_for(numbers, frames, first):
+    names = [f"frame_{number:04}.png" for number in numbers]
+    if first is not None:
+        assert [*frames_of(names, frames).values()] == [number - first for number in numbers]
+        return
     with pytest.raises(LogError, match=r"give `truth\.first` 0 or `truth.first` 1"):
         frames_of(names, frames)
-    for first in (0, 1):
-        assert [*frames_of(names, frames, first=first).values()] == [n - first for n in given]
+    for chosen in (0, 1):
+        assert [*frames_of(names, frames, first=chosen).values()] == [n - chosen for n in numbers]
 
 
 HASHES = [uuid.UUID(int=number**20 + 7).hex for number in range(30)]
@@ -85,19 +78,23 @@ def test_the_digits_by_which_names_differ_are_the_number(name):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["frame_12 (1).png", "frame_7_v2.png", "7.png", "take2_7.png", "frame_007_0.5.png"],
+    "names",
+    [
+        *(
+            [*(f"frame_{number}.png" for number in range(6)), name]
+            for name in ("frame_12 (1).png", "frame_7_v2.png", "7.png", "take2_7.png")
+        ),
+        [*(f"frame_{number}.png" for number in range(6)), "frame_007_0.5.png"],
+        [f"take{number + 1}_{number * 7}.png" for number in range(4)],
+    ],
 )
-def test_a_name_unlike_the_others_is_refused_with_the_way_to_show_the_number(name):
+def test_names_that_differ_in_more_than_a_number_are_refused_with_the_way_to_show_it(names):
     with pytest.raises(LogError, match=r"show them by `truth.names`, as frame_\{number\}_\*"):
-        frames_of([*(f"frame_{number}.png" for number in range(6)), name], 30)
-
-
-def test_two_groups_of_digits_that_differ_are_refused_until_one_is_shown():
-    names = [f"take{number + 1}_{number * 7}.png" for number in range(4)]
-    with pytest.raises(LogError, match="do not tell which digits are the frame's number"):
         frames_of(names, 30)
-    found = frames_of(names, 30, names="*_{number}.png")
+
+
+def test_the_number_is_taken_where_it_is_shown():
+    found = frames_of([f"take{n + 1}_{n * 7}.png" for n in range(4)], 30, names="*_{number}.png")
     assert [*found.values()] == [0, 7, 14, 21]
 
 

@@ -56,10 +56,15 @@ PAIRED = {
 }
 
 
-@pytest.mark.parametrize(("images", "labels", "tolerance", "found"), PAIRED.values(), ids=PAIRED)
-def test_each_image_gets_the_label_that_is_its_own(images, labels, tolerance, found):
-    partners = Partners(Pairing(Stamps(images), Stamps(labels), tolerance))
-    assert [partners.of(image) for image in range(len(images))] == found
+def paired(pairing):
+    """The position of each image's label."""
+    partners = Partners(pairing)
+    return [partners.of(image) for image in range(len(pairing.images))]
+
+
+@pytest.mark.parametrize(("images", "labels", "tolerance", "expected"), PAIRED.values(), ids=PAIRED)
+def test_each_image_gets_the_label_that_is_its_own(images, labels, tolerance, expected):
+    assert paired(Pairing(Stamps(images), Stamps(labels), tolerance)) == expected
 
 
 def test_only_stamps_near_the_one_looked_for_are_read() -> None:
@@ -77,16 +82,16 @@ def test_only_stamps_near_the_one_looked_for_are_read() -> None:
 @example([0] * 3 + [7] * 9 + [9], [7] * 12, 2)
 def test_the_frames_of_labels_are_those_that_find_a_label(images, labels, tolerance):
     pairing = Pairing(Stamps(images), Stamps(labels), tolerance)
-    partners = Partners(pairing)
-    expected = [image for image in range(len(images)) if partners.of(image) is not None]
-    assert sorted(frames_of(pairing)) == expected
+    assert sorted(frames_of(pairing)) == [
+        n for n, at in enumerate(paired(pairing)) if at is not None
+    ]
 
 
 def test_no_frame_is_given_twice_where_stamps_are_equal_and_out_of_order():
     images = [*[1] * 7, *[2] * 5, *[3] * 3, 4, *[5] * 5, *[7] * 3]
     labels = [0, 0, 1, 2, 5, 2, 5, 5, 5, 5, 6, 6, 7, 8, 8]
-    found = [*frames_of(Pairing(Stamps(images), Stamps(labels), 20))]
-    assert sorted({*found}) == sorted(found)
+    frames = [*frames_of(Pairing(Stamps(images), Stamps(labels), 20))]
+    assert sorted({*frames}) == sorted(frames)
 
 
 rising = st.lists(st.integers(0, 60), max_size=30, unique=True).map(sorted)
@@ -95,11 +100,10 @@ rising = st.lists(st.integers(0, 60), max_size=30, unique=True).map(sorted)
 @given(rising, rising, st.integers(0, 6), st.integers(2, 5))
 def test_stamps_in_order_pair_the_same_however_few_are_read(images, labels, tolerance, period):
     few, all_around = (
-        Partners(Pairing(Stamps(images), Stamps(labels), tolerance, period_ns))
+        paired(Pairing(Stamps(images), Stamps(labels), tolerance, period_ns))
         for period_ns in (period, 0)
     )
-    for image in range(len(images)):
-        assert few.of(image) == all_around.of(image)
+    assert few == all_around
 
 
 # --- By what images and labels are paired ---------------------------------------------------------
