@@ -34,6 +34,7 @@ from roadeval.logs.messages.pixels import (
 )
 from roadeval.logs.settings import Color, LabelPlace, LabelSettings, MaskSettings
 from roadeval.logs.topics.choose import lossy_labels
+from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.names import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -44,7 +45,6 @@ from roadeval.logs.truth.pairing import (
     by_number,
     by_time,
     check_times,
-    first_positions,
     frames_of,
 )
 
@@ -68,6 +68,8 @@ NAME_THEM: Final = (
 )
 ALONE: Final = "road"
 """The class that means road where labels have no other."""
+FIRST_CHUNKS: Final = 2
+"""Chunks of a large log in which its first labels are looked at."""
 RARE: Final = 0.05
 """Share of the labelled pixels below which what was named is hardly the road before a vehicle."""
 
@@ -384,8 +386,11 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
     Each comes with its position.
     """
     count = len(pictures)
+    first = range(min(LOOKED_AT, count))
+    if isinstance(pictures, TopicReader) and not pictures.is_small:
+        first = first[: sum(pictures.chunks_of(first[: n + 1]) <= FIRST_CHUNKS for n in first)]
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
-    for position in sorted({*first_positions(pictures), *spread}):
+    for position in sorted({*first, *spread}):
         with suppress(FrameError):
             picture = pictures.picture(position)
             pictures.stamp(position)  # now or never is known how late labels are logged

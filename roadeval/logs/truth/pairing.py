@@ -35,8 +35,6 @@ CLOCKS_NS: Final = 3_000_000_000
 """Least difference by which two clocks are told: of GPS, TAI and UTC any two lie farther apart."""
 LOOKED_AT: Final = 10
 """First images of a log that decide by what labels are paired."""
-FIRST_CHUNKS: Final = 2
-"""Chunks of a large log in which its first images and labels are looked at."""
 
 LabelPictures = TopicReader | NamedLabels
 """Label pictures in the order of their times or numbers."""
@@ -165,14 +163,6 @@ def tolerance(reader: TopicReader, setting_ms: float | None) -> int:
     return period // 2
 
 
-def first_positions(pictures: Stamps) -> range:
-    """Return the positions of the first few pictures; in a large log, of those in few chunks."""
-    first = range(min(LOOKED_AT, len(pictures)))
-    if isinstance(pictures, TopicReader) and not pictures.is_small:
-        first = first[: sum(pictures.chunks_of(first[: n + 1]) <= FIRST_CHUNKS for n in first)]
-    return first
-
-
 @dataclass(frozen=True, eq=False)
 class Pairing:
     """How the images and labels of one source are paired.
@@ -209,7 +199,7 @@ class Pairing:
 
 def _rise(stamps: Stamps) -> bool:
     """Whether the first stamps are in order."""
-    first = map(stamps.stamp, first_positions(stamps))
+    first = [stamps.stamp(position) for position in range(min(LOOKED_AT, len(stamps)))]
     return all(one < other for one, other in pairwise(first))
 
 
