@@ -99,15 +99,20 @@ class Container:
         self.redefined: dict[int, str] = {}
         """Which of two descriptions of topics is believed, by the offset of the second."""
         logs = self._file()
-        if scan.summary.statistics is not None and not self._is_as_counted(logs):
+        counts = {channel_id: log.count for channel_id, log in logs.items()}
+        if scan.summary.statistics and counts != {
+            channel_id: count for channel_id, count in self.expected.items() if count
+        }:
             logs = self._file(look=True)
         if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
-            late = [each for each in scan.late if isinstance(each, Schema) or each.id in logs]
+            late = [
+                record for record in scan.late if isinstance(record, Schema) or record.id in logs
+            ]
             for chunk in self.chunks:
                 if chunk.offset in self.reader.bad:
                     late += definitions(self.reader.remains(chunk))
-            for each in late:
-                scan.define(each)
+            for record in late:
+                scan.define(record)
             logs = self._file()
         self.logs = self._file() if self._redefine(logs) else logs
         """Where messages lie, by the number of their channel."""
@@ -194,15 +199,11 @@ class Container:
         """Close the file."""
         self.source.close()
 
-    def _is_as_counted(self, logs: Mapping[int, ChannelLog]) -> bool:
-        expected = {channel_id: count for channel_id, count in self.expected.items() if count}
-        return expected == {channel_id: log.count for channel_id, log in logs.items()}
-
     def _file(self, *, look: bool = False) -> dict[int, ChannelLog]:
         logs: dict[int, ChannelLog] = {}
-        found = [(number, self._index(number, look=look)) for number in range(len(self.chunks))]
+        indexes = [(number, self._index(number, look=look)) for number in range(len(self.chunks))]
         outside = {channel_id: entries_of(values) for channel_id, values in self.scan.loose.items()}
-        for number, index in (*found, (OUTSIDE, outside)):
+        for number, index in (*indexes, (OUTSIDE, outside)):
             for channel_id, entries in index.items():
                 if channel_id not in logs:
                     channel, schema = self._described(channel_id)
@@ -229,34 +230,32 @@ class Container:
         return channel is not None and (schema is not None or channel.schema_id == 0)
 
     def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
-        """Where a topic is described twice, choose by its messages; return whether any is new.
+        """Choose by its messages if a topic is described twice; return whether anything is new.
 
         Messages were written by the descriptions in the data, which stand in the first chunk or in
-        that of a channel's first message: of a chunk with a checksum they are believed where the
+        that of a channel's first message: those of a chunk with a checksum are believed if the
         messages fit both.
         """
         before = {*self.channels}, {*self.schemas}
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
-        for number in sorted(first - {OUTSIDE}) if self.chunks else []:
-            chunk = self.chunks[number]
+        for chunk in [self.chunks[number] for number in sorted(first - {OUTSIDE}) if self.chunks]:
             if not chunk.cut and chunk.crc and chunk.size <= IN_MEMORY:
                 with suppress(BadRecord):
                     for record in definitions(self.reader.read(chunk)):
                         self.scan.define(record, chunk.offset)
         checked = {chunk.offset for chunk in self.chunks if chunk.crc}
         for offset, record in self.scan.conflicts:
-            known = self.scan.known(record)
-            other, fits = known[record.id], []
-            for each in (other, record):
-                known[record.id] = each
-                fits.append(self._fit(each, logs))
+            descriptions = self.scan.described(record)
+            other, fits = descriptions[record.id], []
+            for description in (other, record):
+                descriptions[record.id] = description
+                fits.append(self._fit(description, logs))
             is_this = fits[1] > fits[0] or (fits[1] == fits[0] and offset in checked)
-            known[record.id] = record if is_this else other
-            which = "this" if is_this else "that"
-            doubt = "either may be wrong" if fits[0] == fits[1] else "messages fit it better"
+            descriptions[record.id] = record if is_this else other
             self.redefined[offset] = (
-                f"a topic is described here in another way than before; {which} is believed; "
-                f"{doubt}"
+                "a topic is described here in another way than before; "
+                f"{'this' if is_this else 'that'} is believed; "
+                f"{'either may be wrong' if fits[0] == fits[1] else 'messages fit it better'}"
             )
         return bool(self.redefined) or before != ({*self.channels}, {*self.schemas})
 
@@ -306,22 +305,21 @@ class Damage:
             span = f", after {start} s" if start else f", before {end} s"
         text = f"{self.path.name}: {self.reason} (byte {self.offset}{span})"
         if self.lost:
-            listed = ", ".join(f"{count} of {topic}" for topic, count in self.lost)
-            text += f"; lost: {listed}"
+            text += "; lost: " + ", ".join(f"{count} of {topic}" for topic, count in self.lost)
         return text if self.lossy else f"{text}; no message is lost by that"
 
 
 def damage_of(container: Container) -> tuple[Damage, ...]:
     """List what is wrong with a log, as far as it is known by now, in the file's order."""
-    found = [*_gaps(container), *_chunks(container), *_others(container)]
-    if not any(each.unsure_ns is not None for each in found) and not container.reader.bad:
-        found += _missing(container)
+    damages = [*_gaps(container), *_chunks(container), *_others(container)]
+    if not container.reader.bad and all(damage.unsure_ns is None for damage in damages):
+        damages += _missing(container)
     begin = container.source.begin
     if begin:
         reason = "another log begins here, behind the one before; its messages are read as well"
-        found.append(Damage(container.path, 0, reason, lossy=False))
-    found = [replace(damage, offset=begin + damage.offset) for damage in found]
-    return tuple(sorted(found, key=lambda damage: damage.offset))
+        damages.append(Damage(container.path, 0, reason, lossy=False))
+    damages = [replace(damage, offset=begin + damage.offset) for damage in damages]
+    return tuple(sorted(damages, key=lambda damage: damage.offset))
 
 
 def sure_until(container: Container) -> int | None:
@@ -336,12 +334,11 @@ def sure_until(container: Container) -> int | None:
 
 def _gaps(container: Container) -> Iterator[Damage]:
     scan = container.scan
-    # Of a chunk that is cut off the messages before the cut were saved.
-    saved = scan.saved_ns
+    # The messages before the cut of a chunk that is cut off were saved.
     places = [
-        (chunk.offset - chunk.cut, chunk.start, saved if chunk.cut and saved else chunk.end)
+        (chunk.offset - chunk.cut, chunk.start, (chunk.cut and scan.saved_ns) or chunk.end)
         for chunk in scan.chunks
-        if not chunk.cut or saved is not None
+        if not chunk.cut or scan.saved_ns is not None
     ]
     for flat in scan.loose.values() if scan.gaps else ():
         places += [(at, time, time) for time, at in zip(flat[::2], flat[1::2], strict=True)]
@@ -355,18 +352,17 @@ def _gaps(container: Container) -> Iterator[Damage]:
         number = bisect_left(places, (offset,))
         before = places[number - 1][2] if number else None
         after = places[number][1] if number < len(places) else None
-        unsure = None
-        if lossy and not listed:
+        unsure, is_lossy = None, lossy and not listed
+        if is_lossy:
             unsure = BEFORE_ALL if before is None else min([before, *least[number : number + 1]])
             unsure += before is not None and after is None
-        lossy = lossy and not listed  # noqa: PLW2901
-        yield Damage(container.path, offset, reason, lossy, before, after, unsure_ns=unsure)
+        yield Damage(container.path, offset, reason, is_lossy, before, after, unsure_ns=unsure)
 
 
 def _chunks(container: Container) -> Iterator[Damage]:
     """Chunks that cannot be read, or are not there, or whose content is not what is said of it."""
     path, reader, summary = container.path, container.reader, container.scan.summary
-    listed = Counter(each[1:4] for each in summary.chunks.values() if summary.checked)
+    listed = Counter(chunk[1:4] for chunk in summary.chunks.values() if summary.checked)
     for number, chunk in enumerate(container.chunks):
         at, start, end = chunk.offset, chunk.start, chunk.end
         listed[chunk[1:4]] -= 1
@@ -375,14 +371,13 @@ def _chunks(container: Container) -> Iterator[Damage]:
         reason = reader.bad.get(at) or reader.kept.get(at, "")
         if reason:
             index = container.scan.indexes[number] or {}
-            lost = tuple((container.topic(key), len(found)) for key, found in index.items())
+            lost = tuple((container.topic(key), len(entries)) for key, entries in index.items())
             lost *= at in reader.bad
-            unsure: int | None = start
-            if at in reader.kept:
-                unsure = BEFORE_ALL  # times that were kept may be wrong
-            if index and number not in container.looked_into:
-                unsure = None
-            yield Damage(path, at, reason, True, start, end, lost, unsure_ns=unsure)
+            # Times that were kept may be wrong.
+            unsure = BEFORE_ALL if at in reader.kept else start
+            is_sure = index and number not in container.looked_into
+            unsure_ns = None if is_sure else unsure
+            yield Damage(path, at, reason, True, start, end, lost, unsure_ns=unsure_ns)
     for chunk in summary.chunks.values():
         if listed[chunk[1:4]] > 0:
             listed[chunk[1:4]] -= 1

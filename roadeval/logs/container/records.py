@@ -11,7 +11,7 @@ import struct
 import sys
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,10 +36,6 @@ MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
-_INDEX_HEAD: Final = struct.Struct("<HI")
-"""Channel, bytes of entries."""
-_CHUNK_INDEX: Final = struct.Struct("<QQQQI")
-"""Start time, end time, offset and length of the chunk's record, bytes of a map."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
 _LONGEST_NAME: Final = 64
@@ -182,7 +178,7 @@ class Chunk(NamedTuple):
 
 
 class _Strict(ReadDataStream):
-    """The library's stream, that refuses a read across the record's end."""
+    """The library's stream, which refuses to read across the record's end."""
 
     def read(self, length: int) -> bytes:
         data: bytes = super().read(length) if length <= sys.maxsize else b""
@@ -191,23 +187,18 @@ class _Strict(ReadDataStream):
         return data
 
 
-_READERS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
-    opcode: getattr(mcap_records, opcode.name.title().replace("_", "")).read
-    for opcode in Opcode
-    if opcode not in (Opcode.MESSAGE, Opcode.CHUNK)
-}
-
-
 def parse(opcode: int, body: Buffer) -> Any:
     """Read a record that is neither message nor chunk, by the `mcap` library."""
-    if opcode not in _READERS:
-        raise BadRecord(f"a record of unknown kind {opcode}")
+    try:
+        name = Opcode(opcode).name
+    except ValueError as error:
+        raise BadRecord(f"a record of unknown kind {opcode}") from error
     stream = BytesIO(body)
     with suppress(EndOfFile, struct.error, UnicodeDecodeError):
-        record = _READERS[opcode](_Strict(stream))
+        record = getattr(mcap_records, name.title().replace("_", "")).read(_Strict(stream))
         if len(body) - stream.tell() <= _EXTENSION:
             return record
-    raise BadRecord(f"a {Opcode(opcode).name.lower()} record that does not add up")
+    raise BadRecord(f"a {name.lower()} record that does not add up")
 
 
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
@@ -226,11 +217,11 @@ def parse_chunk(source: Bytes, record: Record) -> Chunk:
 
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:
     """Read a message index: the channel, and its messages."""
-    channel_id, length = _INDEX_HEAD.unpack_from(body) if len(body) >= _INDEX_HEAD.size else (0, 1)
-    if length % 16 or not 0 <= len(body) - _INDEX_HEAD.size - length <= _EXTENSION:
+    # The library would make a tuple of each message, one by one.
+    channel_id, length = struct.unpack_from("<HI", body) if len(body) >= 6 else (0, 1)
+    if length % 16 or not 0 <= len(body) - 6 - length <= _EXTENSION:
         raise BadRecord("a message index whose lengths contradict each other")
-    entries = bytes(body[_INDEX_HEAD.size : _INDEX_HEAD.size + length])
-    return channel_id, np.frombuffer(entries, "<i8").reshape(-1, 2)
+    return channel_id, np.frombuffer(bytes(body[6 : 6 + length]), "<i8").reshape(-1, 2)
 
 
 def message_at(records: Bytes, offset: int) -> Message:
@@ -288,11 +279,10 @@ class ChunkReader:
             raise BadRecord(self.bad[at])
         if at not in self._cache:
             try:
-                records = self.remains(chunk) if chunk.cut else self._whole(chunk)
+                self._keep(at, self.remains(chunk) if chunk.cut else self._whole(chunk))
             except BadRecord as error:
                 self.bad[at] = str(error)
                 raise
-            self._keep(at, records)
         self._cache.move_to_end(at)
         return self._cache[at]
 
@@ -312,11 +302,12 @@ class ChunkReader:
             with suppress(BadRecord):
                 records = self._uncompressed(chunk, most, whole=True)
                 size = len(records)
-                if (
-                    crc_of(records) == chunk.crc
-                    if chunk.crc
-                    else size == chunk.size == max((each.end for each in walk(records)), default=0)
-                ):
+                if chunk.crc:
+                    is_proven = crc_of(records) == chunk.crc
+                else:
+                    ends = (record.end for record in walk(records))
+                    is_proven = size == chunk.size == max(ends, default=0)
+                if is_proven:
                     self._keep(chunk.offset, records)
                     return chunk._replace(size=size, proven=True)
                 self.patience -= size
@@ -361,9 +352,9 @@ class ChunkReader:
 
 def crc_of(records: Bytes) -> int:
     """Compute the CRC-32 of bytes."""
-    crc, step = 0, BLOCK if isinstance(records, FileBytes) else max(len(records), 1)
-    for offset in range(0, len(records), step):
-        crc = zlib.crc32(records[offset : offset + step], crc)
+    crc = 0
+    for offset in range(0, len(records), BLOCK):
+        crc = zlib.crc32(records[offset : offset + BLOCK], crc)
     return crc
 
 
@@ -377,7 +368,14 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
             stream = cast("IO[bytes]", data)
             yield from zstandard.ZstdDecompressor().read_to_iter(stream, BLOCK, BLOCK)
         elif chunk.compression == "lz4":
-            yield from _lz4_blocks(data)
+            import lz4.frame
+
+            frame = lz4.frame.LZ4FrameDecompressor()
+            while not frame.eof:
+                block = data.read(BLOCK) if frame.needs_input else b""
+                if frame.needs_input and not block:
+                    break
+                yield frame.decompress(block, BLOCK)
         elif chunk.compression == "":
             yield from iter(partial(data.read, BLOCK), b"")
         else:
@@ -388,25 +386,9 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
         raise BadRecord("a chunk that claims more bytes than its data has")
 
 
-def _lz4_blocks(data: FileBytes) -> Iterator[bytes]:
-    import lz4.frame
-
-    frame = lz4.frame.LZ4FrameDecompressor()
-    while not frame.eof:
-        block = data.read(BLOCK) if frame.needs_input else b""
-        if frame.needs_input and not block:
-            return
-        yield frame.decompress(block, BLOCK)
-
-
 _FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
-_CHECKED: Final = HEAD.size + 16
-"""Bytes of the footer that its own checksum covers."""
-_SUMMARY_RECORDS: Final = (
-    *(*DEFINITIONS, Opcode.STATISTICS, Opcode.CHUNK_INDEX),
-    *(Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET),
-)
-"""The records that can stand in a summary."""
+_OTHER_INDEXES: Final = Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET
+"""Records of a summary that must add up, and are not used."""
 
 
 @dataclass(slots=True)
@@ -434,14 +416,13 @@ class Summary:
             if opcode == Opcode.CHUNK_INDEX:
                 chunk, index_end = _parse_chunk_index(records[body:end])
                 self.chunks[chunk.offset], self.index_ends[chunk.offset] = chunk, index_end
-            elif opcode in _SUMMARY_RECORDS:
+            elif opcode in DEFINITIONS:
                 record = parse(opcode, records[body:end])
-                if opcode == Opcode.STATISTICS:
-                    self.statistics = record
-                elif opcode == Opcode.SCHEMA:
-                    self.schemas[record.id] = record
-                elif opcode == Opcode.CHANNEL:
-                    self.channels[record.id] = record
+                (self.schemas if opcode == Opcode.SCHEMA else self.channels)[record.id] = record
+            elif opcode == Opcode.STATISTICS:
+                self.statistics = parse(opcode, records[body:end])
+            elif opcode in _OTHER_INDEXES:
+                parse(opcode, records[body:end])
             elif opcode < PRIVATE:
                 raise BadRecord("its summary is not where it should be")
         if end != len(records):
@@ -457,28 +438,30 @@ def read_summary(source: Bytes) -> Summary:
     footer = parse(Opcode.FOOTER, tail[HEAD.size : -len(MAGIC)])
     if footer.summary_start == 0:
         return Summary(end)
-    found = Summary(footer.summary_start, footer.summary_crc != 0)
+    summary = Summary(footer.summary_start, footer.summary_crc != 0)
     try:
         if not 0 <= end - footer.summary_start <= LARGEST:
             raise BadRecord("its summary is not where it should be")
         records = memoryview(source[footer.summary_start : end])
-        if found.checked and zlib.crc32(tail[:_CHECKED], zlib.crc32(records)) != footer.summary_crc:
+        # Of the footer all but the checksum itself takes part in it.
+        crc = zlib.crc32(tail[: HEAD.size + 16], zlib.crc32(records))
+        if summary.checked and crc != footer.summary_crc:
             raise BadRecord("the checksum of its summary is wrong")
-        found.fill(records)
+        summary.fill(records)
     except BadRecord as error:
         return Summary(footer.summary_start, problem=str(error))
-    return found
+    return summary
 
 
 def _parse_chunk_index(body: Buffer) -> tuple[Chunk, int]:
-    """Read a chunk's head, but for its checksum, and where its message indexes end.
+    """Read a chunk's head but for its checksum, and where its message indexes end.
 
     The library would read a long map first.
     """
     with suppress(struct.error, UnicodeDecodeError):
-        start, end, offset, length, at = _CHUNK_INDEX.unpack_from(body)
-        at += _CHUNK_INDEX.size + 12
-        indexes, name_length = struct.unpack_from("<QI", body, at - 12)
+        start, end, offset, length, map_size = struct.unpack_from("<QQQQI", body)
+        indexes, name_length = struct.unpack_from("<QI", body, 36 + map_size)
+        at = 48 + map_size
         name = bytes(body[at : at + name_length]).decode()
         data_size, size = struct.unpack_from("<QQ", body, at + name_length)
         data_at = offset + HEAD.size + CHUNK_HEAD.size + name_length + 8

@@ -128,11 +128,6 @@ class Scan:
         self._tries_left = DOUBTED + 4 * len(source)
         self._walk()
 
-    @property
-    def is_checked(self) -> bool:
-        """Whether there are chunks, and all of them have a checksum."""
-        return bool(self.chunks) and all(chunk.crc for chunk in self.chunks)
-
     def _walk(self) -> None:
         begun = self.source[0 : len(MAGIC)] == MAGIC
         if not begun:
@@ -149,10 +144,10 @@ class Scan:
                 self.next_log = record.offset
                 return
             record = following
-        size = len(self.source)
-        if self.is_checked and any(gap.lossy for gap in self.gaps):
+        size, ends = len(self.source), {gap.end for gap in self.gaps if gap.lossy}
+        if ends and self.chunks and all(chunk.crc for chunk in self.chunks):
             self.loose.clear()  # they may be those of a damaged chunk
-        if self.data_end is None and not any(gap.lossy and gap.end == size for gap in self.gaps):
+        if self.data_end is None and size not in ends:
             self._gap(size, size, "the file was never finished; what came after is not in it")
 
     def _following(self, record: Record) -> Record:
@@ -197,8 +192,7 @@ class Scan:
 
     def _is_whole(self, record: Record) -> bool:
         """Whether a message is as long as its own fields say."""
-        channel = self.channels.get(record.content[0])
-        if channel is None:
+        if (channel := self.channels.get(record.content[0])) is None:
             return False
         message = message_at(self.source, record.offset)
         return self.stamp_of(channel, self.schemas.get(channel.schema_id), message) is not None
@@ -208,8 +202,8 @@ class Scan:
         if chunk.cut and end == chunk.data_end:
             return chunk.record
         left = chunk._replace(data_size=max(end - chunk.data_offset, 0), cut=False)
-        if end != chunk.data_end and (found := self.reader.proof(left)):
-            return found._replace(repaired=True).record
+        if end != chunk.data_end and (proven := self.reader.proof(left)):
+            return proven._replace(repaired=True).record
         left = left._replace(data_size=min(chunk.data_size, left.data_size))
         with suppress(BadRecord):
             self.reader.read(left)
@@ -226,8 +220,8 @@ class Scan:
         elif opcode == MESSAGE_INDEX and self.chunks:
             self._take_index(*content)
         elif opcode in DEFINITIONS:
-            known = self.known(content)
-            if self.data_end is not None and (content.id not in known or self.chunks):
+            is_new = content.id not in self.described(content)
+            if self.data_end is not None and (is_new or self.chunks):
                 self.late.append(content)
             else:
                 self.define(content, record.offset)
@@ -264,23 +258,23 @@ class Scan:
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
         self.gaps.append(Gap(offset, end, reason, lossy))
 
-    def known(self, record: Schema | Channel) -> dict[int, Any]:
-        """Return the known descriptions of the kind of this one, by their numbers."""
+    def described(self, record: Schema | Channel) -> dict[int, Any]:
+        """Return the descriptions of the kind of this one, by their numbers."""
         return self.schemas if isinstance(record, Schema) else self.channels
 
     def define(self, record: Any, offset: int | None = None) -> None:
         """Learn a description, unless it is known; of one from the data note a contradiction."""
-        other = self.known(record).setdefault(record.id, record)
+        other = self.described(record).setdefault(record.id, record)
         if offset is None or record == other or len(self.conflicts) >= CONFLICTS:
             return
-        if record not in (each for _, each in self.conflicts):
+        if record not in (conflict for _, conflict in self.conflicts):
             self.conflicts.append((offset, record))
 
     def look(self, number: int) -> Mapping[int, Entries]:
         """Walk through the records of a chunk; learn its channels and where its messages lie."""
         chunk = self.chunks[number]
         records = self.reader.read(chunk)
-        found: dict[int, array[int]] = defaultdict(partial(array, "Q"))
+        messages: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         end, problem = 0, ""
         usual = chunk.data_size // BYTES_PER_RECORD
         allowed = usual + self._records_left // 2
@@ -293,7 +287,7 @@ class Scan:
             if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
                 head = records[body : body + MESSAGE_HEAD.size]
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-                found[channel_id].extend((log_time, offset))
+                messages[channel_id].extend((log_time, offset))
             elif opcode in DEFINITIONS:
                 with suppress(BadRecord):  # its messages will show that it is missing
                     self.define(parse(opcode, records[body:after]), chunk.offset)
@@ -304,8 +298,8 @@ class Scan:
         if problem:
             self.reader.kept.setdefault(chunk.offset, problem)
         if chunk.cut:
-            self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
-        self.seen[number] = {channel_id: entries_of(found[channel_id]) for channel_id in found}
+            self.saved_ns = max((max(values[::2]) for values in messages.values()), default=None)
+        self.seen[number] = {channel_id: entries_of(flat) for channel_id, flat in messages.items()}
         return self.seen[number]
 
     # --- The record at a byte, and the next one that makes sense ----------------------------------
@@ -373,20 +367,20 @@ class Scan:
         heads, agrees, size = list[Chunk](), False, len(self.source)
         listed = self.summary.chunks.get(record.offset)
         with suppress(BadRecord):
-            own = parse_chunk(self.source, record)
-            agrees = own.data_end == record.end and record.opcode == CHUNK
-            if agrees and listed == own._replace(crc=0):
-                return own._replace(proven=True)
-            heads = [own, own._replace(data_size=record.end - own.data_offset)]
+            head = parse_chunk(self.source, record)
+            agrees = head.data_end == record.end and record.opcode == CHUNK
+            if agrees and listed == head._replace(crc=0):
+                return head._replace(proven=True)
+            heads = [head, head._replace(data_size=record.end - head.data_offset)]
         crc = int.from_bytes(self.source[record.body + 24 : record.body + 28], "little")
-        known = [listed._replace(crc=crc)] if listed and self._listed else []
-        for chunk in (*known, *heads):
-            if found := self.reader.proof(chunk):
-                repaired = not agrees or found._replace(proven=False) != heads[0]
-                return found._replace(repaired=repaired)
+        by_summary = [listed._replace(crc=crc)] if listed and self._listed else []
+        for chunk in (*by_summary, *heads):
+            if proven := self.reader.proof(chunk):
+                repaired = not agrees or proven._replace(proven=False) != heads[0]
+                return proven._replace(repaired=repaired)
         if agrees and record.end <= min(self._around(record.offset)[1], size):
             return heads[0]
-        if heads and min(each.data_end for each in heads) > size >= heads[0].data_offset:
+        if heads and min(chunk.data_end for chunk in heads) > size >= heads[0].data_offset:
             return heads[0]._replace(data_size=size - heads[0].data_offset, cut=True)
         raise BadRecord("a chunk whose lengths contradict each other")
 
@@ -398,8 +392,8 @@ class Scan:
             if chunk.compression in COMPRESSIONS:
                 for end in (chunk.data_end, self._next(chunk.data_offset, anything).offset):
                     left = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
-                    if found := self.reader.proof(left):
-                        return found.record
+                    if proven := self.reader.proof(left):
+                        return proven.record
         return None
 
     def _next(self, begin: int, doubted: Record) -> Record:
@@ -430,9 +424,9 @@ class Scan:
         """Yield the bytes at or after ``begin`` where a record may begin."""
         for at in range(begin, len(self.source), _BLOCK):
             block = self.source[at : at + _BLOCK + HEAD.size]
-            found = {at + match.start() for match in _CANDIDATE.finditer(block)}
-            found |= {int(each) for each in self._borders if at <= each < at + _BLOCK}
-            yield from sorted(each for each in found if each < at + _BLOCK)
+            offsets = {at + match.start() for match in _CANDIDATE.finditer(block)}
+            offsets |= {int(border) for border in self._borders if at <= border < at + _BLOCK}
+            yield from sorted(offset for offset in offsets if offset < at + _BLOCK)
 
     def _is_believed(self, record: Record, doubted: Record) -> bool:
         """Whether it is more than chance that this looks like a record of the log."""
@@ -454,12 +448,12 @@ class Scan:
 
 def definitions(records: Bytes) -> list[Any]:
     """Return the schemas and channels of a chunk."""
-    found = []
+    descriptions = []
     for opcode, _, body, end, _ in islice(walk(records), RECORDS):
         if opcode in DEFINITIONS:
             with suppress(BadRecord):
-                found.append(parse(opcode, records[body:end]))
-    return found
+                descriptions.append(parse(opcode, records[body:end]))
+    return descriptions
 
 
 def entries_of(values: array[int]) -> Entries:
