@@ -11,7 +11,7 @@ import io
 import re
 import struct
 from collections.abc import Callable
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from types import SimpleNamespace
@@ -37,23 +37,12 @@ class TopicKind(StrEnum):
 Fields = tuple[tuple[str, str], ...]
 """Names and types of a message's fields, in the order of their bytes."""
 _CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q", "f8": "d"}
-"""Of the numbers among the types, as `struct` names them."""
-
-
-class MessageSchema(NamedTuple):
-    """A message that carries an image, a calibration or transforms."""
-
-    kind: TopicKind
-    fields: Fields
+"""The types that are numbers, as `struct` names them."""
 
 
 def _fields(text: str) -> Fields:
     pairs = (field.partition(":") for field in text.split())
     return tuple((name, type_) for name, _, type_ in pairs)
-
-
-def _schema(kind: TopicKind, fields: str) -> MessageSchema:
-    return MessageSchema(kind, _fields(fields))
 
 
 _ROS: Final = "header:header"
@@ -71,37 +60,39 @@ NESTED: Final = {
 }
 """The fields of types that are messages themselves."""
 
-SCHEMAS: Final = {
-    "sensor_msgs/Image": _schema(
+_KINDS_AND_FIELDS: Final = {
+    "sensor_msgs/Image": (
         TopicKind.IMAGE,
         f"{_ROS} height:u4 width:u4 encoding:str is_bigendian:u1 step:u4 data:bytes",
     ),
-    "sensor_msgs/CompressedImage": _schema(TopicKind.COMPRESSED, f"{_ROS} format:str data:bytes"),
-    "ffmpeg_image_transport_msgs/FFMPEGPacket": _schema(
+    "sensor_msgs/CompressedImage": (TopicKind.COMPRESSED, f"{_ROS} format:str data:bytes"),
+    "ffmpeg_image_transport_msgs/FFMPEGPacket": (
         TopicKind.VIDEO,
         f"{_ROS} width:i4 height:i4 encoding:str pts:u8 flags:u1 is_bigendian:u1 data:bytes",
     ),
-    "foxglove/RawImage": _schema(
-        TopicKind.IMAGE, f"{_FOXGLOVE} width:u4 height:u4 encoding:str step:u4 data:bytes"
+    "foxglove/RawImage": (
+        TopicKind.IMAGE,
+        f"{_FOXGLOVE} width:u4 height:u4 encoding:str step:u4 data:bytes",
     ),
-    "foxglove/CompressedImage": _schema(TopicKind.COMPRESSED, f"{_FOXGLOVE} data:bytes format:str"),
-    "foxglove/CompressedVideo": _schema(TopicKind.VIDEO, f"{_FOXGLOVE} data:bytes format:str"),
-    "sensor_msgs/CameraInfo": _schema(
+    "foxglove/CompressedImage": (TopicKind.COMPRESSED, f"{_FOXGLOVE} data:bytes format:str"),
+    "foxglove/CompressedVideo": (TopicKind.VIDEO, f"{_FOXGLOVE} data:bytes format:str"),
+    "sensor_msgs/CameraInfo": (
         TopicKind.CALIBRATION,
         f"{_ROS} height:u4 width:u4 {_LENS} binning_x:u4 binning_y:u4 roi:region",
     ),
-    "foxglove/CameraCalibration": _schema(
-        TopicKind.CALIBRATION, f"{_FOXGLOVE} width:u4 height:u4 {_LENS}"
+    "foxglove/CameraCalibration": (
+        TopicKind.CALIBRATION,
+        f"{_FOXGLOVE} width:u4 height:u4 {_LENS}",
     ),
-    "tf2_msgs/TFMessage": _schema(TopicKind.TRANSFORMS, "transforms:stamped[]"),
-    "foxglove/FrameTransform": _schema(TopicKind.TRANSFORMS, _FRAME),
-    "foxglove/FrameTransforms": _schema(TopicKind.TRANSFORMS, "transforms:frame[]"),
+    "tf2_msgs/TFMessage": (TopicKind.TRANSFORMS, "transforms:stamped[]"),
+    "foxglove/FrameTransform": (TopicKind.TRANSFORMS, _FRAME),
+    "foxglove/FrameTransforms": (TopicKind.TRANSFORMS, "transforms:frame[]"),
 }
-"""By package and message."""
-
+"""What messages carry, and their fields, by package and message."""
+LAYOUTS: Final = {name: _fields(fields) for name, (_, fields) in _KINDS_AND_FIELDS.items()}
+KINDS: Final = {name.partition("/")[2]: kind for name, (kind, _) in _KINDS_AND_FIELDS.items()}
+"""The kinds by the message alone: its package may be another, with fields of the same names."""
 PICTURES: Final = (TopicKind.IMAGE, TopicKind.COMPRESSED, TopicKind.VIDEO)
-KINDS: Final = {name.partition("/")[2]: schema.kind for name, schema in SCHEMAS.items()}
-"""By the message alone: its package may be another, with fields of the same names."""
 
 
 def parts_of(schema_name: str) -> list[str]:
@@ -119,8 +110,7 @@ def fields_of(schema: Schema | None) -> Fields | None:
     if len(parts) < 2:
         return None
     package = "foxglove" if parts[0] == "foxglove_msgs" else parts[0]
-    found = SCHEMAS.get(f"{package}/{parts[-1]}")
-    return found.fields if found else None
+    return LAYOUTS.get(f"{package}/{parts[-1]}")
 
 
 LONGEST_TEXT: Final = 1 << 16
@@ -175,17 +165,15 @@ class FieldReader:
     """Reads one field after the other.
 
     ``order`` is the byte order as `struct` names it, ``start`` the position of the first field.
-    Where ``aligned``, numbers stand at multiples of their size, at most of ``widest``.
+    If ``aligned``, numbers stand at multiples of their size, at most of ``widest``.
     """
 
     def __init__(
         self, data: Buffer, order: str, start: int, *, aligned: bool, widest: int = 8
     ) -> None:
-        self._data = memoryview(data)
-        self._order = order
+        self._data, self._order = memoryview(data), order
         self._start = self._at = start
-        self._aligned = aligned
-        self._widest = widest
+        self._aligned, self._widest = aligned, widest
 
     @property
     def left(self) -> int:
@@ -217,8 +205,7 @@ class FieldReader:
     def _number(self, kind: str) -> Any:
         code = struct.Struct(self._order + _CODES[kind])
         if self._aligned:
-            width = min(code.size, self._widest)
-            self._at += -(self._at - self._start) % width
+            self._at += -(self._at - self._start) % min(code.size, self._widest)
         return code.unpack(self._take(code.size))[0]
 
     def _take(self, length: int) -> memoryview:
@@ -235,8 +222,8 @@ class Layouts:
     Some writers log two kinds of message on a topic under the schema of the first.
     """
 
-    own: Fields
-    """The one that the channel's schema names."""
+    named: Fields
+    """The layout that the channel's schema names."""
     begin: Callable[[Buffer], FieldReader]
     """Return a reader of a message's fields."""
     padding: int = 1
@@ -245,25 +232,23 @@ class Layouts:
     def read(self, data: Buffer, decode: Decode | None) -> Any:
         """Read a message by ``decode``, or by another image's layout if it fits that alone.
 
-        Of what is no image the own layout is read where it fits: the libraries refuse some texts.
+        A message that is no image is read by its layout if it fits: the libraries refuse some
+        texts.
         """
-        is_image = ("data", "bytes") in self.own
-        if self.fits(self.own, data):
-            decode = decode if is_image else None
-        elif decode is None and not is_image:
+        is_image = ("data", "bytes") in self.named
+        if message := self.fitting(data):
+            return decode(data) if decode and is_image else message
+        if decode is None and not is_image:
             raise BadMessage("its length is not that of its fields")
-        else:
-            # Of the others that begin as the own one does.
-            for fields in (schema.fields for schema in SCHEMAS.values()):
-                if fields[0] == self.own[0] and fields != self.own and self.fits(fields, data):
-                    return self.begin(data).read(fields)
-        return decode(data) if decode else self.begin(data).read(self.own)
+        for fields in LAYOUTS.values():
+            if fields[0] == self.named[0] and (message := self.fitting(data, fields)):
+                return message
+        return decode(data) if decode else self.begin(data).read(self.named)
 
-    def fits(self, fields: Fields, data: Buffer) -> bool:
-        """Whether a message is exactly as long as these fields say."""
-        try:
+    def fitting(self, data: Buffer, fields: Fields | None = None) -> SimpleNamespace | None:
+        """Read a message by its own or other fields; None if it is not as long as they say."""
+        with suppress(BadMessage, struct.error):
             reader = self.begin(data)
-            reader.read(fields)
-        except (BadMessage, struct.error):
-            return False
-        return reader.left < self.padding
+            message = reader.read(fields or self.named)
+            return message if reader.left < self.padding else None
+        return None

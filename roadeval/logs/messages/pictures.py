@@ -69,20 +69,15 @@ class DecodedPicture:
     """How it is to be turned, as EXIF counts it; it is turned already where limits say so."""
 
 
-BUFFERS: Final = (bytes, bytearray, memoryview)
-
 LoggedPicture = RawPicture | CompressedPicture
 Picture = LoggedPicture | DecodedPicture
 
+_BUFFERS: Final = (bytes, bytearray, memoryview)
 _SECONDS: Final = ("sec", "secs", "seconds")
 _NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
 _CODECS: Final = {
-    "h264": "h264",
-    "avc": "h264",
-    "libx264": "h264",
-    "h265": "hevc",
-    "hevc": "hevc",
-    "libx265": "hevc",
+    **dict.fromkeys(("h264", "avc", "libx264"), "h264"),
+    **dict.fromkeys(("h265", "hevc", "libx265"), "hevc"),
     "vp9": "vp9",
     "av1": "av1",
 }
@@ -113,29 +108,22 @@ def picture_in(message: Any) -> LoggedPicture:
         frame_id = getattr(header, "frame_id", "")
         frame_id = frame_id if isinstance(frame_id, str) else ""
         if not hasattr(message, "height") or hasattr(message, "pts"):
-            name = message.format if hasattr(message, "format") else message.encoding
-            data = _as(BUFFERS, message.data)
-            if _name(name).lower() == "zstd":
+            name = _name(message.format if hasattr(message, "format") else message.encoding)
+            data = _as(_BUFFERS, message.data)
+            if name.lower() == "zstd":
                 return _unpacked(stamp_ns, bytes(data), frame_id)
             pts = int(message.pts) if hasattr(message, "pts") else None
-            return CompressedPicture(stamp_ns, _name(name), data, frame_id, pts)
-        return RawPicture(
-            stamp_ns,
-            int(message.width),
-            int(message.height),
-            _name(message.encoding),
-            int(getattr(message, "step", 0)),
-            bool(getattr(message, "is_bigendian", False)),
-            _as(BUFFERS, message.data),
-            frame_id,
-        )
+            return CompressedPicture(stamp_ns, name, data, frame_id, pts)
+        size, encoding = (int(message.width), int(message.height)), _name(message.encoding)
+        step, order = int(getattr(message, "step", 0)), getattr(message, "is_bigendian", False)
+        data = _as(_BUFFERS, message.data)
+        return RawPicture(stamp_ns, *size, encoding, step, bool(order), data, frame_id)
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it lacks the fields of an image") from error
 
 
 _PACKED: Final = struct.Struct("<IIBII")
 """Height, width, whether the upper byte comes first, bytes a row, letters of the encoding."""
-_GZIP: Final = b"\x1f\x8b"
 
 
 def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
@@ -143,10 +131,10 @@ def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
     import zstandard
 
     try:
-        height, width, big_endian, step, letters = _PACKED.unpack_from(data)
+        height, width, order, step, letters = _PACKED.unpack_from(data)
         begin = _PACKED.size + letters
         packed, most = data[begin:], max(min(4 * step * height, LARGEST), 1)
-        if packed.startswith(_GZIP):
+        if packed.startswith(b"\x1f\x8b"):  # gzip
             pixels = zlib.decompressobj(zlib.MAX_WBITS | 16).decompress(packed, most)
         elif zstandard.frame_content_size(packed) <= most:
             pixels = zstandard.ZstdDecompressor().decompress(packed, most)
@@ -154,10 +142,8 @@ def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
             raise BadMessage("an image in zstd of another size than it says")
     except (struct.error, zlib.error, zstandard.ZstdError) as error:
         raise BadMessage("an image in zstd that cannot be uncompressed") from error
-    encoding = data[_PACKED.size : begin].decode("ascii", "replace")
-    return RawPicture(
-        stamp_ns, width, height, _name(encoding), step, bool(big_endian), pixels, frame_id
-    )
+    encoding = _name(data[_PACKED.size : begin].decode("ascii", "replace"))
+    return RawPicture(stamp_ns, width, height, encoding, step, bool(order), pixels, frame_id)
 
 
 def _name(text: Any) -> str:
@@ -229,10 +215,8 @@ def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
     parts = () if schema is None else (schema.name, schema.encoding, schema.data)
     decoder = _decoder_for(channel.message_encoding, *parts)
     if decoder is None:
-        name = schema.encoding if schema else "no"
-        raise BadMessage(
-            f"{channel.message_encoding!r} messages with {name!r} schema are not readable"
-        )
+        messages, name = channel.message_encoding, schema.encoding if schema else "no"
+        raise BadMessage(f"{messages!r} messages with {name!r} schema are not readable")
     return decoder
 
 
@@ -249,11 +233,8 @@ def message_stamp(channel: Channel, schema: Schema | None, message: Message) -> 
 def _decoder_for(message_encoding: str, *parts: Any) -> Decoder | None:
     """Return what decodes the messages of a schema, whichever channels and files share it."""
     encoding = message_encodings().get(message_encoding)
-    if encoding is None:
-        return None
-    name, schema_encoding, data = parts or ("", "", b"")
-    schema = Schema(id=1, name=name, encoding=schema_encoding, data=data) if parts else None
-    reader = encoding.reader(schema)
+    schema = Schema(1, name=parts[0], encoding=parts[1], data=parts[2]) if parts else None
+    reader = encoding.reader(schema) if encoding else None
     return Decoder(reader) if reader else None
 
 
@@ -307,9 +288,7 @@ class Video:
         import av
 
         self._av: Final = av
-        self._whole = av.video.reformatter.ColorRange.JPEG
-        self._packets = packets
-        self._limits = limits
+        self._packets, self._limits = packets, limits
         self.notes: Final = dict[str, str]()
         """Warnings about the frames so far, by their kind."""
         self._ready: dict[int, DecodedPicture | FrameError]
@@ -330,17 +309,15 @@ class Video:
         while position not in self._ready and self._next <= position + PATIENCE:
             if not next(self._steps, False):
                 break
-        found = self._ready.pop(position, FrameError("the decoder gave no picture for it"))
+        outcome = self._ready.pop(position, FrameError("the decoder gave no picture for it"))
         self._ready = {ready: late for ready, late in self._ready.items() if ready > position}
-        if isinstance(found, FrameError):
-            raise found
-        return found
+        if isinstance(outcome, FrameError):
+            raise outcome
+        return outcome
 
     def _begin(self, position: int) -> None:
-        self._next, self._damaged = position, False
-        self._ready = {}
-        self._shown = position, 0
-        self._steps = self._decode(position)
+        self._next, self._damaged, self._ready = position, False, {}
+        self._shown, self._steps = (position, 0), self._decode(position)
 
     def _keyframe(self, position: int) -> int:
         """Position of the last keyframe at or before ``position``."""
@@ -423,11 +400,12 @@ class Video:
                 self._ready[frame.pts] = FrameError(f"{what} is damaged")
             elif packet is not None:
                 self._look(frame, packet)
-                whole = {"src_color_range": self._whole} if self._limits.full_range else {}
-                pixels, turned = frame.to_ndarray(format="rgb24", **whole), turn_of(frame)
+                full = self._av.video.reformatter.ColorRange.JPEG
+                luma_range = {"src_color_range": full} if self._limits.full_range else {}
+                pixels, turned = frame.to_ndarray(format="rgb24", **luma_range), turn_of(frame)
                 pixels = upright(pixels, turned if self._limits.turn else 1)
-                found = DecodedPicture(packet.stamp_ns, packet.data, pixels, turned)
-                self._ready[frame.pts] = found
+                picture = DecodedPicture(packet.stamp_ns, packet.data, pixels, turned)
+                self._ready[frame.pts] = picture
 
     def _look(self, frame: Any, packet: Picture) -> None:
         """Note what is doubtful of a frame, which come in the order in which they are shown."""
@@ -441,12 +419,10 @@ class Video:
                 else "the video has B-frames: frames are numbered in the order of decoding, and "
                 "labels that are paired by number in the order of stamps, in which it is shown"
             )
-        form = frame.format
-        if frame.color_range or self._limits.full_range or not form.name.startswith("yuv4"):
+        form, plane = frame.format, frame.planes[0]
+        is_limited = not frame.color_range and not self._limits.full_range
+        if not (is_limited and form.name.startswith("yuv4") and form.components[0].bits == 8):
             return
-        if form.components[0].bits != 8:
-            return
-        plane = frame.planes[0]
         luma = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[::4, : frame.width : 4]
         share = ((luma < _LIMITED[0]) | (luma > _LIMITED[1])).mean()
         if share > _STRAY:
@@ -472,7 +448,7 @@ class Video:
 
 def _step(one: Picture, other: Picture) -> int:
     """Return by how much the numbers of two packets differ; 0 where one has none."""
-    first, second = (getattr(each, "number", None) for each in (one, other))
+    first, second = (getattr(packet, "number", None) for packet in (one, other))
     return 0 if first is None or second is None else second - first
 
 
@@ -483,7 +459,7 @@ def turn_of(frame: Any) -> int:
             a, b, _, c, d = struct.unpack("=5i", bytes(side)[:20])
             exchanged = abs(b) > abs(a)
             signs = (b < 0, c < 0) if exchanged else (d < 0, a < 0)
-            return next(n for n, each in ORIENTATIONS.items() if each == (exchanged, *signs))
+            return next(n for n, turn in ORIENTATIONS.items() if turn == (exchanged, *signs))
     return 1
 
 

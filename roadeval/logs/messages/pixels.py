@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -48,28 +49,21 @@ class PixelFormat:
 
 
 def _formats() -> dict[str, PixelFormat]:
-    formats = {
-        "yuv422": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
-        "uyvy": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
-        "yuyv": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
-        "yuv422_yuy2": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
-        "nv12": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV12", 1.5, (2, 2)),
-        "nv21": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV21", 1.5, (2, 2)),
-        "nv24": PixelFormat("u1", 1, "COLOR_YUV2RGB_YUY2", 3),
-    }
-    numbers = {"32fc1": "f4", "8sc1": "i1", "16sc1": "i2", "32sc1": "i4"}
-    formats |= {name: PixelFormat(of, 1, "COLOR_GRAY2RGB") for name, of in numbers.items()}
+    uyvy = PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1))
+    yuy2 = replace(uyvy, code="COLOR_YUV2RGB_YUY2")
+    formats = {"yuv422": uyvy, "uyvy": uyvy, "yuyv": yuy2, "yuv422_yuy2": yuy2}
+    for name in ("nv12", "nv21"):
+        formats[name] = PixelFormat("u1", 1, f"COLOR_YUV2RGB_{name.upper()}", 1.5, (2, 2))
+    formats["nv24"] = PixelFormat("u1", 1, "COLOR_YUV2RGB_YUY2", 3)
+    for name, dtype in (("32fc1", "f4"), ("8sc1", "i1"), ("16sc1", "i2"), ("32sc1", "i4")):
+        formats[name] = PixelFormat(dtype, 1, "COLOR_GRAY2RGB")
     for bits, dtype in (("8", "u1"), ("16", "u2")):
-        formats |= {
-            f"mono{bits}": PixelFormat(dtype, 1, "COLOR_GRAY2RGB"),
-            f"{bits}uc1": PixelFormat(dtype, 1, "COLOR_GRAY2RGB"),
-            f"rgb{bits}": PixelFormat(dtype, 3, None),
-            f"bgr{bits}": PixelFormat(dtype, 3, "COLOR_BGR2RGB"),
-            f"{bits}uc3": PixelFormat(dtype, 3, "COLOR_BGR2RGB"),
-            f"rgba{bits}": PixelFormat(dtype, 4, "COLOR_RGBA2RGB"),
-            f"bgra{bits}": PixelFormat(dtype, 4, "COLOR_BGRA2RGB"),
-            f"{bits}uc4": PixelFormat(dtype, 4, "COLOR_BGRA2RGB"),
-        }
+        codes = ((1, "GRAY"), (3, "BGR"), (4, "BGRA"))
+        grey, bgr, bgra = (PixelFormat(dtype, n, f"COLOR_{code}2RGB") for n, code in codes)
+        formats |= {f"mono{bits}": grey, f"{bits}uc1": grey, f"bgr{bits}": bgr}
+        formats |= {f"{bits}uc3": bgr, f"bgra{bits}": bgra, f"{bits}uc4": bgra}
+        formats[f"rgb{bits}"] = PixelFormat(dtype, 3, None)
+        formats[f"rgba{bits}"] = PixelFormat(dtype, 4, "COLOR_RGBA2RGB")
         for order in ("rggb", "bggr", "grbg", "gbrg"):
             code = f"COLOR_Bayer{order.upper()}2RGB"
             formats[f"bayer_{order}{bits}"] = PixelFormat(dtype, 1, code)
@@ -125,11 +119,8 @@ def rows_of(picture: RawPicture, limits: Limits) -> Array:
     return np.ascontiguousarray(array, dtype.newbyteorder("="))
 
 
-def raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None = None) -> Rgb:
-    """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own; ``white`` as of `to_rgb`.
-
-    A `BadMessage` if its encoding is unknown, or as of `rows_of`.
-    """
+def _raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None) -> Rgb:
+    """Convert a picture to RGB as `to_rgb` does."""
     import cv2
 
     samples, layout = eight_bits(rows_of(picture, limits), white), format_of(picture)
@@ -157,13 +148,13 @@ def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
     bits, and 1 of fractions. A `BadMessage` if it is damaged or cannot be decoded.
     """
     if isinstance(picture, RawPicture):
-        return raw_to_rgb(picture, limits, white)
-    if isinstance(picture, CompressedPicture):
-        if _is_depth(picture):
-            raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
-        with _bad_message():
-            return decoding.to_rgb(picture.data, limits, white)
-    return picture.pixels
+        return _raw_to_rgb(picture, limits, white)
+    if isinstance(picture, DecodedPicture):
+        return picture.pixels
+    if _is_depth(picture):
+        raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
+    with _bad_message():
+        return decoding.to_rgb(picture.data, limits, white)
 
 
 def deep_samples(picture: Picture, limits: Limits) -> Array | None:
@@ -172,9 +163,8 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
     A `BadMessage` as of `to_rgb`.
     """
     if isinstance(picture, RawPicture):
-        is_deep = format_of(picture).dtype != "u1"
-        return rows_of(picture, limits) if is_deep else None
-    if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
+        return rows_of(picture, limits) if format_of(picture).dtype != "u1" else None
+    if _file_in(picture) is None:
         return None
     with _bad_message():
         return decoding.deep_samples(file_of(picture), limits)
@@ -206,19 +196,17 @@ def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
     """
     if isinstance(picture, RawPicture):
         return picture.width, picture.height
-    if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
-        return None
     with _bad_message():
-        return decoding.size_of(file_of(picture), limits)
+        return None if (file := _file_in(picture)) is None else decoding.size_of(file, limits)
 
 
 def lossy_format(picture: Picture) -> str:
     """Return the name of a format whose compression changes values, as JPEG; else empty."""
     if isinstance(picture, RawPicture):
         return ""
-    if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
+    if (file := _file_in(picture)) is None:
         return "video"
-    format_ = formats.format_of(file_of(picture))
+    format_ = formats.format_of(file)
     return "" if format_ is None or format_.exact else format_.name
 
 
@@ -230,22 +218,24 @@ def _bad_message() -> Iterator[None]:
         raise BadMessage(str(error)) from error
 
 
-_DEPTH_HEAD: Final = 12
-"""Bytes of image_transport's ``compressedDepth`` before the image file: kind and quantization."""
-
-
 def _is_depth(picture: CompressedPicture) -> bool:
     return "compresseddepth" in picture.format.lower()
 
 
+def _file_in(picture: CompressedPicture | DecodedPicture) -> Buffer | None:
+    """Return the image file of a picture, None if it is a video's."""
+    if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
+        return None
+    return file_of(picture)
+
+
 def file_of(picture: CompressedPicture) -> Buffer:
-    """Return the image file of a picture; of ``compressedDepth`` the PNG of whole numbers.
+    """Return the image file of a picture: of ``compressedDepth`` the PNG of whole numbers.
 
     A `BadMessage` if it has none.
     """
     if not _is_depth(picture):
         return picture.data
-    data, name = picture.data[_DEPTH_HEAD:], picture.format.lower()
-    if "32fc1" in name or "rvl" in name:
+    if re.search("(?i)32fc1|rvl", picture.format):
         raise BadMessage(f"it holds depth ({picture.format}); of such images PNG of 16UC1 is read")
-    return data
+    return picture.data[12:]  # behind the kind and the quantization

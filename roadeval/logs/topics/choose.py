@@ -54,8 +54,8 @@ class Choice(NamedTuple):
 def words(name: str) -> frozenset[str]:
     """Split a topic's name into its words, in lower case."""
     spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name)
-    found = re.findall(r"[a-z]+", spaced.lower())
-    return frozenset(found) | ({"groundtruth"} if {"ground", "truth"} <= set(found) else set())
+    parts = frozenset(re.findall(r"[a-z]+", spaced.lower()))
+    return parts | {"groundtruth"} if {"ground", "truth"} <= parts else parts
 
 
 def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicInfo, str]:
@@ -68,26 +68,28 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         return named(topics, asked, "`topics.image`"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
-    found = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
-    cameras = _of_one_transport(found)
-    if len(cameras) == 1:
-        why = "the only camera image" if len(images) > 1 else "the only image topic"
-        return cameras[0], f"{why}, of {len(found)} transports" if len(found) > 1 else why
-    if not cameras:
-        raise LogError(_no_image(topics, images))
-    raise LogError(
-        f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or give "
-        "it once for each of several"
-    )
-
-
-def _of_one_transport(topics: Sequence[TopicInfo]) -> list[TopicInfo]:
-    """Return a topic of each camera: of several transports one that can be read, without loss."""
+    sent = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
+    # Of several transports of a camera one that can be read is taken, without loss if possible.
     best: dict[str, TopicInfo] = {}
-    for topic in sorted(topics, key=lambda topic: (bool(topic.problem), bool(topic.lossy))):
+    for topic in sorted(sent, key=lambda topic: (bool(topic.problem), bool(topic.lossy))):
         base, _, transport = topic.name.rpartition("/")
         best.setdefault(base if transport in TRANSPORTS else topic.name, topic)
-    return [topic for topic in topics if topic in best.values()]
+    cameras = [topic for topic in sent if topic in best.values()]
+    if len(cameras) == 1:
+        why = "the only camera image" if len(images) > 1 else "the only image topic"
+        return cameras[0], f"{why}, of {len(sent)} transports" if len(sent) > 1 else why
+    if cameras:
+        raise LogError(
+            f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or "
+            "give it once for each of several"
+        )
+    if images:
+        raise LogError(
+            f"only label images: {_names(images)}; choose the camera's with `topics.image`"
+        )
+    listed = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
+    more = ", ..." if len(topics) > 8 else ""
+    raise LogError(f"no image topic; the log has: {listed or 'no topics at all'}{more}")
 
 
 def choose_truth(
@@ -108,30 +110,30 @@ def choose_truth(
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.truth`")
-    found = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
-    roads = [topic for topic in found if not topic.lossy]
+    candidates = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
+    roads = [topic for topic in candidates if not topic.lossy]
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
-    own = [topic for topic in roads if topic.name not in elsewhere]
+    of_camera = [topic for topic in roads if topic.name not in elsewhere]
     colors = bool(labels.road_colors)
-    truth = _only(_clear_truths(own, image, colors=colors), image, "label", "`topics.truth`")
+    truth = _only(_clear_truths(of_camera, image, colors=colors), image, "label", "`topics.truth`")
     if truth is not None:
         by = "colours" if truth.channels == 3 else "single channel"
         return Choice(truth, f"the label image, by its name and its {by}")
     if others := _clear_truths(roads, image, colors=colors):
-        whose = f"{others[0].name} belongs to another camera than {image.name}, by "
-        whose += elsewhere[others[0].name]
+        name = others[0].name
+        why = f"{name} belongs to another camera than {image.name}, by {elsewhere[name]}"
         if of_rig:
-            return Choice(None, whose)
+            return Choice(None, why)
         raise LogError(
-            f"{whose}: name it with `topics.truth` to use it nevertheless, or give an empty name "
+            f"{why}: name it with `topics.truth` to use it nevertheless, or give an empty name "
             "there to continue without truth"
         )
     if roads:
         why = "no topic is clearly road truth; name one with `topics.truth`:"
         return Choice(None, f"{why} {_names(roads)}")
-    if not found:
+    if not candidates:
         return Choice(None, "no label topic")
-    why = lossy_labels(found[0].name, found[0].lossy)
+    why = lossy_labels(candidates[0].name, candidates[0].lossy)
     if labels != LabelSettings():
         raise LogError(why)
     return Choice(None, why)
@@ -169,9 +171,8 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
         and not other_camera(topic, image, topics)
     ]
     shadow = _only(shadows, image, "shadow", "`topics.shadow`")
-    if shadow is None:
-        return Choice(None, "no shadow topic")
-    return Choice(shadow, "the shadow mask, by its name and its single channel")
+    why = "the shadow mask, by its name and its single channel" if shadow else "no shadow topic"
+    return Choice(shadow, why)
 
 
 def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]) -> str:
@@ -184,8 +185,8 @@ def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]
     """
     cameras = _other_cameras(topics, image)
     for what, theirs, ours, others in (
-        ("its path", label.name, image.name, [each.name for each in cameras]),
-        ("its frame_id", label.frame_id, image.frame_id, [each.frame_id for each in cameras]),
+        ("its path", label.name, image.name, [camera.name for camera in cameras]),
+        ("its frame_id", label.frame_id, image.frame_id, [camera.frame_id for camera in cameras]),
     ):
         if ours and _is_another(*_cameras(theirs, ours, *others)):
             return what if theirs == label.name else f"{what} ({theirs}, not {ours})"
@@ -194,17 +195,17 @@ def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]
 
 def _cameras(theirs: str, ours: str, *others: str) -> list[set[str]]:
     """Return the words of each name that tell a camera from others."""
-    known = frozenset[str]().union(*map(_camera_words, (ours, *others)))
+    names = SIDES.union(*map(_camera_words, (ours, *others)))
     return [
-        {w for w in _camera_words(text) if w in known | SIDES or re.fullmatch(r"camera\d+", w)}
+        {word for word in _camera_words(text) if word in names or re.fullmatch(r"camera\d+", word)}
         for text in (theirs, ours, *others)
     ]
 
 
 def _is_another(of_label: set[str], of_image: set[str], *of_others: set[str]) -> bool:
     is_another = bool(of_image - {"camera"}) and not of_label <= of_image
-    nearer = any(len(of_label ^ each) < len(of_label ^ of_image) for each in of_others)
-    return bool(of_label) and (is_another or nearer)
+    is_nearer = any(len(of_label ^ other) < len(of_label ^ of_image) for other in of_others)
+    return bool(of_label) and (is_another or is_nearer)
 
 
 def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicInfo]) -> None:
@@ -220,7 +221,7 @@ def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicIn
     of_labels = [_cameras(text, ours, *others)[0] for text in texts]
     numbered = {word for words in of_labels for word in words if word[-1].isdigit()}
     frames = numbered if len(numbered) == len(names) else set[str]()
-    shown = {frozenset(each - frames): name for each, name in zip(of_labels, names, strict=True)}
+    shown = {frozenset(words - frames): name for words, name in zip(of_labels, names, strict=True)}
     cameras = {words: name for words, name in shown.items() if words}
     theirs = [
         name for words, name in cameras.items() if _is_another({*words}, of_image, *of_others)
@@ -236,24 +237,29 @@ def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicIn
 
 
 def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
-    found = [topic for topic in topics if topic.is_image and topic.count]
-    return [each for each in found if each.name != image.name and not _looks_like_label(each)]
+    return [
+        topic
+        for topic in topics
+        if topic.is_image
+        and topic.count
+        and topic.name != image.name
+        and not _looks_like_label(topic)
+    ]
 
 
 def _camera_words(name: str) -> frozenset[str]:
     """Split a path or a ``frame_id`` into words and numbers that may distinguish cameras."""
     spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name).lower()
     numbered = re.sub(r"(?<![a-z])cam(?:era)?[ _]?(\d+)", r"camera\1", spaced)
-    found = re.findall(r"camera\d+|[a-z]+|\d+", numbered)
-    common = frozenset(SAME_WORDS.get(word, word) for word in found)
+    parts = re.findall(r"camera\d+|[a-z]+|\d+", numbered)
+    common = frozenset(SAME_WORDS.get(word, word) for word in parts)
     return common - TRANSPORT_WORDS - LABEL_WORDS - MASK_WORDS - ROAD_WORDS
 
 
 def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
     """Return the topic of a name; an empty one takes none."""
-    if not name:
-        return Choice(None, "asked to use none")
-    return Choice(named(topics, name, setting), "asked for")
+    topic = named(topics, name, setting) if name else None
+    return Choice(topic, "asked for" if name else "asked to use none")
 
 
 def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
@@ -308,14 +314,6 @@ def _only(
     if len(best) > 1:
         raise LogError(f"{len(best)} {what} topics: {_names(best)}; choose one with {setting}")
     return best[0] if best else None
-
-
-def _no_image(topics: Sequence[TopicInfo], images: Sequence[TopicInfo]) -> str:
-    if images:
-        return f"only label images: {_names(images)}; choose the camera's with `topics.image`"
-    found = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
-    more = ", ..." if len(topics) > 8 else ""
-    return f"no image topic; the log has: {found or 'no topics at all'}{more}"
 
 
 def _names(topics: Iterable[TopicInfo]) -> str:

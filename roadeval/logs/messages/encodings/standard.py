@@ -45,17 +45,12 @@ def _cdr(schema: Schema | None) -> MessageReader | None:
         # The library takes XCDR2 for its first version, in which longer numbers stand elsewhere.
         return layouts.read(message, None if bytes(message[1:2]) >= b"\6" else decode)
 
-    return MessageReader(
-        read,
-        lambda data: _cdr_stamp(fields, _uncompressed(data)),
-        lambda data: layouts.fits(fields, data),
-    )
+    def stamp(data: Buffer) -> Any:
+        """Read only the first field, which is the stamp or a header that holds it."""
+        first = _after_head(_uncompressed(data)).read(fields[:1])
+        return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
 
-
-def _cdr_stamp(fields: Fields, data: Buffer) -> Any:
-    """Read only the first field, which is the stamp or a header that holds it."""
-    first = _after_head(data).read(fields[:1])
-    return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
+    return MessageReader(read, stamp, lambda data: layouts.fitting(data) is not None)
 
 
 def _after_head(data: Buffer) -> FieldReader:
@@ -63,11 +58,8 @@ def _after_head(data: Buffer) -> FieldReader:
     if len(data) < 4:
         raise BadMessage("a message without a head")
     kind = data[1]
-    order = "<" if kind & 1 else ">"
-    version_2 = kind >= 6
-    delimited = kind in (8, 9)
-    start = 8 if delimited else 4
-    return FieldReader(data, order, start, aligned=True, widest=4 if version_2 else 8)
+    order, start = "<" if kind & 1 else ">", 8 if kind in (8, 9) else 4
+    return FieldReader(data, order, start, aligned=True, widest=4 if kind >= 6 else 8)
 
 
 def _uncompressed(data: Buffer) -> Buffer:
@@ -97,9 +89,8 @@ def _flatbuffer(schema: Schema | None) -> MessageReader | None:
 
 
 def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
-    return SimpleNamespace(
-        **{name: _flatbuffer_field(message, name, kind) for name, kind in fields}
-    )
+    values = {name: _flatbuffer_field(message, name, kind) for name, kind in fields}
+    return SimpleNamespace(**values)
 
 
 def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
@@ -122,15 +113,11 @@ def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
 # --- JSON: bytes in base 64, or as a list of numbers ----------------------------------------------
 
 
-def _json_message(data: Buffer) -> SimpleNamespace:
-    message: SimpleNamespace = json.loads(
-        bytes(data), object_hook=lambda fields: SimpleNamespace(**fields)
-    )
-    if not hasattr(message, "data"):  # it is no image
-        return message
-    if isinstance(message.data, str):
-        message.data = base64.b64decode(message.data, validate=True)
-    else:
+def _json_message(data: Buffer) -> Any:
+    message = json.loads(bytes(data), object_hook=lambda fields: SimpleNamespace(**fields))
+    if isinstance(content := getattr(message, "data", None), str):
+        message.data = base64.b64decode(content, validate=True)
+    elif hasattr(message, "data"):  # else it is no image
         message.data = bytes(message.data)
     return message
 
