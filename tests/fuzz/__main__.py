@@ -6,9 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.fuzz.campaign import ROOT, Result, guidance, run
+from tests.fuzz.campaign import ROOT, Job, Result, guidance, run
 from tests.fuzz.harness import NAMES, harness_of, run_case
-from tests.fuzz.worker import Job
 
 
 def main() -> int:
@@ -22,12 +21,12 @@ def main() -> int:
     for name in names:
         guided = guidance() and not words.plain
         jobs = [
-            Job(name, "", words.seed + each, guided, words.cases, seconds / len(names))
-            for each in range(words.jobs)
+            Job(name, "", words.seed + number, guided, words.cases, seconds / len(names))
+            for number in range(words.jobs)
         ]
         results.append(run(jobs, words.save))
         _tell(results[-1], guided=guided)
-    return int(any(result.found for result in results))
+    return int(any(result.findings for result in results))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -52,14 +51,14 @@ def _again(name: str, path: Path) -> int:
 
 
 def _tell(result: Result, *, guided: bool) -> None:
-    kinds = ", ".join(sorted({kind for kind, _, _ in result.found})) or "nothing found"
+    kinds = ", ".join(sorted({kind for kind, _, _ in result.findings})) or "nothing found"
     print(
         f"{result.harness}: {result.cases} {'guided' if guided else 'random'} cases in "
         f"{result.seconds:.0f} s, slowest {result.slowest:.1f} s, biggest "
         f"{result.biggest / 1e6:.0f} MB: {kinds}",
         flush=True,
     )
-    for (kind, where, file), times in sorted(result.found.items()):
+    for (kind, where, file), times in sorted(result.findings.items()):
         print(f"  {kind}: {where}; {times} times, kept as {file}", flush=True)
 
 

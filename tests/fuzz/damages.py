@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
 from mcap.opcode import Opcode
 
 from tests.fixtures import broken
-from tests.fuzz.choices import Choices
+from tests.fuzz.changes import CHANGES, MOST, Choices, flip, near, number, overwrite
 from tests.fuzz.intact import Intact
 
-MOST: Final = 4
-"""Changes of one case."""
-LENGTHS: Final = (1, 2, 4, 8, 9, 31, 64, 300, 512, 2000, 4096)
-NUMBERS: Final = (0, 1, 8, 0x7F, 0xFF, 0xFFFF, 1 << 31, 1 << 32, 1 << 62, (1 << 64) - 1)
 CHUNK_HEAD: Final = (0, 1, 9, 17, 25, 33, 37, 41, 44, 45)
 """Where the parts of a chunk's head begin, whatever its compression is called."""
 FOOTER_CRC_FROM_END: Final = len(broken.MAGIC) + 4
@@ -31,9 +26,6 @@ class Damaged:
 
     data: bytes
     reached: frozenset[int] = frozenset()
-
-
-Change = Callable[[bytes, Choices], bytes]
 
 
 def damaged(intact: Intact, choices: Choices) -> Damaged:
@@ -59,67 +51,13 @@ def _place(intact: Intact, data: bytes, choices: Choices) -> int:
     return min(begin + choices.number(min(end - begin, 80)), max(len(data) - 1, 0))
 
 
-def _flip(data: bytes, at: int, choices: Choices) -> bytes:
-    if at >= len(data):
-        return data
-    return broken.over(data, at, bytes([data[at] ^ 1 << choices.number(8)]))
-
-
-def _overwrite(data: bytes, at: int, choices: Choices) -> bytes:
-    length = min(choices.of(LENGTHS), len(data) - at)
-    filling = choices.of((bytes(length), b"\xff" * length, None))
-    return broken.over(data, at, choices.bytes(length) if filling is None else filling)
-
-
-def _number(data: bytes, at: int, choices: Choices) -> bytes:
-    number, width = choices.of(NUMBERS), choices.of((1, 2, 4, 8))
-    packed = number.to_bytes(8, "little")[: min(width, len(data) - at)]
-    return broken.over(data, at, packed)
-
-
-def _near(data: bytes, at: int, choices: Choices) -> bytes:
-    """Make a number a little larger or smaller, as a length that is almost right."""
-    width = min(choices.of((4, 8)), len(data) - at)
-    by = choices.of((1, -1, 8, -8, 64, 256))
-    number = int.from_bytes(data[at : at + width], "little") + by
-    return broken.over(data, at, (number % (1 << 8 * width)).to_bytes(width, "little"))
-
-
-def _cut(data: bytes, at: int, choices: Choices) -> bytes:
-    return data[:at]
-
-
-def _remove(data: bytes, at: int, choices: Choices) -> bytes:
-    return data[:at] + data[at + choices.of(LENGTHS) :]
-
-
-def _insert(data: bytes, at: int, choices: Choices) -> bytes:
-    length = choices.of(LENGTHS)
-    other = choices.number(max(len(data), 1))
-    filling = choices.of((bytes(length), data[other : other + length], choices.bytes(8)))
-    return data[:at] + filling + data[at:]
-
-
-def _swap(data: bytes, at: int, choices: Choices) -> bytes:
-    """Exchange two blocks, as a file system that was not whole may."""
-    size = choices.of((64, 512, 4096))
-    first, second = sorted((at // size * size, choices.number(max(len(data), 1)) // size * size))
-    left, right = data[first : first + size], data[second : second + size]
-    if first == second or len(right) < size:
-        return data
-    return broken.over(broken.over(data, first, right), second, left)
-
-
-CHANGES: Final = (_flip, _flip, _overwrite, _number, _cut, _remove, _insert, _swap)
-
-
 def _heads(intact: Intact, choices: Choices) -> Damaged:
     """Change the kinds, lengths, times and checksums in the heads of records."""
     data = intact.data
     for _ in range(1 + choices.number(2)):
         opcode, begin, _ = choices.of(intact.records)
         at = choices.of(CHUNK_HEAD if opcode == Opcode.CHUNK else (0, 1))
-        data = choices.of((_near, _number, _flip))(data, begin + at, choices)
+        data = choices.of((near, number, flip))(data, begin + at, choices)
     return Damaged(data)
 
 
@@ -150,7 +88,7 @@ def _summary(intact: Intact, choices: Choices) -> Damaged:
     end = len(data) - FOOTER_CRC_FROM_END
     for _ in range(1 + choices.number(MOST)):
         at = begin + choices.number(end - begin)
-        change = choices.of((_flip, _number, _near, _overwrite))
+        change = choices.of((flip, number, near, overwrite))
         data = change(data[:end], at, choices) + data[end:]
     return Damaged(broken.mended(data))
 
@@ -167,7 +105,7 @@ def _inside(intact: Intact, choices: Choices) -> Damaged:
         begin, end = choices.of(places)
         head = 49 if data[begin] == Opcode.CHUNK else broken.HEAD
         at = begin + min(head + choices.number(end - begin), end - begin - 1)
-        change = choices.of((_flip, _number, _near, _overwrite))
+        change = choices.of((flip, number, near, overwrite))
         new = data[:begin] + change(data[begin:end], at - begin, choices) + data[end:]
         changed += [i for i in range(begin, end) if new[i] != data[i]]
         data = new
@@ -192,13 +130,13 @@ def _messages(intact: Intact, choices: Choices) -> Damaged:
     messages = list(intact.written.messages)
     reached = set()
     for _ in range(1 + choices.number(MOST)):
-        number = choices.number(len(messages))
-        message = messages[number]
-        reached.add(intact.frame_of(intact.written.messages[number].log_time))
-        data = message.data
-        at = choices.number(max(len(data), 1))
+        position = choices.number(len(messages))
+        message = messages[position]
+        reached.add(intact.frame_of(message.log_time))
+        at = choices.number(max(len(message.data), 1))
         if choices.number(3) == 0:
             at = min(at, choices.number(64))
-        messages[number] = replace(message, data=choices.of(CHANGES)(data, at, choices))
+        data = choices.of(CHANGES)(message.data, at, choices)
+        messages[position] = replace(message, data=data)
     changed = replace(intact, written=replace(intact.written, messages=tuple(messages)))
     return Damaged(changed.data, frozenset(reached))

@@ -8,8 +8,8 @@ import pytest
 
 from roadeval.errors import RoadevalError
 from tests.fuzz import campaign, harness
+from tests.fuzz.campaign import Job, case_of
 from tests.fuzz.harness import NAMES, Harness, Lost, harness_of, run_case
-from tests.fuzz.worker import Job, case_of
 
 SEED = 0
 
@@ -40,13 +40,6 @@ def outcome_of(check):
     return run_case(Harness(check, lambda: [b""]), b"")
 
 
-def raises(error):
-    def check(data):
-        raise error
-
-    return check
-
-
 @pytest.mark.parametrize(
     ("error", "kind"),
     [
@@ -58,7 +51,10 @@ def raises(error):
     ],
 )
 def test_an_error_that_is_not_known_is_a_finding(error, kind):
-    assert outcome_of(raises(error)).kind == kind
+    def check(data):
+        raise error
+
+    assert outcome_of(check).kind == kind
 
 
 def test_a_case_that_takes_long_or_much_is_one(monkeypatch):
@@ -89,6 +85,6 @@ def test_a_case_that_ends_its_process_is_kept_and_the_rest_is_tried(tmp_path, mo
     )
     result = campaign.run([Job("configurations", "", SEED, False, 4, 0)], tmp_path / "kept")
     assert result.cases == 4
-    assert [(kind, times) for (kind, _, _), times in result.found.items()] == [("died", 1)]
+    assert [(kind, times) for (kind, _, _), times in result.findings.items()] == [("died", 1)]
     (kept,) = (tmp_path / "kept").iterdir()
     assert kept.read_bytes() == fatal

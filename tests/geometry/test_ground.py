@@ -18,12 +18,14 @@ from roadeval.geometry.settings import GroundSettings
 
 SIZE = 640, 480
 PLACES = np.random.default_rng(0).uniform([4, -6], [60, 6], (500, 2))
+FISHEYE = (-0.02, 0.003, -0.001, 0.0002)
 LENSES = {
     "plumb_bob": (-0.3, 0.1, 0.001, -0.002, 0.01),
     "rational_polynomial": (0.2, -0.1, 0.001, 0.0005, 0.02, 0.3, -0.05, 0.01),
-    "equidistant": (-0.02, 0.003, -0.001, 0.0002),
+    "equidistant": FISHEYE,
     "fisheye": (0.0, 0.0, 0.0, 0.0),
 }
+OPTICAL = Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 PRISM = (-0.2, 0.05, 0.001, 0.002, 0.01, 0.1, 0.0, 0.0, 0.01, -0.02, 0.01, 0.003)
 
 
@@ -37,8 +39,8 @@ def made(**settings: object) -> Ground:
 def pose(ground: Ground) -> tuple[float, ...]:
     """The height in metres; pitch and roll in degrees."""
     turn, origin = ground.axes()
-    optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
-    _, pitch, roll = Rotation.from_matrix(turn.T @ optical.T).as_euler("ZYX", degrees=True)
+    body = Rotation.from_matrix(turn.T) * OPTICAL.inv()
+    _, pitch, roll = body.as_euler("ZYX", degrees=True)
     return -(turn.T @ origin)[2], pitch, roll
 
 
@@ -107,16 +109,8 @@ def test_a_pixel_that_no_ray_reaches_lies_nowhere(model: str, numbers: tuple[flo
 @pytest.mark.parametrize(
     ("model", "numbers", "same"),
     [
-        (
-            "equidistant",
-            (-0.02, 0.003, -0.001, 0.0002, 0.0),
-            ("equidistant", LENSES["equidistant"]),
-        ),
-        (
-            "equidistant",
-            (*LENSES["equidistant"], *(0.0,) * 8),
-            ("equidistant", LENSES["equidistant"]),
-        ),
+        ("equidistant", (*FISHEYE, 0.0), ("equidistant", FISHEYE)),
+        ("equidistant", (*FISHEYE, *(0.0,) * 8), ("equidistant", FISHEYE)),
         ("equidistant", (-0.02,), ("equidistant", (-0.02, 0.0, 0.0, 0.0))),
         ("equidistant", (), ("equidistant", (0.0,) * 4)),
         ("Plumb_Bob ", (-0.3, 0.1), ("plumb_bob", (-0.3, 0.1, 0.0, 0.0))),
@@ -126,9 +120,7 @@ def test_a_pixel_that_no_ray_reaches_lies_nowhere(model: str, numbers: tuple[flo
         ("inverse_brown_conrady", (0.0,) * 5, ("", ())),
     ],
 )
-def test_zeros_may_follow_the_numbers_of_a_model_or_be_missing(
-    model: str, numbers: tuple[float, ...], same: tuple[str, tuple[float, ...]]
-):
+def test_zeros_may_follow_the_numbers_of_a_model_or_be_missing(model, numbers, same):
     seen = made(model=model, distortion=numbers, focal=(400.0,)).pixels(PLACES)
     expected = made(model=same[0], distortion=same[1], focal=(400.0,)).pixels(PLACES)
     assert seen == pytest.approx(expected, nan_ok=True)
@@ -165,21 +157,16 @@ def test_a_homography_is_what_four_corners_say():
     seen = made().pixels(places)
     found, _ = cv2.findHomography(seen, places)
     alone, _ = ground_of(None, GroundSettings(homography=tuple(found.ravel())), SIZE)
-    assert alone is not None
     assert alone.pixels(PLACES) == pytest.approx(made().pixels(PLACES), abs=1e-3)
     with pytest.raises(GroundError, match="homography alone"):
         alone.moved(pitch=1)
     settings = GroundSettings(homography=tuple(-7 * found.ravel()), focal=(560.0,))
     posed, _ = ground_of(None, settings, SIZE)
-    assert posed is not None
     assert pose(posed.moved()) == pytest.approx((1.3, 4, 2), abs=1e-4)
 
 
 def mounted(parent: str, at: tuple[float, ...], pitch: float, yaw: float = 0.0) -> Calibration:
-    optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
-    turn = Rotation.from_euler("ZYX", [yaw, pitch, 2.0], degrees=True) * Rotation.from_matrix(
-        optical
-    )
+    turn = Rotation.from_euler("ZYX", [yaw, pitch, 2.0], degrees=True) * OPTICAL
     mounting = Mounting(parent, at, tuple(turn.as_quat()))
     matrix = (560.0, 0, 319.5, 0, 560.0, 239.5, 0, 0, 1.0)
     return Calibration("/info", *SIZE, matrix, "plumb_bob", (0.0,) * 5, "cam", mounting)
@@ -188,7 +175,6 @@ def mounted(parent: str, at: tuple[float, ...], pitch: float, yaw: float = 0.0) 
 def test_transforms_give_angles_and_on_a_footprint_the_height():
     known = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4, yaw=30)
     ground, why = ground_of(known, GroundSettings(), SIZE)
-    assert ground is not None
     assert ground.pixels(PLACES) == pytest.approx(made().pixels(PLACES))
     expected = "camera 1.30 m above it, pitch 4.0\N{DEGREE SIGN} down, roll 2.0\N{DEGREE SIGN}"
     covers = "a pixel covers 0.14 m of the way 10 m ahead, 2.2 m at 40"
@@ -197,19 +183,16 @@ def test_transforms_give_angles_and_on_a_footprint_the_height():
 
 def test_what_a_file_says_replaces_what_the_log_says():
     known = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4)
-    given = GroundSettings(
-        height=1.5, pitch=3.0, roll=-1.0, model="plumb_bob", distortion=LENSES["plumb_bob"]
-    )
+    lens = {"model": "plumb_bob", "distortion": LENSES["plumb_bob"]}
+    given = GroundSettings(height=1.5, pitch=3.0, roll=-1.0, **lens)
     ground, _ = ground_of(known, given, SIZE)
-    assert ground is not None
     assert pose(ground) == pytest.approx((1.5, 3, -1))
     assert ground.distortion == LENSES["plumb_bob"]
 
 
 def test_a_centre_far_from_the_middle_is_told():
-    _, why = ground_of(
-        None, GroundSettings(height=1.3, pitch=4, focal=(560.0,), centre=(639.5, 479.5)), SIZE
-    )
+    given = GroundSettings(height=1.3, pitch=4, focal=(560.0,), centre=(639.5, 479.5))
+    _, why = ground_of(None, given, SIZE)
     assert "its centre, 639.5, 479.5, is far from the middle of 640x480 pixels" in why
 
 
@@ -217,6 +200,9 @@ def test_intrinsics_may_be_for_images_of_another_size():
     larger = made(size=(1280, 960), focal=(1120.0,), centre=(639.5, 479.5))
     assert larger.pixels(PLACES) == pytest.approx(made().pixels(PLACES))
     assert made(focal=(), fov=60.0).matrix[0] == pytest.approx(320 / math.tan(math.radians(30)))
+
+
+PLACED = {"height": 1.0, "pitch": 1.0, "fov": 60.0}
 
 
 @pytest.mark.parametrize(
@@ -229,38 +215,10 @@ def test_intrinsics_may_be_for_images_of_another_size():
         (None, {"height": 1.4, "fov": 60.0}, "missing: its pitch"),
         (None, {"fov": 60.0}, "the camera's height above the ground, and its pitch"),
         (None, {"height": 1.4, "pitch": -40.0, "fov": 60.0}, "it looks up"),
-        (
-            None,
-            {"height": 1.0, "pitch": 1.0, "fov": 60.0, "model": "mei", "distortion": (1.0,)},
-            "the distortion is not known: mei of 1 numbers",
-        ),
-        (
-            None,
-            {
-                "height": 1.0,
-                "pitch": 1.0,
-                "fov": 60.0,
-                "model": "radtan",
-                "distortion": (0.1,) * 14,
-            },
-            "the distortion is not known: radtan of 14 numbers",
-        ),
-        (
-            None,
-            {"height": 1.0, "pitch": 1.0, "fov": 60.0, "model": "double_sphere"},
-            "the distortion is not known: double_sphere of 0 numbers",
-        ),
-        (
-            None,
-            {
-                "height": 1.0,
-                "pitch": 1.0,
-                "fov": 60.0,
-                "model": "fisheye",
-                "distortion": (0.1,) * 5,
-            },
-            "the distortion is not known: fisheye of 5 numbers",
-        ),
+        (None, {"model": "mei", "distortion": (1.0,)} | PLACED, "not known: mei of 1 numbers"),
+        (None, {"model": "radtan", "distortion": (0.1,) * 14} | PLACED, "radtan of 14 numbers"),
+        (None, {"model": "double_sphere"} | PLACED, "double_sphere of 0 numbers"),
+        (None, {"model": "fisheye", "distortion": (0.1,) * 5} | PLACED, "fisheye of 5 numbers"),
     ],
 )
 def test_what_is_missing_is_said(known: Calibration | None, given: dict[str, float], said: str):

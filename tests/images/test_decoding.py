@@ -50,7 +50,6 @@ def test_a_format_with_loss_gives_pixels_near_by(name: str) -> None:
 def test_the_format_is_told_by_the_first_bytes_and_the_size_by_the_head(name: str) -> None:
     data = (EXACT | LOSSY)[name]
     format_ = format_of(data)
-    assert format_ is not None
     assert (format_.name, format_.exact) == (name, name in EXACT)
     assert size_of(data, LIMITS) == (WIDTH, HEIGHT)
 

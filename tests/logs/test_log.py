@@ -76,9 +76,7 @@ def test_log_times_or_the_order_take_the_place_of_zero_stamps(
 
 
 @pytest.mark.parametrize("kind", list(CompressionType))
-def test_chunks_too_big_for_memory_are_read_all_the_same(
-    tmp_path: Path, kind: CompressionType, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_chunks_too_big_for_memory_are_read_all_the_same(tmp_path, kind, monkeypatch):
     path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS, compression=kind)
     monkeypatch.setattr(records, "IN_MEMORY", 1000)
     monkeypatch.setattr(records, "BLOCK", 100)
@@ -90,9 +88,7 @@ def test_chunks_too_big_for_memory_are_read_all_the_same(
 
 
 @pytest.mark.parametrize("stamp", [2**63 - 1, 2**63, 10**40, -(10**40)])
-def test_a_stamp_beyond_all_clocks_cannot_be_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stamp: int
-) -> None:
+def test_a_stamp_beyond_all_clocks_cannot_be_read(tmp_path, monkeypatch, stamp):
     path = ros2_log(tmp_path / "drive.mcap", [("/cam", 1, compressed(1, jpeg(grey(9))))])
     with open_log(path) as log:
         camera = log.readers["/cam"]
@@ -131,9 +127,7 @@ def chunks_read(log: Log, monkeypatch: pytest.MonkeyPatch) -> set[int]:
 
 @pytest.mark.parametrize("apart", [1, 7])
 @pytest.mark.parametrize("delay", [0, 900])
-def test_labelled_frames_are_found_by_their_labels_alone(
-    tmp_path: Path, apart: int, delay: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_labelled_frames_are_found_by_their_labels_alone(tmp_path, apart, delay, monkeypatch):
     stamps = range(1000, 9000, 100)
     image, mask = jpeg(grey(9)), grey(0)
     mask[3:] = 255
@@ -161,9 +155,7 @@ def test_labelled_frames_are_found_by_their_labels_alone(
         FrameSettings(labelled=True, start="20001000ns", end="20002600ns"),
     ],
 )
-def test_labels_are_paired_only_within_the_range(
-    tmp_path: Path, frames: FrameSettings, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_labels_are_paired_only_within_the_range(tmp_path, frames, monkeypatch):
     monkeypatch.setattr(reader, "SMALL", 0)
     stamps = range(20_000_000, 20_024_000, 100)
     image, mask = jpeg(grey(9)), grey(0)
@@ -231,9 +223,7 @@ def two_cameras(path: Path, names: list[str]) -> Path:
 @pytest.mark.parametrize(
     "names", [["front", "rear"] * 6, ["front"] * 20 + ["rear"] * 4, ["a", "b", "c"] * 5]
 )
-def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(
-    tmp_path: Path, names: list[str]
-) -> None:
+def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, names):
     path = two_cameras(tmp_path / "a.mcap", names)
     _, frames = read(path)
     assert len(frames) == len(names)

@@ -76,9 +76,7 @@ def test_a_display_matrix_turns_each_pixel_to_its_place(quarters: int, flip: int
 
 @pytest.mark.parametrize("videos", shared("failures", "reality", "turned_video"))
 @pytest.mark.parametrize(("name", "turns"), [("quarter_turn", -1), ("upside_down", 2)])
-def test_pack_turns_a_video_as_players_do_and_says_so(
-    tmp_path: Path, videos: Path, name: str, turns: int
-) -> None:
+def test_pack_turns_a_video_as_players_do_and_says_so(tmp_path, videos, name, turns):
     shown = []
     for each in ("plain", name):
         packed = pack(videos / f"{each}.mp4", tmp_path / f"{each}.mcap")
@@ -114,9 +112,7 @@ def test_a_replay_turns_images_unless_it_is_asked_not_to_and_says_both(tmp_path:
 
 
 @pytest.mark.parametrize("resize", [False, True])
-def test_no_label_is_scaled_whose_width_and_height_are_exchanged(
-    tmp_path: Path, resize: bool
-) -> None:
+def test_no_label_is_scaled_whose_width_and_height_are_exchanged(tmp_path, resize):
     config = LogConfig(topics=TopicSettings(resize_truth=resize))
     with (
         open_log(drive(tmp_path, 6), config) as log,

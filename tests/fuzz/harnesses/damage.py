@@ -16,7 +16,7 @@ still decodes, it is taken for what was logged. Of such frames only the limits a
 
 from __future__ import annotations
 
-from tests.fuzz.choices import Choices
+from tests.fuzz.changes import Choices
 from tests.fuzz.damages import Damaged, damaged
 from tests.fuzz.harness import Harness, Lost, Wrong, scratch
 from tests.fuzz.intact import SAID, UNSAID, Intact, Reading, Seen, intact_logs, read

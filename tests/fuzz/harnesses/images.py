@@ -23,7 +23,7 @@ from roadeval.logs.messages.pictures import (
 )
 from roadeval.logs.messages.pixels import FORMATS, to_labels, to_rgb
 from tests.fixtures.flavours import FLAVOURS, NoEncoderError, file_of, scenes
-from tests.fuzz.choices import Choices
+from tests.fuzz.changes import Choices
 from tests.fuzz.harness import Harness
 
 FILE, RAW = b"\xff", b"\xfe"

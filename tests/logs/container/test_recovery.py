@@ -318,9 +318,7 @@ rosbag2_bagfile_information:
         ("a_0.mcap a_1.mcap", "renamed.mcap", ""),
     ],
 )
-def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(
-    tmp_path: Path, listed: str, there: str, told: str
-) -> None:
+def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(tmp_path, listed, there, told):
     for name in there.split():
         (tmp_path / name).write_bytes(LOGS["broken/ok.mcap"].data())
     for end in ("\n", "\r\n"):

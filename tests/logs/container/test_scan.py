@@ -144,9 +144,7 @@ COMPRESSED_ZEROS = {
 
 
 @pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
-def test_zeros_in_place_of_records_are_told_and_not_walked_through(
-    tmp_path: Path, compression: str
-) -> None:
+def test_zeros_in_place_of_records_are_told_and_not_walked_through(tmp_path, compression):
     path = tmp_path / "log.mcap"
     with_chunk(path, compression, COMPRESSED_ZEROS[compression], SIZE)
     assert kept(path) == [*range(FRAMES)]
@@ -155,9 +153,7 @@ def test_zeros_in_place_of_records_are_told_and_not_walked_through(
 
 
 @pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
-def test_a_chunk_that_grows_beyond_all_bounds_is_given_up(
-    tmp_path: Path, compression: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_chunk_that_grows_beyond_all_bounds_is_given_up(tmp_path, compression, monkeypatch):
     monkeypatch.setattr("roadeval.logs.container.records.LARGEST_CHUNK", 10 << 20)
     path = tmp_path / "log.mcap"
     with_chunk(path, compression, COMPRESSED_ZEROS[compression], SIZE)

@@ -121,9 +121,7 @@ def test_fields_of_another_type_than_an_image_has_are_refused() -> None:
         ("cbor", schema("foxglove.CompressedImage", ""), b""),
     ],
 )
-def test_what_cannot_be_read_is_refused(
-    encoding: str, described: Schema | None, data: bytes
-) -> None:
+def test_what_cannot_be_read_is_refused(encoding, described, data):
     with pytest.raises(BadMessage):
         read(encoding, described, data)
 

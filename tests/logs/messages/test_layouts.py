@@ -1,5 +1,6 @@
 """Calibrations and transforms, read by the layouts of their names whatever the schemas' texts."""
 
+import re
 import struct
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from foxglove_schemas_flatbuffer import CameraCalibration, FrameTransform, Quaternion, Vector3
 
+from benchmarks.long_logs import MESSAGES
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import decoder_for
 from tests.logs.messages.test_decoders import channel, schema
@@ -17,15 +19,9 @@ P = [70.0, 0, 47, 0, 0, 71, 35, 0, 0, 0, 1, 0]
 STAMP: list[Any] = [5, 7]
 INFO = [*STAMP, "cam", 72, 96, "plumb_bob", 5, *D, *K, *K, *P, 2, 3, 1, 2, 30, 40, True]
 TRANSFORM = [1, *STAMP, "base_link", "cam", 1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8]
-UPPER = (
-    "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] D\n"
-    "float64[9] K\nfloat64[9] R\nfloat64[12] P\nuint32 binning_x\nuint32 binning_y\n"
-    f"sensor_msgs/RegionOfInterest roi\n{'=' * 80}\nMSG: std_msgs/Header\n"
-    f"builtin_interfaces/Time stamp\nstring frame_id\n{'=' * 80}\n"
-    f"MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n{'=' * 80}\n"
-    "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\n"
-    "uint32 width\nbool do_rectify\n"
-)
+TEXT = MESSAGES["sensor_msgs/msg/CameraInfo"]
+UPPER = re.sub(r"(?<=\] )[dkrp]$", lambda name: name[0].upper(), TEXT, flags=re.MULTILINE)
+"""The text with D, K, R and P, as rosbags-convert 0.11.9 writes it."""
 
 
 def packed(values: list[Any], kind: int = 1, *, ros1: bool = False) -> bytes:

@@ -36,9 +36,7 @@ def test_its_size_is_known_before_the_first_frame(log: Path) -> None:
 
 
 @pytest.mark.parametrize("log", VIDEOS, indirect=True)
-def test_a_start_amid_the_video_begins_at_the_keyframe_before(
-    log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_start_amid_the_video_begins_at_the_keyframe_before(log, monkeypatch):
     whole = frames(log)
     monkeypatch.setattr("roadeval.logs.messages.pictures.PATIENCE", 2)
     with open_log(log) as opened:
@@ -126,9 +124,7 @@ class Missing:
         ("av1", "pts"),
     ],
 )
-def test_what_builds_upon_a_packet_that_is_missing_is_lost(
-    codec: str, counted: bool, lost: int
-) -> None:
+def test_what_builds_upon_a_packet_that_is_missing_is_lost(codec, counted, lost):
     """FFmpeg 7 conceals a missing reference of H.264 and VP9, and raises and flags nothing."""
     missing = Missing(codec, lost, counted=counted)
     video, found = Video(missing, Limits()), []

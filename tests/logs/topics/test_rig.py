@@ -75,9 +75,7 @@ def test_of_two_truths_the_cameras_own_is_taken(tmp_path: Path) -> None:
         ({"/cam0/image": ""}, {"/cam1/labels": ""}, False),
     ],
 )
-def test_the_only_camera_takes_a_truth_that_names_no_other(
-    tmp_path: Path, camera: dict[str, str], labels: dict[str, str], belong: bool
-) -> None:
+def test_the_only_camera_takes_a_truth_that_names_no_other(tmp_path, camera, labels, belong):
     path, (image,), (label,) = rig(tmp_path, camera, labels), camera, labels
     if belong:
         assert truth(path, image) == label
