@@ -1,5 +1,6 @@
 """Small logs for the tests, written by the MCAP project's own writers."""
 
+import struct
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,7 @@ def drive(
 ) -> Path:
     """A log of images whose level is their position, and of 0/255 masks, at these stamps."""
     messages = [
-        ("/camera", stamp, compressed(stamp, jpeg(grey(20 * level))))
+        ("/camera", stamp, compressed(stamp, jpeg(grey(20 * level % 256))))
         for level, stamp in enumerate(stamps)
     ]
     mask = grey(0)
@@ -134,3 +135,10 @@ def small_log(path: Path, container: str) -> dict[int, bytes]:
             writer.add_message(2, stamp + 5, encoders[1](label), stamp)
         writer.finish()
     return images
+
+
+def chunk_record(data: bytes, compression: str, size: int, crc: int = 0, start: int = 0) -> bytes:
+    """A chunk of compressed data that claims to hold so many bytes, of one time."""
+    head = struct.pack("<QQQII", start, start, size, crc, len(compression)) + compression.encode()
+    body = head + struct.pack("<Q", len(data)) + data
+    return b"\x06" + struct.pack("<Q", len(body)) + body

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from mcap.opcode import Opcode
 
-from tests.fixtures.broken import HEAD, data_end, length_of, mended, over
+from tests.fixtures.broken import HEAD, data_end, length_of, mended, over, records
 from tests.fuzz.intact import FRAMES, Intact, Reading, intact_logs, read
 
 START, SIZE, DATA_SIZE, NAME = 9, 25, 41, 37
@@ -16,9 +16,9 @@ letters, that of its data; and the length of that name."""
 Damage = Callable[[Intact], bytes]
 
 
-def places(log: Intact, opcode: int) -> list[int]:
+def places(log: Intact, opcode: Opcode) -> list[int]:
     """Return where records of a kind begin."""
-    return [begin for kind, begin, _ in log.records if kind == opcode]
+    return list(records(log.data, opcode))
 
 
 def more(data: bytes, at: int, by: int, width: int = 8) -> bytes:
@@ -64,7 +64,8 @@ def first_bytes_missing(log: Intact) -> bytes:
     return log.data[8:]
 
 
-def all_before_the_first_chunk_missing(log: Intact) -> bytes:
+def beginning_missing(log: Intact) -> bytes:
+    """Leave out all before the first chunk."""
     return log.data[places(log, Opcode.CHUNK)[0] :]
 
 
@@ -85,9 +86,8 @@ def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[i
     path = tmp_path / "drive.mcap"
     path.write_bytes(damage(log))
     reading = read(path)
-    other = [log.number_of(time) for time in log.frames if (time, log.frames[time]) not in
-             reading.frames]  # fmt: skip
-    return reading, other
+    frames = log.frames.items()
+    return reading, [log.number_of(frame[0]) for frame in frames if frame not in reading.frames]
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[i
         ("no_index", head_twice, "8 bytes too many"),
         ("no_index", channel_in_the_summary, ""),
         ("unfinished", first_bytes_missing, "never finished"),
-        ("unfinished", all_before_the_first_chunk_missing, "never finished"),
+        ("unfinished", beginning_missing, "never finished"),
         ("uncompressed", channel_in_the_summary, ""),
         ("uncompressed", number_of_labels_in_the_summary, ""),
     ],
@@ -128,9 +128,8 @@ def test_no_message_of_a_chunk_whose_checksum_cannot_be_right_is_read(tmp_path, 
         return over(data, mask, bytes([data[mask] ^ 7]))
 
     reading, other = beside(log, tmp_path, damage)
-    touched = {log.number_of(time) for time in log.frames if any(
-        begin == at for begin, _ in log.blocks[time])}  # fmt: skip
-    assert set(other) <= touched
+    touched = [time for time, blocks in log.blocks.items() if at in (begin for begin, _ in blocks)]
+    assert set(other) <= set(map(log.number_of, touched))
     assert reading.told
     assert all(frame == log.frames[time] for time, frame in reading.frames if frame.truth)
 
@@ -142,4 +141,4 @@ def test_an_unchunked_log_whose_data_hides_its_topics_is_read_by_the_summarys_re
 
     reading, other = beside(intact_logs()["unchunked"], tmp_path, damage)
     assert not other
-    assert any("512 bytes too many" in each for each in reading.told)
+    assert "512 bytes too many" in " ".join(reading.told)

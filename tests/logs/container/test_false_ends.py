@@ -1,28 +1,14 @@
 """A file whose end says other things than what lies before it, or whose chunks do not add up."""
 
-from pathlib import Path
-
 import pytest
 from mcap.opcode import Opcode
 
-from roadeval.logs.log import Log, open_log
+from roadeval.logs.log import open_log
 from tests.fixtures import broken
 from tests.fixtures.broken import HEAD, chunk, data_end, good, length_of, mended, over, records
 
 LENGTH_AT = HEAD + 8 + 8 + 8
 """Where a chunk index has the length of its chunk."""
-
-
-def opened(folder: Path, data: bytes) -> Log:
-    path = folder / "drive.mcap"
-    path.write_bytes(data)
-    return open_log(path)
-
-
-def losses(folder: Path, data: bytes) -> str:
-    with opened(folder, data) as log:
-        log.verify()
-        return " | ".join(log.losses)
 
 
 def without(number: int, data: bytes) -> bytes:
@@ -36,42 +22,52 @@ def test_an_index_of_a_chunk_that_cannot_be_so_long_is_not_followed(tmp_path, le
     """One of no length would lead back to its own chunk, again and again."""
     data = good()
     at = next(records(data, Opcode.CHUNK_INDEX))
-    data = mended(over(data, at + LENGTH_AT, length.to_bytes(8, "little")))
-    with opened(tmp_path, data) as log:
+    path = tmp_path / "drive.mcap"
+    path.write_bytes(mended(over(data, at + LENGTH_AT, length.to_bytes(8, "little"))))
+    with open_log(path) as log:
         assert log.topics[0].count == broken.FRAMES
 
 
-def test_a_chunk_that_is_left_out_is_told_though_all_others_are_sound(tmp_path):
-    data = good()
-    missing = length_of(data, chunk(3, data))
-    told = losses(tmp_path, without(3, data))
-    assert f"{missing} bytes are missing before it" in told
+def left_out() -> tuple[bytes, str]:
+    """Leave a chunk out though all others are sound."""
+    return without(3, good()), f"{length_of(good(), chunk(3, good()))} bytes are missing before it"
 
 
-def test_a_chunk_that_is_there_twice_is_told(tmp_path):
-    data = good()
-    at = chunk(3, data)
-    more = length_of(data, at)
-    assert f"{more} bytes too many lie before it" in losses(
-        tmp_path, data[: at + more] + data[at : at + more] + data[at + more :]
-    )
+def repeated() -> tuple[bytes, str]:
+    data, at = good(), chunk(3, good())
+    length = length_of(data, at)
+    return data[:at] + data[at : at + length] + data[at:], f"{length} bytes too many lie before it"
 
 
-def test_without_an_end_the_counts_behind_the_data_tell_what_is_missing(tmp_path):
-    told = losses(tmp_path, without(3, good())[:-20])
-    assert "lost: 2 of /cam/image/compressed" in told
+def without_an_end() -> tuple[bytes, str]:
+    """Leave counts behind the data, which tell what is missing."""
+    return without(3, good())[:-20], "lost: 2 of /cam/image/compressed"
 
 
-def test_without_a_summary_a_wrong_checksum_of_all_data_is_a_loss(tmp_path):
+def without_a_summary() -> tuple[bytes, str]:
+    """Leave only the checksum of all data, which is wrong."""
     data = broken.log(enable_data_crcs=True).bytes()
     end = data_end(data)
     damaged = without(3, data[: end + length_of(data, end)])
-    assert "nothing tells which messages are wrong or missing" in losses(tmp_path, damaged)
+    return damaged, "nothing tells which messages are wrong or missing"
 
 
-def test_a_chunk_whose_records_do_not_add_up_is_told_though_its_checksum_is_right(tmp_path):
+def of_wrong_records() -> tuple[bytes, str]:
+    """Change a length in a chunk under a checksum that is right."""
     data = broken.log(use_statistics=False, compression=broken.CompressionType.NONE).bytes()
-    at = chunk(3, data)
-    inside = next(at for at in broken.inside(data, at) if data[at] == Opcode.MESSAGE)
-    damaged = mended(over(data, inside + broken.LENGTH_AT, broken.ABSURD))
-    assert "records do not add up" in losses(tmp_path, damaged)
+    places = broken.inside(data, chunk(3, data))
+    message = next(at for at in places if data[at] == Opcode.MESSAGE)
+    damaged = mended(over(data, message + broken.LENGTH_AT, broken.ABSURD))
+    return damaged, "records do not add up"
+
+
+@pytest.mark.parametrize(
+    "damage", [left_out, repeated, without_an_end, without_a_summary, of_wrong_records]
+)
+def test_a_chunk_that_is_missing_repeated_or_wrong_is_told(tmp_path, damage):
+    data, told = damage()
+    path = tmp_path / "drive.mcap"
+    path.write_bytes(data)
+    with open_log(path) as log:
+        log.verify()
+        assert told in " | ".join(log.losses)
