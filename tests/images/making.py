@@ -29,6 +29,13 @@ def file(format_: str, image: npt.NDArray[Any] | None = None, **options: Any) ->
     return made.getvalue()
 
 
+def oriented(orientation: int) -> Image.Exif:
+    """Return EXIF data that asks for a turn."""
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    return exif
+
+
 EXACT: Final = {
     "PNG": file("PNG"),
     "WebP without loss": file("WEBP", lossless=True),

@@ -1,11 +1,9 @@
 """Image files to arrays; damage and size are told before anything else."""
 
-import io
 from contextlib import suppress
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from roadeval.images.decoding import palette_indices, size_of, to_labels, to_rgb
 from roadeval.images.formats import ImageError, Limits, format_of
@@ -17,6 +15,7 @@ from tests.images.making import (
     by_opencv,
     file,
     jpeg_of_size,
+    oriented,
     png_of_size,
     scene,
     zeroed,
@@ -28,11 +27,10 @@ LIMITS = Limits()
 JPEG, PNG = LOSSY["JPEG"], EXACT["PNG"]
 
 
-def turned() -> bytes:
-    """Return a JPEG whose EXIF data asks for a quarter turn."""
-    exif = Image.Exif()
-    exif[0x112] = 6
-    return file("JPEG", exif=exif)
+def with_byte(behind: int, value: int) -> bytes:
+    """Return a JPEG with another byte behind the mark of its frame's head."""
+    at = JPEG.index(b"\xff\xc0") + behind
+    return JPEG[:at] + bytes([value]) + JPEG[at + 1 :]
 
 
 @pytest.mark.parametrize("name", EXACT)
@@ -62,7 +60,7 @@ def test_the_format_is_told_by_the_first_bytes_and_the_size_by_the_head(name: st
         file("JPEG", restart_marker_blocks=2),
         file("JPEG", scene()[..., 0]),
         file("JPEG", np.dstack([scene(), scene()[..., :1]])[..., :3], keep_rgb=True),
-        turned(),
+        file("JPEG", exif=oriented(6)),
         JPEG + b"padding of a camera" * 300,
     ],
     ids=["444", "422", "420", "progressive", "restart", "grey", "rgb", "turned", "padded"],
@@ -79,14 +77,27 @@ def test_sixteen_bits_keep_the_upper_half() -> None:
         assert to_labels(data, LIMITS).tolist() == samples.tolist()
 
 
-def test_whole_numbers_of_thirty_two_bits_keep_their_sign_and_size() -> None:
-    data = file("TIFF", np.array([[70_000, -1]], np.int32))
-    assert to_labels(data, LIMITS).tolist() == [[70_000, -1]]
+CLEAR, BLACK, WHITE = (255, 255, 255, 0), (0, 0, 0, 0), (255, 255, 255, 255)
 
 
-def test_a_mask_of_one_bit_is_black_and_white() -> None:
-    mask = np.array([[True, False]])
-    assert to_labels(file("PNG", mask), LIMITS).tolist() == [[255, 0]]
+@pytest.mark.parametrize(
+    ("name", "pixels", "labels"),
+    [
+        ("TIFF", np.array([[70_000, -1]], np.int32), [70_000, -1]),
+        ("PNG", np.array([[True, False]]), [255, 0]),
+        # One colour is the mask of its opacity; two count if their opacity says the same.
+        ("PNG", np.array([[CLEAR, WHITE]], np.uint8), [0, 255]),
+        ("PNG", np.array([[BLACK, WHITE]], np.uint8), [0, 255]),
+    ],
+)
+def test_labels_keep_sign_size_and_opacity(name, pixels, labels) -> None:
+    assert to_labels(file(name, pixels), LIMITS).tolist() == [labels]
+
+
+def test_a_label_image_whose_opacity_says_more_than_its_colours_is_refused() -> None:
+    data = file("PNG", np.array([[BLACK, WHITE, CLEAR]], np.uint8))
+    with pytest.raises(ImageError, match="one colour is transparent in parts: save it without"):
+        to_labels(data, LIMITS)
 
 
 @pytest.mark.parametrize("name", [*EXACT, *LOSSY])
@@ -96,21 +107,17 @@ def test_half_a_file_is_damaged(name: str) -> None:
         to_rgb(data[: len(data) // 2], LIMITS)
 
 
-def test_a_jpeg_of_twelve_bits_is_called_so() -> None:
-    data = bytearray(LOSSY["JPEG"])
-    data[data.index(b"\xff\xc0") + 4] = 12
-    with pytest.raises(ImageError, match="a JPEG of 12 bits a sample, which is not read"):
-        to_rgb(bytes(data), LIMITS)
-
-
-def test_a_jpeg_without_its_end_is_damaged() -> None:
-    with pytest.raises(ImageError, match="Premature end"):
-        to_rgb(JPEG[:-2], LIMITS)
-
-
-def test_a_jpeg_damaged_inside_is_told() -> None:
-    data = zeroed(JPEG, 1500)
-    with pytest.raises(ImageError, match=r"a damaged JPEG \(Corrupt JPEG data"):
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (with_byte(4, 12), "a JPEG of 12 bits a sample, which is not read"),
+        (with_byte(11, 0x31), "rare chroma subsampling"),
+        (JPEG[:-2], "Premature end"),
+        (zeroed(JPEG, 1500), r"a damaged JPEG \(Corrupt JPEG data"),
+    ],
+)
+def test_a_jpeg_that_is_damaged_or_not_read_is_told(data: bytes, why: str) -> None:
+    with pytest.raises(ImageError, match=why):
         to_rgb(data, LIMITS)
 
 
@@ -119,15 +126,6 @@ def test_a_flipped_bit_of_a_png_is_told_wherever_it_lies(at: int) -> None:
     data = bytearray(PNG)
     data[at] ^= 8
     with pytest.raises(ImageError, match="a damaged PNG"):
-        to_rgb(bytes(data), LIMITS)
-
-
-def test_a_jpeg_of_a_subsampling_that_is_not_read_is_refused() -> None:
-    data = bytearray(JPEG)
-    factors = data.index(b"\xff\xc0") + 11
-    assert data[factors] == 0x22
-    data[factors] = 0x31
-    with pytest.raises(ImageError, match="rare chroma subsampling"):
         to_rgb(bytes(data), LIMITS)
 
 
@@ -165,25 +163,3 @@ def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded() -> None:
     for read in (to_rgb, to_labels):
         with pytest.raises(ImageError, match="a JPEG of more than 100 scans"):
             read(memoryview(progressive[:-2] + 100 * scan + progressive[-2:]), LIMITS)
-
-
-def rgba(rows: list[list[tuple[int, int, int, int]]]) -> bytes:
-    file = io.BytesIO()
-    Image.fromarray(np.array(rows, np.uint8), "RGBA").save(file, "png")
-    return file.getvalue()
-
-
-def test_a_label_image_of_one_colour_is_the_mask_of_its_opacity() -> None:
-    data = rgba([[(255, 255, 255, 0), (255, 255, 255, 255)]])
-    assert to_labels(data, Limits()).tolist() == [[0, 255]]
-
-
-def test_colours_of_a_label_image_count_where_opacity_says_the_same() -> None:
-    data = rgba([[(0, 0, 0, 0), (255, 255, 255, 255)]])
-    assert to_labels(data, Limits()).tolist() == [[0, 255]]
-
-
-def test_a_label_image_whose_opacity_says_more_than_its_colours_is_refused() -> None:
-    data = rgba([[(0, 0, 0, 0), (255, 255, 255, 255), (255, 255, 255, 0)]])
-    with pytest.raises(ImageError, match="one colour is transparent in parts: save it without"):
-        to_labels(data, Limits())

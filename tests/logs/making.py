@@ -12,6 +12,10 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2._dynamic import serialize_dynamic
 from mcap_ros2.writer import Writer as Ros2Writer
 
+from roadeval.data import Frame
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import FrameSettings, LogConfig
+
 SECOND = 1_000_000_000
 
 HEADER = """std_msgs/Header header
@@ -116,6 +120,12 @@ CONTAINERS: dict[str, dict[str, Any]] = {
     "uncompressed": {"compression": CompressionType.NONE},
     "unchunked": {"use_chunking": False},
 }
+
+
+def frames(path: Path, **settings: Any) -> list[Frame]:
+    """Decode the frames of a log."""
+    with open_log(path, LogConfig(frames=FrameSettings(**settings))) as log:
+        return [frame.decode() for frame in log.frames(log.select())]
 
 
 def small_log(path: Path, container: str) -> dict[int, bytes]:

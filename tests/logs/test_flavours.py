@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from roadeval.data import Frame
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.log import open_log
 from tests.fixtures.flavours import FLAVOURS, scenes
 from tests.fixtures.shared import both, shared
+from tests.logs.making import frames
 
 Rgb = npt.NDArray[np.uint8]
 
@@ -26,11 +26,6 @@ def cases(*shows: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("log", both("flavours", *names), indirect=True)
 
 
-def frames(path: Path) -> list[Frame]:
-    with open_log(path) as log:
-        return [frame.decode() for frame in log.frames(log.select())]
-
-
 def expected(log: Path, *, grey: bool) -> list[Rgb]:
     """Return the frames that a log was made from: those beside it, or ours."""
     beside = sorted(log.parent.glob("expected_*.png"))
@@ -38,10 +33,6 @@ def expected(log: Path, *, grey: bool) -> list[Rgb]:
     if not grey:
         return found
     return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)[..., None].repeat(3, axis=2) for rgb in found]
-
-
-def error(found: Rgb, wanted: Rgb) -> float:
-    return float(np.abs(found.astype(int) - wanted).mean())
 
 
 @pytest.mark.parametrize("folder", shared("mcap", "flavours"))
@@ -54,7 +45,7 @@ def test_frames_are_those_expected(log: Path) -> None:
     flavour, found = FLAVOURS[log.stem], frames(log)
     assert len(found) == 5
     for frame, wanted in zip(found, expected(log, grey=flavour.shows == "grey"), strict=True):
-        assert error(frame.image, wanted) <= flavour.error
+        assert np.abs(frame.image.astype(int) - wanted).mean() <= flavour.error
 
 
 @cases("colour", "grey", "video")

@@ -1,30 +1,26 @@
 """Video in a log: frames that need the frames before them."""
 
+from collections.abc import Collection
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from roadeval.data import Frame
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import FrameError
 from roadeval.logs.log import open_log
 from roadeval.logs.messages.encoding import TopicKind
-from roadeval.logs.messages.pictures import CompressedPicture, Picture, Video, is_keyframe
+from roadeval.logs.messages.pictures import CompressedPicture, Video, is_keyframe
 from roadeval.logs.settings import FrameSettings, LabelPlace, LabelSettings, LogConfig
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar, packets
 from tests.fixtures.shared import both
-from tests.logs.making import compressed, png, ros2_log
+from tests.logs.making import compressed, frames, png, ros2_log
 
 H264 = "fox_pb_CompressedVideo_h264.mcap"
 VIDEOS = both("flavours", H264, "fox_pb_CompressedVideo_vp9.mcap")
-
-
-def frames(path: Path, **asked: Any) -> list[Frame]:
-    with open_log(path, LogConfig(frames=FrameSettings(**asked))) as log:
-        return [frame.decode() for frame in log.frames(log.select())]
+of_h264 = pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
 
 
 @pytest.mark.parametrize("log", VIDEOS, indirect=True)
@@ -47,96 +43,69 @@ def test_a_start_amid_the_video_begins_at_the_keyframe_before(log, monkeypatch):
     assert np.array_equal(late[0].image, whole[7].image)
 
 
-class Packets:
-    """The packets of a log, some of them lost."""
+class Packets(list[CompressedPicture]):
+    """The packets of a video, some of which cannot be read."""
 
-    def __init__(self, path: Path, lost: set[int]) -> None:
-        self.lost = lost
-        with open_log(path) as log:
-            stream = log.frames(log.select())
-            self.packets: list[Picture] = [
-                CompressedPicture(f.stamp_ns, "h264", f.decode().payload) for f in stream
-            ]
+    lost: Collection[int] = ()
 
-    def __len__(self) -> int:
-        return len(self.packets)
-
-    def picture(self, position: int) -> Picture:
+    def picture(self, position: int) -> CompressedPicture:
         if position in self.lost:
             raise FrameError("a chunk whose checksum is wrong")
-        return self.packets[position]
+        return self[position]
+
+
+def packets_of(path: Path, *lost: int) -> Packets:
+    """Return the packets of a log, some of them lost."""
+    with open_log(path) as log:
+        stream = log.frames(log.select())
+        found = Packets(CompressedPicture(f.stamp_ns, "h264", f.decode().payload) for f in stream)
+    found.lost = lost
+    return found
 
 
 def readable(packets: Packets) -> list[int]:
     video, found = Video(packets, Limits()), []
     for position in range(len(packets)):
-        try:
+        with suppress(FrameError):
             video.picture(position)
-        except FrameError:
-            continue
-        found.append(position)
+            found.append(position)
     return found
 
 
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+@of_h264
 def test_frames_that_build_upon_a_lost_one_are_lost_until_the_next_keyframe(log: Path) -> None:
-    keyframes = [i for i, packet in enumerate(Packets(log, set()).packets) if is_keyframe(packet)]
+    keyframes = [i for i, packet in enumerate(packets_of(log)) if is_keyframe(packet)]
     assert keyframes[0] == 0
-    following = [frame for frame in keyframes if frame > 3]
-    resumed = range(following[0], 12) if following else []
-    assert readable(Packets(log, set())) == list(range(12))
-    assert readable(Packets(log, {3})) == [0, 1, 2, *resumed]
+    resumed = next((frame for frame in keyframes if frame > 3), 12)
+    assert readable(packets_of(log)) == list(range(12))
+    assert readable(packets_of(log, 3)) == [0, 1, 2, *range(resumed, 12)]
 
 
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+@of_h264
 def test_a_video_without_its_keyframe_is_not_guessed_at(log: Path) -> None:
-    packets = Packets(log, {0})
     with pytest.raises(FrameError, match=r"keyframe|builds upon"):
-        Video(packets, Limits()).picture(1)
+        Video(packets_of(log, 0), Limits()).picture(1)
 
 
-class Missing:
-    """The packets of a video without one of them, of which no message is left."""
-
-    def __init__(self, codec: str, lost: int, *, counted: bool) -> None:
-        self.left = [number for number in range(VIDEO_FRAMES) if number != lost]
-        data = packets(codec)
-        self.packets = [
-            CompressedPicture(n, codec, data[n], "", n if counted else None) for n in self.left
-        ]
-
-    def __len__(self) -> int:
-        return len(self.packets)
-
-    def picture(self, position: int) -> Picture:
-        return self.packets[position]
+def numbered(codec: str, *, counted: bool) -> Packets:
+    """Return the packets of a video, whose stamps are their numbers."""
+    data = enumerate(packets(codec))
+    return Packets(CompressedPicture(n, codec, it, "", n if counted else None) for n, it in data)
 
 
 @pytest.mark.parametrize("lost", range(VIDEO_FRAMES))
 @pytest.mark.parametrize(
     ("codec", "counted"),
-    [
-        ("h264", ""),
-        ("h264", "log"),
-        ("vp9", "pts"),
-        ("vp9", "log"),
-        ("h265", "log"),
-        ("av1", "pts"),
-    ],
+    [("h264", False), ("h264", True), ("vp9", True), ("h265", True), ("av1", True)],
 )
 def test_what_builds_upon_a_packet_that_is_missing_is_lost(codec, counted, lost):
     """FFmpeg 7 conceals a missing reference of H.264 and VP9, and raises and flags nothing."""
-    missing = Missing(codec, lost, counted=counted)
-    video, found = Video(missing, Limits()), []
-    for position, number in enumerate(missing.left):
-        try:
-            video.picture(position)
-        except FrameError:
-            continue
-        found.append(number)
-    whole = Missing(codec, VIDEO_FRAMES, counted=counted).packets
-    keys = (n for n in range(lost + 1, VIDEO_FRAMES) if is_keyframe(whole[n]))
-    assert found == [*range(lost), *range(next(keys, VIDEO_FRAMES), VIDEO_FRAMES)]
+    left = numbered(codec, counted=counted)
+    keys = (n for n in range(lost + 1, VIDEO_FRAMES) if is_keyframe(left[n]))
+    resumed = next(keys, VIDEO_FRAMES)
+    del left[lost]
+    found = [left[position].stamp_ns for position in readable(left)]
+    assert found == [*range(lost), *range(resumed, VIDEO_FRAMES)]
 
 
 CODECS = [f"made:flavours/fox_pb_CompressedVideo_{codec}.mcap" for codec in ENCODERS]
@@ -151,9 +120,9 @@ def test_every_codec_is_decoded_from_any_frame(log: Path) -> None:
     assert all(np.array_equal(a.image, b.image) for a, b in zip(late, found[6:], strict=True))
 
 
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+@of_h264
 def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(log: Path) -> None:
-    whole = bytes(Packets(log, set()).packets[0].data)
+    whole = bytes(packets_of(log)[0].data)
     parameters = whole[: whole.index(b"\x00\x00\x01\x65")]
     assert is_keyframe(CompressedPicture(0, "h264", parameters))
     assert not is_keyframe(CompressedPicture(0, "h264", b"no video"))
@@ -161,15 +130,15 @@ def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(log: Path) -> N
 
 def damaged_at(log: Path, number: int) -> Packets:
     """Return the packets of a log, the second half of one of them with wrong bytes."""
-    packets = Packets(log, set())
-    data = bytes(packets.packets[number].data)
+    packets = packets_of(log)
+    data = bytes(packets[number].data)
     half = len(data) // 2
     data = data[:half] + b"U" * (len(data) - half)
-    packets.packets[number] = CompressedPicture(number, "h264", data)
+    packets[number] = CompressedPicture(number, "h264", data)
     return packets
 
 
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+@of_h264
 def test_a_damaged_frame_and_those_that_build_upon_it_are_told(log: Path) -> None:
     video = Video(damaged_at(log, 2), Limits())
     assert all(video.picture(number).pixels.any() for number in range(2))
@@ -207,14 +176,12 @@ def encoded(pictures: list[np.ndarray], bf: int) -> list[tuple[int, bytes]]:
     return [(int(packet.pts), bytes(packet)) for packet in (*found, *encoder.encode(None))]
 
 
-class Stamped(Missing):
-    """Packets with stamps: by their places, or in the order of the packets."""
-
-    def __init__(self, video: list[tuple[int, bytes]], *, by_place: bool = True) -> None:
-        self.packets = [
-            CompressedPicture(100 + (place if by_place else order), "h264", data)
-            for order, (place, data) in enumerate(video)
-        ]
+def stamped(video: list[tuple[int, bytes]], *, by_place: bool = True) -> Packets:
+    """Return packets with stamps: by their places, or in the order of the packets."""
+    return Packets(
+        CompressedPicture(100 + (place if by_place else order), "h264", data)
+        for order, (place, data) in enumerate(video)
+    )
 
 
 @pytest.mark.parametrize(
@@ -228,7 +195,7 @@ class Stamped(Missing):
 def test_b_frames_are_told(bf: int, by_place: bool, told: str | None) -> None:
     slope = np.arange(64, dtype=np.uint8) + 60
     pictures = [np.roll(slope, 5 * i)[None].repeat(48, 0) for i in range(9)]
-    packets = Stamped(encoded(pictures, bf), by_place=by_place)
+    packets = stamped(encoded(pictures, bf), by_place=by_place)
     video = Video(packets, Limits())
     for position in range(len(packets)):
         video.picture(position)
@@ -259,7 +226,7 @@ def test_labels_with_numbers_are_those_of_b_frames_as_they_are_shown(tmp_path: P
 @pytest.mark.parametrize("full_range", [False, True])
 def test_luma_beyond_its_range_is_told_and_read_as_asked(full_range: bool) -> None:
     levels = np.repeat(np.array([16, 64, 128, 192, 240, 250], np.uint8), 16)
-    packets = Stamped(encoded([levels[None].repeat(48, 0)] * 3, 0))
+    packets = stamped(encoded([levels[None].repeat(48, 0)] * 3, 0))
     video = Video(packets, Limits(full_range=full_range))
     grey = video.picture(0).pixels[24, 8::16, 0].astype(int)
     expected = levels[8::16] if full_range else [0, 56, 130, 205, 255, 255]
