@@ -186,33 +186,31 @@ def _bent(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
 
 
 def ground_of(
-    known: Calibration | None, given: GroundSettings, size: tuple[int, int] | None
+    logged: Calibration | None, settings: GroundSettings, size: tuple[int, int] | None
 ) -> tuple[Ground | None, str]:
     """Return the ground of a camera and how it is known, or None and what is missing.
 
-    ``known`` is what the log says of the camera, for images of ``size``; ``given`` replaces parts
-    of it. Nothing is assumed but a roll of 0, which is said. Without either the text is empty. A
-    `GroundError` for settings that make no camera.
+    ``logged`` is what the log says of the camera, for images of ``size``; ``settings`` replace
+    parts of it. Nothing is assumed but a roll of 0, which is said. Without either the text is
+    empty. A `GroundError` for settings that make no camera.
     """
-    if size is None or (known is None and not given.given):
+    if size is None or (logged is None and not settings.given):
         return None, ""
-    lens, why = _lens(known, given, size)
-    if given.homography:
-        plane, is_posed, text = _of_homography(given, lens)
-        width, height = given.size or size
+    lens, why = _lens(logged, settings, size)
+    if settings.homography:
+        plane, is_posed, text = _of_homography(settings, lens)
+        width, height = settings.size or size
         lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     elif lens is None:
         return None, f"no metres: {why}"
     else:
-        (above, pitch, roll), text = _pose(known.mounting if known else None, given)
+        (above, pitch, roll), text = _pose(logged.mounting if logged else None, settings)
         if above is None or pitch is None:
             return None, f"no metres: {text}"
         turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
         plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
-    made = Ground(
-        *(lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion),
-        is_posed=is_posed,
-    ).scaled(*size)
+    parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
+    made = Ground(*parts, is_posed=is_posed).scaled(*size)
     # Places all over the image, its edges included.
     columns, rows = np.meshgrid(*(np.linspace(0, length - 1, 9) for length in size))
     if not np.isfinite(made.places(np.column_stack([columns.ravel(), rows.ravel()]))).any():
@@ -221,65 +219,62 @@ def ground_of(
     covers = (
         f"a pixel covers {near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
     )
-    doubt = lens.doubt if given.focal else ""
+    doubt = lens.doubt if settings.focal else ""
     told = f"metres: flat ground, {text}", covers if math.isfinite(near + far) else "", doubt
     return made, "; ".join(filter(None, told))
 
 
 def _lens(
-    known: Calibration | None, given: GroundSettings, size: tuple[int, int]
+    lens: Calibration | None, settings: GroundSettings, size: tuple[int, int]
 ) -> tuple[Calibration | None, str]:
     """Return the lens, or None and what is missing of it."""
-    width, height = given.size or size
-    focal = given.focal
-    if given.fov is not None:
-        focal = (width / 2 / math.tan(math.radians(given.fov) / 2),)
+    width, height = settings.size or size
+    focal = settings.focal
+    if settings.fov is not None:
+        focal = (width / 2 / math.tan(math.radians(settings.fov) / 2),)
     if focal:
-        x, y = given.centre or ((width - 1) / 2, (height - 1) / 2)
+        x, y = settings.centre or ((width - 1) / 2, (height - 1) / 2)
         matrix = (focal[0], 0.0, x, 0.0, focal[-1], y, 0.0, 0.0, 1.0)
-        known = Calibration("", width, height, matrix, given.model, given.distortion)
-    elif known is not None and given.model:
-        known = replace(known, model=given.model, distortion=given.distortion)
-    if known is None:
+        lens = Calibration("", width, height, matrix, settings.model, settings.distortion)
+    elif lens is not None and settings.model:
+        lens = replace(lens, model=settings.model, distortion=settings.distortion)
+    if lens is None:
         return None, "the focal length is missing: give fov, or focal, with `ground`"
-    if problem := known.problem:
+    if problem := lens.problem:
         raise GroundError(f"`ground.{problem.split()[0]}`: its {problem}: no camera has that")
-    if not known.has_shape(*size):
-        shape = f"{known.width}x{known.height}, have another shape than the images"
+    if not lens.has_shape(*size):
+        shape = f"{lens.width}x{lens.height}, have another shape than the images"
         raise GroundError(f"`ground.size`: its images, {shape}, {size[0]}x{size[1]}")
-    last = max((n for n, number in enumerate(known.distortion, 1) if number), default=0)
-    model = known.model.strip().lower()
+    last = max((n for n, number in enumerate(lens.distortion, 1) if number), default=0)
+    model = lens.model.strip().lower()
     length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
     if length is None:
-        model = f"{known.model or 'without a name'} of {len(known.distortion)} numbers"
+        model = f"{lens.model or 'without a name'} of {len(lens.distortion)} numbers"
         names = ", ".join(name for name, counts in COEFFICIENTS.items() if any(counts))
         return None, f"the distortion is not known: {model}; known are {names}"
-    numbers = (*known.distortion[:last], *(0.0,) * (length - last))
-    return replace(known, model=model, distortion=numbers), ""
+    numbers = (*lens.distortion[:last], *(0.0,) * (length - last))
+    return replace(lens, model=model, distortion=numbers), ""
 
 
 def _pose(
-    mounting: Mounting | None, given: GroundSettings
+    mounting: Mounting | None, settings: GroundSettings
 ) -> tuple[tuple[float | None, float | None, float], str]:
     """Return height, pitch and roll, and where they come from; or None, and what is missing."""
-    height, pitch, roll = given.height, given.pitch, given.roll
+    height, pitch, roll = settings.height, settings.pitch, settings.roll
     if mounting is not None:
         angles = _angles_of(_matrix_of(mounting.rotation) @ AXES)
         pitch = angles[0] if pitch is None else pitch
         roll = angles[1] if roll is None else roll
         if height is None and mounting.parent in GROUND_FRAMES:
             height = mounting.translation[2]
-    missing = []
-    if height is None or not LOWEST <= height <= HIGHEST:
+    is_low = height is None or not LOWEST <= height <= HIGHEST
+    if height is None or pitch is None or is_low:
         above = f": the log has it above {mounting.parent} alone" if mounting else ""
         above = above if height is None else f": the log says {height:.6g} m"
-        missing.append(f"the camera's height above the ground{above}")
-    if pitch is None:
-        missing.append("its pitch")
-    if missing:
+        missing = [f"the camera's height above the ground{above}"] * is_low
+        missing += ["its pitch"] * (pitch is None)
         return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
     # Adding 0 makes 0.0 of what would be read as -0.0.
-    assert pitch is not None
     shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
     way = "up" if pitch < 0 else "down"
     text = f"camera {height:.2f} m above it, pitch {shown[0]} {way}, roll {shown[1]}"
@@ -287,9 +282,9 @@ def _pose(
 
 
 def _of_homography(
-    given: GroundSettings, lens: Calibration | None
+    settings: GroundSettings, lens: Calibration | None
 ) -> tuple[tuple[float, ...], bool, str]:
-    to_ground = np.reshape(given.homography, (3, 3))
+    to_ground = np.reshape(settings.homography, (3, 3))
     if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
         raise GroundError("`ground.homography` cannot be inverted")
     matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))

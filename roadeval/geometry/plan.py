@@ -46,15 +46,15 @@ class Plan:
 
         The nearest pixel is taken.
         """
-        found = image.reshape(-1, *image.shape[2:]).take(self.cells, axis=0)
-        found[self.cells == OUTSIDE] = nothing
-        return found
+        picture = image.reshape(-1, *image.shape[2:]).take(self.cells, axis=0)
+        picture[self.cells == OUTSIDE] = nothing
+        return picture
 
 
 def pixels_of(ground: Ground, places: Matrix) -> Places:
     """Return the pixel in which each place lies, ``(n,)`` in a flat image; `OUTSIDE` of none."""
-    found = np.rint(ground.pixels(places))
+    pixels = np.rint(ground.pixels(places))
     size = ground.width, ground.height
-    inside = np.all((found >= 0) & (found < size), axis=1, keepdims=True)
-    columns, rows = np.where(inside, found, 0).astype(np.intp).T
+    inside = np.all((pixels >= 0) & (pixels < size), axis=1, keepdims=True)
+    columns, rows = np.where(inside, pixels, 0).astype(np.intp).T
     return np.where(inside[:, 0], rows * ground.width + columns, OUTSIDE)

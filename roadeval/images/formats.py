@@ -72,4 +72,4 @@ FORMATS: Final = (
 def format_of(data: bytes | memoryview) -> ImageFormat | None:
     """Return the format of a file, None if it is none of these."""
     head = bytes(data[:16])
-    return next((each for each in FORMATS if head.startswith(each.magic, each.skipped)), None)
+    return next((one for one in FORMATS if head.startswith(one.magic, one.skipped)), None)

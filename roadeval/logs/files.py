@@ -88,43 +88,41 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
         _check(path)
         return [path], []
     try:
-        inside = filter(is_shown, path.iterdir())
-        found = sorted((file for file in inside if file.suffix == ".mcap"), key=natural)
+        inside = sorted(filter(is_shown, path.iterdir()), key=natural)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
-    damage = [Damage(file, 0, why) for file in found if (why := _problem(file))]
-    files = [file for file in found if file not in {each.path for each in damage}]
+    there = [file for file in inside if file.suffix == ".mcap"]
+    problems = {file: problem for file in there if (problem := _problem(file))}
+    damage = [Damage(file, 0, problem) for file, problem in problems.items()]
+    files = [file for file in there if file not in problems]
     if not files:
         raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
-    lacking = sorted({*_missing(found), *_listed(path, {*found})} - {*found}, key=natural)
+    lacking = sorted({*_missing(there), *_listed(path, {*there})} - {*there}, key=natural)
     unnamed = "the file is not called *.mcap"
     return files, [*damage, *(Damage(file, 0, _problem(file) or unnamed) for file in lacking)]
 
 
 def _missing(files: Sequence[Path]) -> Iterator[Path]:
     """Yield the files that lack among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
-    for names, name_of in _NUMBERED:
-        found = [match for file in files if (match := names.fullmatch(file.name))]
-        numbers = {int(match["number"]) for match in found}
-        one_name = len({match["name"] for match in found}) == 1
-        if one_name and len(found) == len(files) and 0 in numbers and max(numbers) < 2 * len(files):
+    for pattern, name_of in _NUMBERED:
+        matches = [match for file in files if (match := pattern.fullmatch(file.name))]
+        numbers = {int(match["number"]) for match in matches}
+        names = {match["name"] for match in matches}
+        is_numbered = len(names) == 1 and len(matches) == len(files) and 0 in numbers
+        if is_numbered and max(numbers) < 2 * len(files):
             for number in sorted({*range(max(numbers))} - numbers):
-                name = name_of.format(name=found[0]["name"], number=number)
-                yield files[0].with_name(name)
+                yield files[0].with_name(name_of.format(name=matches[0]["name"], number=number))
 
 
 def _listed(folder: Path, there: Set[Path]) -> set[Path]:
-    """Return the files of which a recorder noted that the log consists, by what it called them.
+    """Return the files that a recorder noted as the log's, by what it called them.
 
-    None where there is no such note, or it knows none of those that are ``there``: then it is about
-    other files.
+    There are none without such a note, and none if it lists no file that is ``there``: then it is
+    about others.
     """
-    try:
-        with (folder / METADATA).open("rb") as file:
-            note = file.read(_NOTE).decode(errors="replace")
-    except OSError:
-        return set()
-    block = _LIST.search(note)
+    block = None
+    with suppress(OSError), (folder / METADATA).open("rb") as file:
+        block = _LIST.search(file.read(_NOTE).decode(errors="replace"))
     names = [] if block is None else _ITEM.findall(block[1])
     # Earlier recorders wrote the folder before the name.
     files = {folder / Path(name.strip(" \r'\"")).name for name in names}
@@ -170,18 +168,16 @@ def check_content(path: Path, file: IO[bytes]) -> None:
     if head.startswith(MAGIC) or (wrong <= _DAMAGED and len(head) >= len(MAGIC)) or tail == MAGIC:
         return
     other = _other(path, head)
-    if not other and _RECORD.search(head):
-        return
-    other = other or f"something else (it begins with {head[:8].hex(' ')})"
-    raise LogError(f"{path}: not an MCAP file but {other}")
+    if other or not _RECORD.search(head):
+        other = other or f"something else (it begins with {head[:8].hex(' ')})"
+        raise LogError(f"{path}: not an MCAP file but {other}")
 
 
 def _other(path: Path, head: bytes) -> str:
     for skipped, magic, name in _OTHERS:
         if head[skipped:].startswith(magic):
             stem = path.name.split(".")[0]
-            clash = path.name == f"{stem}.mcap"
-            stem = f"{stem}_converted" if clash else stem
+            stem += "_converted" * (path.name == f"{stem}.mcap")
             return name.format(path=shlex.quote(path.name), stem=shlex.quote(stem))
     return "" if any(head) else "zeros: the disk or the copy failed"
 
@@ -208,16 +204,13 @@ def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> li
     """
     try:
         inside = folder.rglob("*") if below and folder.is_dir() else folder.iterdir()
-        found = [file for file in inside if file.suffix.lower() in endings and is_shown(file)]
-    except NotADirectoryError as error:
-        raise LogError(f"{folder}: a file, not a folder") from error
-    except FileNotFoundError as error:
-        raise LogError(f"{folder}: no such folder") from error
+        files = [file for file in inside if file.suffix.lower() in endings and is_shown(file)]
     except OSError as error:
-        raise LogError(f"{folder}: {error.strerror}") from error
-    if not found:
+        names = {NotADirectoryError: "a file, not a folder", FileNotFoundError: "no such folder"}
+        raise LogError(f"{folder}: {names.get(type(error), error.strerror)}") from error
+    if not files:
         raise LogError(f"{folder}: no image in it ({', '.join(sorted(endings))})")
-    return sorted(found, key=natural)
+    return sorted(files, key=natural)
 
 
 def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
@@ -248,31 +241,27 @@ def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, P
 
     The name is taken as it is, or as `bare`, or without what all labels have before and after it.
     """
-    exact, loose = {each.stem: each for each in images}, {bare(each): each for each in images}
-    names = dict(zip(labels, without_hashes([*map(bare, labels)]), strict=True))
-    before = _shared([*names.values()])
-    behind = [len(part) for part in _shared([name[::-1] for name in names.values()])]
-    cut = max(
-        (
-            [loose.get(n.removeprefix(b)[: -e or None]) for n in names.values()]
-            for b in before
-            for e in behind
-        ),
-        key=lambda belong: len(belong) - belong.count(None),
-        default=[],
+    exact, loose = {file.stem: file for file in images}, {bare(file): file for file in images}
+    names = without_hashes([*map(bare, labels)])
+    ends = [len(part) for part in _shared([name[::-1] for name in names])]
+    matches = (
+        [loose.get(name.removeprefix(begin)[: -end or None]) for name in names]
+        for begin in _shared(names)
+        for end in ends
     )
-    found = {
+    best = max(matches, key=lambda belong: len(belong) - belong.count(None), default=[])
+    pairs = {
         label: exact.get(label.stem) or exact.get(bare(label)) or image
-        for label, image in zip(labels, cut, strict=True)
+        for label, image in zip(labels, best, strict=True)
     }
-    return {label: image for label, image in found.items() if image is not None}
+    return {label: image for label, image in pairs.items() if image is not None}
 
 
 def _shared(names: Sequence[str]) -> list[str]:
     """Return what all names begin with, up to each of its separators, the shortest first."""
     pairs = zip(min(names, default=""), max(names, default=""), strict=False)
     common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
-    return ["", *(common[: found.end()] for found in re.finditer(r"[^0-9A-Za-z]+", common))]
+    return ["", *(common[: mark.end()] for mark in re.finditer(r"[^0-9A-Za-z]+", common))]
 
 
 def without_hashes(names: Sequence[str]) -> Sequence[str]:
@@ -282,11 +271,11 @@ def without_hashes(names: Sequence[str]) -> Sequence[str]:
     ['frame_7', 'frame_8']
     """
     for pattern in _HASHED:
-        found = [match for match in map(pattern.fullmatch, names) if match]
-        hashes = "".join(match["hash"] for match in found)
-        one_length = len({len(match["hash"]) for match in found}) == 1
-        if one_length and len(found) == len(names) and re.search("[a-f]", hashes):
-            names = [match["name"] for match in found]
+        matches = [match for match in map(pattern.fullmatch, names) if match]
+        hashes = [match["hash"] for match in matches]
+        has_one_length = len(set(map(len, hashes))) == 1
+        if has_one_length and len(hashes) == len(names) and re.search("[a-f]", "".join(hashes)):
+            names = [match["name"] for match in matches]
     return names
 
 
@@ -312,8 +301,7 @@ def time_in(name: str) -> int | None:
     match = _TIME.fullmatch(name)
     if match is None:
         return None
-    seconds, fraction, milli, micro, nano = match.groups()
+    seconds, fraction, *others = match.groups()
     if seconds is not None:
         return int(seconds) * NS + int((fraction or "").ljust(9, "0"))
-    scales = ((milli, 1_000_000), (micro, 1000), (nano, 1))
-    return next(int(digits) * scale for digits, scale in scales if digits is not None)
+    return next(int(text) * 1000 ** (2 - place) for place, text in enumerate(others) if text)

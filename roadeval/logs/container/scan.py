@@ -85,7 +85,7 @@ class Gap(NamedTuple):
     offset: int
     end: int
     reason: str
-    lossy: bool
+    lossy: bool = True
 
 
 class Scan:
@@ -131,7 +131,7 @@ class Scan:
     def _walk(self) -> None:
         begun = self.source[0 : len(MAGIC)] == MAGIC
         if not begun:
-            self._gap(0, len(MAGIC), "the file does not begin as it should", lossy=False)
+            self.gaps.append(Gap(0, len(MAGIC), "the file does not begin as it should", False))
         record = Record(BORDER, 0, 0, len(MAGIC) if begun else 0)
         while record.opcode != END:
             try:
@@ -148,7 +148,8 @@ class Scan:
         if ends and self.chunks and all(chunk.crc for chunk in self.chunks):
             self.loose.clear()  # they may be those of a damaged chunk
         if self.data_end is None and size not in ends:
-            self._gap(size, size, "the file was never finished; what came after is not in it")
+            reason = "the file was never finished; what came after is not in it"
+            self.gaps.append(Gap(size, size, reason))
 
     def _following(self, record: Record) -> Record:
         """Read the record behind one; refuse where that shows that either is damaged."""
@@ -158,7 +159,7 @@ class Scan:
             return self._record(record.end)
         if record.opcode != Opcode.DATA_END:
             reason = "the record that ends the data is missing"
-            self._gap(record.end, record.end, reason, lossy=False)
+            self.gaps.append(Gap(record.end, record.end, reason, False))
             self.data_end = self.after_data = record.end
         return Record(END, record.end, record.end, record.end)
 
@@ -177,25 +178,22 @@ class Scan:
         following = following or self._next(record.end if whole else record.offset + 1, record)
         if in_doubt:
             record = self._remains(record.content, following.offset)
-        kept = whole or in_doubt or following.offset > record.end - PADDING
-        if record.opcode == MESSAGE:
-            kept = kept and self._is_whole(record)
-        if kept:
+        is_taken = whole or in_doubt or following.offset > record.end - PADDING
+        if record.opcode == MESSAGE and is_taken:  # if it is as long as its own fields say
+            channel = self.channels.get(record.content[0])
+            schema = self.schemas.get(channel.schema_id) if channel else None
+            is_taken = channel is not None and (
+                self.stamp_of(channel, schema, message_at(self.source, record.offset)) is not None
+            )
+        if is_taken:
             self._take(record)
-        begin = record.end if kept else record.offset
-        if following.offset > begin or not kept:
+        begin = record.end if is_taken else record.offset
+        if following.offset > begin or not is_taken:
             if self.indexes and record.opcode in (CHUNK, MESSAGE_INDEX):
                 self.indexes[-1] = None
             if self.data_end is None or following.opcode in (CHUNK, MESSAGE):
-                self._gap(begin, following.offset, reason)
+                self.gaps.append(Gap(begin, following.offset, reason))
         return following
-
-    def _is_whole(self, record: Record) -> bool:
-        """Whether a message is as long as its own fields say."""
-        if (channel := self.channels.get(record.content[0])) is None:
-            return False
-        message = message_at(self.source, record.offset)
-        return self.stamp_of(channel, self.schemas.get(channel.schema_id), message) is not None
 
     def _remains(self, chunk: Chunk, end: int) -> Record:
         """Return what is left of a chunk that is not whole, where the next record begins."""
@@ -217,8 +215,16 @@ class Scan:
             self.loose[channel_id].extend((log_time, record.offset))
         elif opcode == CHUNK:
             self._take_chunk(content)
-        elif opcode == MESSAGE_INDEX and self.chunks:
-            self._take_index(*content)
+        elif opcode == MESSAGE_INDEX and self.chunks and self.indexes[-1] is not None:
+            channel_id, entries = content
+            chunk, index = self.chunks[-1], self.indexes[-1]
+            if len(entries):
+                times, offsets = entries[:, 0].view("u8"), entries[:, 1].view("u8")
+                is_within = chunk.start <= times.min() and times.max() <= chunk.end
+                if channel_id in index or not is_within or offsets.max() >= chunk.size:
+                    self.indexes[-1] = None  # it does not agree with its chunk
+                else:
+                    index[channel_id] = entries
         elif opcode in DEFINITIONS:
             is_new = content.id not in self.described(content)
             if self.data_end is not None and (is_new or self.chunks):
@@ -234,29 +240,14 @@ class Scan:
     def _take_chunk(self, chunk: Chunk) -> None:
         if chunk.repaired:
             reason = "the head of a chunk is damaged; what it said was found out otherwise"
-            self._gap(chunk.offset, chunk.data_offset, reason, lossy=False)
+            self.gaps.append(Gap(chunk.offset, chunk.data_offset, reason, False))
         self.chunks.append(chunk)
         self.indexes.append({})
         if chunk.cut:
-            self._gap(chunk.offset, chunk.data_end, "the file ends inside a chunk")
+            self.gaps.append(Gap(chunk.offset, chunk.data_end, "the file ends inside a chunk"))
         if self.summary.statistics is None:  # while it is uncompressed
             with suppress(BadRecord):
                 self.look(len(self.chunks) - 1)
-
-    def _take_index(self, channel_id: int, entries: Entries) -> None:
-        """File a message index, unless it does not agree with its chunk."""
-        chunk, index = self.chunks[-1], self.indexes[-1]
-        if index is None or not len(entries):
-            return
-        times, offsets = entries[:, 0].view("u8"), entries[:, 1].view("u8")
-        is_within = chunk.start <= times.min() and times.max() <= chunk.end
-        if channel_id in index or not is_within or offsets.max() >= chunk.size:
-            self.indexes[-1] = None
-        else:
-            index[channel_id] = entries
-
-    def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
-        self.gaps.append(Gap(offset, end, reason, lossy))
 
     def described(self, record: Schema | Channel) -> dict[int, Any]:
         """Return the descriptions of the kind of this one, by their numbers."""
@@ -338,7 +329,7 @@ class Scan:
         if opcode == MESSAGE or opcode >= PRIVATE:
             fits = MESSAGE_HEAD.size <= end - body <= LARGEST
             channel_id, _, log_time, _ = MESSAGE_HEAD.unpack_from(head.ljust(_HEADS), HEAD.size)
-            if opcode != MESSAGE and fits and self._is_known(channel_id):
+            if opcode != MESSAGE and fits and self._is_described(channel_id):
                 raise BadRecord("a message whose kind is damaged")
             if opcode == MESSAGE and not fits:
                 raise BadRecord("a message of a length that cannot be")
@@ -359,7 +350,7 @@ class Scan:
         """Whether a message index lies here, by the summary."""
         return offset < self.summary.index_ends.get(int(self._around(offset)[0]), 0)
 
-    def _is_known(self, channel_id: int) -> bool:
+    def _is_described(self, channel_id: int) -> bool:
         return not self.channels or channel_id in self.channels
 
     def _chunk(self, record: Record) -> Chunk:
@@ -405,9 +396,9 @@ class Scan:
         size = len(self.source)
         for offset in self._candidates(begin):
             if self.source[offset : offset + len(MAGIC)] == MAGIC:
-                if self.source[offset - 8 : offset] == MAGIC or (
-                    not self.summary.checked and self.source[0:8] == MAGIC
-                ):  # else it may be this log's own beginning, moved
+                # It may be this log's own beginning, moved, unless it follows on an end.
+                begun = not self.summary.checked and self.source[0:8] == MAGIC
+                if begun or self.source[offset - 8 : offset] == MAGIC:
                     return Record(BORDER, offset, offset, offset + len(MAGIC))
                 continue
             with suppress(BadRecord):
@@ -440,7 +431,7 @@ class Scan:
             return False
         if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
             return not self._listed or self._is_index_here(record.offset)
-        if opcode == MESSAGE and not self._is_known(content[0]):
+        if opcode == MESSAGE and not self._is_described(content[0]):
             return False
         self._record(record.end)
         return True

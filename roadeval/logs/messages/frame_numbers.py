@@ -48,7 +48,7 @@ class FrameNumbers:
         return gap
 
     @property
-    def known(self) -> bool:
+    def are_counted(self) -> bool:
         """Whether pictures have numbers, as far as the stream was followed."""
         return self._width > 0
 

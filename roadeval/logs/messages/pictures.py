@@ -340,7 +340,7 @@ class Video:
     def _follows(self, packet: Picture, last: Picture | None, numbers: FrameNumbers) -> bool:
         """Whether no packet that this one builds upon is lost before it, as far as is known."""
         is_gap = codec_of(packet) == "h264" and numbers.is_gap(bytes(packet.data))
-        if numbers.known or last is None:
+        if numbers.are_counted or last is None:
             return not is_gap
         return not (self._counted and _step(last, packet) > 1)
 

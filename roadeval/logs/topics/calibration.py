@@ -63,36 +63,36 @@ def calibration_of(
         for topic in topics
         if topic.kind is TopicKind.CALIBRATION and topic.count
     }
-    own = {name: lens for name, lens in lenses.items() if lens[0] in ("", image.frame_id)}
-    near = max((_shared(name, image.name) for name in own), default=0)
-    best = [name for name in own if _shared(name, image.name) == near]
-    best = [name for name in best if own[name][1]] or best
-    if len(best) != 1 or not (near or own[best[0]][0] or own[best[0]][1] is None):
+    matching = {name: lens for name, lens in lenses.items() if lens[0] in ("", image.frame_id)}
+    near = max((_shared(name, image.name) for name in matching), default=0)
+    best = [name for name in matching if _shared(name, image.name) == near]
+    best = [name for name in best if matching[name][1]] or best
+    if len(best) != 1 or not (near or matching[best[0]][0] or matching[best[0]][1] is None):
         why = f"none of {', '.join(lenses)} is clearly of {image.name}"
         return None, why if lenses else ""
     (topic,) = best
-    frame, made, why = own[topic]
-    if made is None:
+    frame, lens, why = matching[topic]
+    if lens is None:
         return None, f"{topic}: {why}"
     reader = readers[topic]
     with suppress(*_UNREADABLE):
         last, _ = _read(topic, reader.fields(len(reader) - 1), image)
-        if last not in (None, made):
+        if last not in (None, lens):
             return None, f"{topic}: it changes within the log"
-    static = [each.name for each in topics if each.kind is TopicKind.TRANSFORMS and each.count]
+    static = [info.name for info in topics if info.kind is TopicKind.TRANSFORMS and info.count]
     transforms = dict(_transforms(readers[name] for name in static))
-    notes = [why] * bool(why)
+    notes, mounting = [why] * bool(why), None
     if static and not transforms:
         notes.append(f"its place is not known: {', '.join(static)} cannot be read")
     try:
         mounting = _mounting(frame, transforms)
     except ValueError as error:
-        return made, "; ".join([*notes, f"its place is not known: the transform of {error}"])
+        notes.append(f"its place is not known: the transform of {error}")
     if mounting and mounting.has_body_axes:
         notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read so")
         mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
-        made = replace(made, frame_id=f"{frame}_optical")
-    return replace(made, mounting=mounting), "; ".join(notes)
+        lens = replace(lens, frame_id=f"{frame}_optical")
+    return replace(lens, mounting=mounting), "; ".join(notes)
 
 
 def _shared(one: str, other: str) -> int:
@@ -155,17 +155,16 @@ def _fitted(made: Calibration, message: Any, size: Size) -> Known:
         int(getattr(region, name, 0)) for name in ("x_offset", "y_offset", "width", "height")
     )
     bins = [max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy"]
-    whole = made.width, made.height
     across, down = across or made.width - left, down or made.height - top
-    if min(left, top) < 0 or left + across > whole[0] or top + down > whole[1]:
-        return None, f"its region of interest lies outside its images of {whole[0]}x{whole[1]}"
+    if min(left, top) < 0 or left + across > made.width or top + down > made.height:
+        return None, f"its region of interest lies outside its images of {made.width}x{made.height}"
     part = made.part((left, top), (across // bins[0], down // bins[1]), bins)
     if part.problem:
         return None, f"its {part.problem} of its region of interest, binned"
     if max(abs(part.width - size[0]), abs(part.height - size[1])) <= (max(bins) > 1):
         note = "" if left or top else part.doubt
         return replace(part, width=size[0], height=size[1]), note
-    if size == whole:
+    if size == (made.width, made.height):
         return made, "its region of interest and binning are not those of the images, and not used"
     for lens in (part, made):
         if lens.has_shape(*size):
@@ -180,16 +179,13 @@ def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform
         for position in range(min(len(reader), LOOKED_AT)):
             with suppress(*_UNREADABLE):
                 message = reader.fields(position)
-                for each in getattr(message, "transforms", [message]):
-                    yield _transform(each)
-
-
-def _transform(each: Any) -> tuple[str, Transform]:
-    moved = getattr(each, "transform", each)
-    at = np.array([getattr(moved.translation, axis) for axis in "xyz"], np.float64)
-    turn = np.array([getattr(moved.rotation, axis) for axis in "xyzw"], np.float64)
-    parent = each.header.frame_id if hasattr(each, "header") else each.parent_frame_id
-    return str(each.child_frame_id), (str(parent), at, turn)
+                for frame in getattr(message, "transforms", [message]):
+                    moved = getattr(frame, "transform", frame)
+                    at = np.array([getattr(moved.translation, axis) for axis in "xyz"], float)
+                    turn = np.array([getattr(moved.rotation, axis) for axis in "xyzw"], float)
+                    parent = getattr(frame, "header", None)
+                    parent = frame.parent_frame_id if parent is None else parent.frame_id
+                    yield str(frame.child_frame_id), (str(parent), at, turn)
 
 
 def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | None:
@@ -207,15 +203,14 @@ def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | Non
         parent, offset, rotation = names[name]
         length = np.linalg.norm(rotation)
         if not (np.abs(offset) < FARTHEST).all():
-            raise ValueError(f"{name} is moved by {', '.join(f'{each:.6g}' for each in offset)} m")
+            metres = ", ".join(f"{length:.6g}" for length in offset)
+            raise ValueError(f"{name} is moved by {metres} m")
         if not abs(length - 1) < NOT_UNIT:
             raise ValueError(f"{name} has a quaternion of length {length:.6g}, not 1")
         rotation = rotation / length
-        at, turn, name = (
-            offset + _turned(rotation, at),
-            _product(rotation, turn),
-            parent.lstrip("/"),
-        )
+        twice = 2 * np.cross(rotation[:3], at)
+        at = offset + (at + rotation[3] * twice + np.cross(rotation[:3], twice))
+        turn, name = _product(rotation, turn), parent.lstrip("/")
     return None
 
 
@@ -223,9 +218,3 @@ def _product(one: Vector, other: Vector) -> Any:
     """Multiply two quaternions x, y, z, w."""
     (a, b), (c, d) = (one[:3], one[3]), (other[:3], other[3])
     return np.append(b * c + d * a + np.cross(a, c), b * d - a @ c)
-
-
-def _turned(rotation: Vector, point: Vector) -> Any:
-    """Turn a point by a unit quaternion."""
-    twice = 2 * np.cross(rotation[:3], point)
-    return point + rotation[3] * twice + np.cross(rotation[:3], twice)

@@ -276,9 +276,9 @@ class TopicReader:
         source = self.channels[number]
         here = np.flatnonzero((self._places[:, 1:] == (number, chunk)).all(axis=1))
         listed = {(int(self.log_times[i]), int(self._places[i, 0])): i for i in here}
-        found = [tuple(e) for e in source.container.look(chunk, source.channel_id).tolist()]
-        missed = [entry for entry in found if entry not in listed]
-        for wrong, right in zip(sorted(listed.keys() - {*found}), missed, strict=False):
+        entries = [tuple(e) for e in source.container.look(chunk, source.channel_id).tolist()]
+        missed = [entry for entry in entries if entry not in listed]
+        for wrong, right in zip(sorted(listed.keys() - {*entries}), missed, strict=False):
             self.log_times[listed[wrong]], self._places[listed[wrong], 0] = right
 
     def picture(self, position: int) -> LoggedPicture:
@@ -391,6 +391,6 @@ def topic_readers(
         for channel_id, channel in sorted(container.channels.items()):
             channels.setdefault(channel.topic, []).append(FileChannel(container, channel_id))
     return {
-        topic: TopicReader(topic, found, limits, containers, lacks_files=lacks_files)
-        for topic, found in channels.items()
+        topic: TopicReader(topic, carriers, limits, containers, lacks_files=lacks_files)
+        for topic, carriers in channels.items()
     }
