@@ -96,11 +96,10 @@ def test_the_sample_that_is_white_is_the_topics_whatever_the_range(
 @pytest.mark.parametrize("pack", [zstandard.compress, gzip.compress])
 @pytest.mark.parametrize("harm", ["bomb", "cut", "noise"])
 def test_a_packed_image_that_is_damaged_is_refused_in_bounded_memory(pack, harm: str) -> None:
-    head = struct.pack("<IIBII", 6, 8, 0, 8, 5) + b"mono8"
     data = pack(bytes(100_000_000 if harm == "bomb" else 48))
     data = {"bomb": data, "cut": data[:9], "noise": data[:2] + b"noise"}[harm]
     message = SimpleNamespace(header=SimpleNamespace(stamp="0", frame_id=""), format="zstd")
-    message.data = head + data
+    message.data = struct.pack("<IIBII", 6, 8, 0, 8, 5) + b"mono8" + data
     with suppress(BadMessage):
         assert len(picture_in(message).data) <= 4 * 48
 
@@ -113,10 +112,8 @@ def test_a_camera_whose_images_are_blank_is_told(tmp_path: Path, level: int, wor
 
 
 def test_a_blank_image_among_many_is_not_told(tmp_path: Path) -> None:
-    levels = [0, *[90] * 19]
-    path = camera(
-        tmp_path, [compressed(at, jpeg(grey(i))) for at, i in zip(STAMPS, levels, strict=True)]
-    )
+    levels = dict.fromkeys(STAMPS, 90) | {STAMPS[0]: 0}
+    path = camera(tmp_path, [compressed(at, jpeg(grey(level))) for at, level in levels.items()])
     with open_log(path) as log:
         stream = log.frames(log.select())
         for frame in stream:

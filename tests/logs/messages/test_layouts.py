@@ -95,32 +95,29 @@ def test_a_number_of_transforms_that_cannot_be_is_refused_at_once():
         fields("cdr", "tf2_msgs/msg/TFMessage", ("", ""), packed([2**32 - 1, *TRANSFORM[1:]]))
 
 
+def made(builder: flatbuffers.Builder, table: Any, **parts: Any) -> int:
+    """Write a table of FlatBuffers."""
+    table.Start(builder)
+    for name, value in parts.items():
+        getattr(table, f"Add{name}")(builder, value)
+    return table.End(builder)
+
+
 def test_foxgloves_flatbuffers_are_read():
     builder = flatbuffers.Builder()
-    lists = {"D": D, "K": K, "P": P}
-    made = {name: builder.CreateNumpyVector(np.array(each)) for name, each in lists.items()}
-    model, frame = builder.CreateString("plumb_bob"), builder.CreateString("cam")
-    CameraCalibration.Start(builder)
-    for name, place in {**made, "DistortionModel": model, "FrameId": frame}.items():
-        getattr(CameraCalibration, f"Add{name}")(builder, place)
-    CameraCalibration.AddWidth(builder, 96)
-    builder.Finish(CameraCalibration.End(builder))
+    numbers = zip("DKP", (D, K, P), strict=True)
+    parts = {name: builder.CreateNumpyVector(np.array(values)) for name, values in numbers}
+    parts |= {"DistortionModel": builder.CreateString("plumb_bob")}
+    parts |= {"FrameId": builder.CreateString("cam"), "Width": 96}
+    builder.Finish(made(builder, CameraCalibration, **parts))
     text = "flatbuffer", ""
     found = fields("flatbuffer", "foxglove.CameraCalibration", text, bytes(builder.Output()))
     assert (found.frame_id, found.width, found.d, found.k, found.p) == ("cam", 96, D, K, P)
 
     builder = flatbuffers.Builder()
     parent = builder.CreateString("base_link")
-    Vector3.Start(builder)
-    Vector3.AddZ(builder, 3.0)
-    at = Vector3.End(builder)
-    Quaternion.Start(builder)
-    Quaternion.AddW(builder, 0.8)
-    turn = Quaternion.End(builder)
-    FrameTransform.Start(builder)
-    FrameTransform.AddParentFrameId(builder, parent)
-    FrameTransform.AddTranslation(builder, at)
-    FrameTransform.AddRotation(builder, turn)
-    builder.Finish(FrameTransform.End(builder))
+    at, turn = made(builder, Vector3, Z=3.0), made(builder, Quaternion, W=0.8)
+    parts = {"ParentFrameId": parent, "Translation": at, "Rotation": turn}
+    builder.Finish(made(builder, FrameTransform, **parts))
     found = fields("flatbuffer", "foxglove.FrameTransform", text, bytes(builder.Output()))
     assert (found.parent_frame_id, found.translation.z, found.rotation.w) == ("base_link", 3.0, 0.8)

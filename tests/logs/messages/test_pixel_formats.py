@@ -1,9 +1,6 @@
 """Pixels as logged, to RGB."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from roadeval.images.formats import Limits
@@ -14,20 +11,14 @@ from roadeval.logs.messages.pixels import to_labels, to_rgb
 LIMITS = Limits()
 
 
-def picture(data: bytes, encoding: str, width: int, height: int = 1, **more: Any) -> RawPicture:
-    fields: dict[str, Any] = {"step": 0, "big_endian": False} | more
-    return RawPicture(0, width, height, encoding, fields["step"], fields["big_endian"], data)
-
-
-def row(data: bytes, encoding: str, width: int = 1, **more: Any) -> list[list[int]]:
-    found: npt.NDArray[np.uint8] = to_rgb(picture(data, encoding, width, **more), LIMITS)
-    pixels: list[list[int]] = found[0].tolist()
-    return pixels
+def picture(data: bytes, encoding: str, width: int, height: int = 1, step: int = 0) -> RawPicture:
+    return RawPicture(0, width, height, encoding, step, False, data)
 
 
 def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
     data = np.array([0, 0.5, 1, 2, np.nan], np.float32).tobytes()
-    assert [r for r, _, _ in row(data, "32FC1", 5)] == [0, 128, 255, 255, 0]
+    pixels = to_rgb(picture(data, "32FC1", 5), LIMITS)
+    assert pixels[0, :, 0].tolist() == [0, 128, 255, 255, 0]
 
 
 def test_padding_between_rows_is_skipped() -> None:

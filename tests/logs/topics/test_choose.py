@@ -76,19 +76,20 @@ def test_an_unknown_topic_lists_the_valid_ones() -> None:
         choose_image(topics, "/imu")
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["/labels/semantic", "/front/road_mask", "/truth/road", "/gt", "/mask", "/front/GroundTruth"],
-)
-def test_one_plain_label_image_is_the_truth(name: str) -> None:
-    assert truth_of(label(name)) == name
+ROADS = [
+    "/labels/semantic",
+    "/front/road_mask",
+    "/truth/road",
+    "/gt",
+    "/mask",
+    "/front/GroundTruth",
+]
+OTHERS = ["/ego_mask", "/shadow_mask", "/net/road_mask", "/mono", "/truth/shadow"]
 
 
-@pytest.mark.parametrize(
-    "name", ["/ego_mask", "/shadow_mask", "/net/road_mask", "/mono", "/truth/shadow"]
-)
-def test_other_masks_are_no_road_truth(name: str) -> None:
-    assert truth_of(label(name)) is None
+@pytest.mark.parametrize("name", [*ROADS, *OTHERS])
+def test_one_plain_label_image_is_the_truth_and_other_masks_are_none(name: str) -> None:
+    assert truth_of(label(name)) == (name if name in ROADS else None)
 
 
 def test_the_labels_of_the_chosen_camera_are_taken() -> None:
@@ -102,20 +103,10 @@ def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
     assert choose_shadow(topics, topics[0], None).topic == topics[2]
 
 
-def lossy(name: str) -> TopicInfo:
-    return TopicInfo(
-        name, "CompressedImage", "cdr", TopicKind.COMPRESSED, 5, channels=1, lossy="JPEG"
-    )
-
-
-def test_label_images_with_loss_are_named_as_such() -> None:
-    topics = [camera("/cam"), lossy("/cam/road_mask")]
+def test_label_images_with_loss_are_named_or_refused_to_who_says_what_values_mean() -> None:
+    topics = [camera("/cam"), replace(label("/cam/road_mask"), lossy="JPEG")]
     topic, why = choose_truth(topics, topics[0], None, LabelSettings())
     assert topic is None
     assert "/cam/road_mask is JPEG, which changes label values" in why
-
-
-def test_label_images_with_loss_are_refused_to_who_says_what_their_values_mean() -> None:
-    topics = [camera("/cam"), lossy("/cam/road_mask")]
     with pytest.raises(LogError, match=r"/cam/road_mask is JPEG.*: log labels as PNG"):
         choose_truth(topics, topics[0], None, LabelSettings(road=(255,)))

@@ -31,73 +31,71 @@ def named(message: dict, frame_id: str) -> dict:
     return message | {"header": message["header"] | {"frame_id": frame_id}}
 
 
-def selected(path: Path, image: str, truth: str | None = None) -> Selection:
-    asked = LogConfig(topics=TopicSettings(image=image, truth=truth))
-    with open_log(path, asked) as log:
+def selected(path: Path, image: str) -> Selection:
+    with open_log(path, LogConfig(topics=TopicSettings(image=image))) as log:
         return log.select()
 
 
-def truth(path: Path, image: str, asked: str | None = None) -> str | None:
-    found = selected(path, image, asked).truth
-    return found.where if found else None
-
-
-def test_another_cameras_truth_is_refused_by_its_path(tmp_path: Path) -> None:
-    path = rig(tmp_path, {FRONT: "", REAR: ""}, {"/camera/front/labels": ""})
-    assert truth(path, FRONT) == "/camera/front/labels"
-    with pytest.raises(LogError, match=rf"/camera/front/labels belongs to another.*{REAR}.* path"):
-        truth(path, REAR)
-
-
-def test_another_cameras_truth_is_refused_by_its_frame_id(tmp_path: Path) -> None:
-    path = rig(tmp_path, {"/a/image": "front", "/b/image": "rear"}, {"/labels/semantic": "front"})
-    assert truth(path, "/a/image") == "/labels/semantic"
-    with pytest.raises(LogError, match=r"frame_id \(front, not rear\)"):
-        truth(path, "/b/image")
-
-
-def test_of_two_truths_the_cameras_own_is_taken(tmp_path: Path) -> None:
-    cameras = {"/one": "cam1", "/two": "cam2"}
-    path = rig(tmp_path, cameras, {"/labels/a": "cam1", "/labels/b": "cam2"})
-    assert truth(path, "/one") == "/labels/a"
-    assert truth(path, "/two") == "/labels/b"
+REFUSED = "belongs to another camera"
+NUSCENES = {"/CAM_FRONT/image_rect": "", "/CAM_FRONT_LEFT/image_rect": ""}
 
 
 @pytest.mark.parametrize(
-    ("camera", "labels", "belong"),
+    ("cameras", "labels", "truths"),
     [
-        ({"/camera/image_raw": "camera"}, {"/labels/semantic": "labels"}, True),
-        ({"/camera/image": "camera_optical"}, {"/front/road_mask": "base_link"}, True),
-        ({"/front/left/image": ""}, {"/front/labels": ""}, True),
-        ({"/rear/image": ""}, {"/front/labels": ""}, False),
-        ({"/image": "camera_1"}, {"/labels": "camera_2"}, False),
-        ({"/image": "CAM_BACK"}, {"/labels": "CAM_FRONT"}, False),
-        ({"/cam0/image": ""}, {"/cam1/labels": ""}, False),
+        # By their paths, by their frames, and each of two cameras its own.
+        (
+            {FRONT: "", REAR: ""},
+            {"/camera/front/labels": ""},
+            {FRONT: "/camera/front/labels", REAR: rf"{REFUSED} than {REAR}, by its path"},
+        ),
+        (
+            {"/a/image": "front", "/b/image": "rear"},
+            {"/labels/semantic": "front"},
+            {"/a/image": "/labels/semantic", "/b/image": r"frame_id \(front, not rear\)"},
+        ),
+        (
+            {"/one": "cam1", "/two": "cam2"},
+            {"/labels/a": "cam1", "/labels/b": "cam2"},
+            {"/one": "/labels/a", "/two": "/labels/b"},
+        ),
+        # The only camera takes a truth that names no other.
+        ({"/camera/image_raw": "camera"}, {"/labels/semantic": "labels"}, "/labels/semantic"),
+        (
+            {"/camera/image": "camera_optical"},
+            {"/front/road_mask": "base_link"},
+            "/front/road_mask",
+        ),
+        ({"/front/left/image": ""}, {"/front/labels": ""}, "/front/labels"),
+        ({"/rear/image": ""}, {"/front/labels": ""}, REFUSED),
+        ({"/image": "camera_1"}, {"/labels": "camera_2"}, REFUSED),
+        ({"/image": "CAM_BACK"}, {"/labels": "CAM_FRONT"}, REFUSED),
+        ({"/cam0/image": ""}, {"/cam1/labels": ""}, REFUSED),
+        # The name of a camera may be part of another's.
+        (
+            NUSCENES,
+            {"/CAM_FRONT/annotations": "", "/CAM_FRONT_LEFT/annotations": ""},
+            {camera: camera.replace("image_rect", "annotations") for camera in NUSCENES},
+        ),
+        (NUSCENES, {"/CAM_FRONT/annotations": ""}, {"/CAM_FRONT_LEFT/image_rect": REFUSED}),
+        # A coded camera and its raw images are one.
+        (
+            {"/front/image_raw": "front", "/front/image_raw/compressed": "front"},
+            {"/front/labels/compressed": "front"},
+            "/front/labels/compressed",
+        ),
     ],
 )
-def test_the_only_camera_takes_a_truth_that_names_no_other(tmp_path, camera, labels, belong):
-    path, (image,), (label,) = rig(tmp_path, camera, labels), camera, labels
-    if belong:
-        assert truth(path, image) == label
-    else:
-        with pytest.raises(LogError, match="belongs to another camera"):
-            truth(path, image)
-
-
-def test_a_camera_whose_name_is_part_of_anothers_has_its_own_truth(tmp_path: Path) -> None:
-    cameras = {"/CAM_FRONT/image_rect": "", "/CAM_FRONT_LEFT/image_rect": ""}
-    path = rig(tmp_path, cameras, {"/CAM_FRONT/annotations": "", "/CAM_FRONT_LEFT/annotations": ""})
-    assert truth(path, "/CAM_FRONT/image_rect") == "/CAM_FRONT/annotations"
-    assert truth(path, "/CAM_FRONT_LEFT/image_rect") == "/CAM_FRONT_LEFT/annotations"
-    path = rig(tmp_path, cameras, {"/CAM_FRONT/annotations": ""})
-    with pytest.raises(LogError, match="belongs to another camera"):
-        truth(path, "/CAM_FRONT_LEFT/image_rect")
-
-
-def test_a_coded_camera_and_its_raw_images_are_one(tmp_path: Path) -> None:
-    cameras = {"/front/image_raw": "front", "/front/image_raw/compressed": "front"}
-    path = rig(tmp_path, cameras, {"/front/labels/compressed": "front"})
-    assert {truth(path, camera) for camera in cameras} == {"/front/labels/compressed"}
+def test_a_camera_is_scored_against_its_own_truth_alone(tmp_path, cameras, labels, truths):
+    path = rig(tmp_path, cameras, labels)
+    if isinstance(truths, str):
+        truths = dict.fromkeys(cameras, truths)
+    for image, truth in truths.items():
+        if truth in labels:
+            assert selected(path, image).truth.where == truth
+        else:
+            with pytest.raises(LogError, match=truth):
+                selected(path, image)
 
 
 def test_another_cameras_shadow_is_left_out(tmp_path: Path) -> None:
