@@ -16,17 +16,14 @@ def main() -> int:
     if words.case:
         return _again(words.harness or NAMES[0], words.case)
     names = [words.harness] if words.harness else list(NAMES)
-    seconds = words.seconds or (0 if words.cases else 60)
-    results = []
+    seconds = (words.seconds or (0 if words.cases else 60)) / len(names)
+    guided, is_found = guidance() and not words.plain, False
     for name in names:
-        guided = guidance() and not words.plain
-        jobs = [
-            Job(name, "", words.seed + number, guided, words.cases, seconds / len(names))
-            for number in range(words.jobs)
-        ]
-        results.append(run(jobs, words.save))
-        _tell(results[-1], guided=guided)
-    return int(any(result.findings for result in results))
+        seeds = range(words.seed, words.seed + words.jobs)
+        result = run([Job(name, "", n, guided, words.cases, seconds) for n in seeds], words.save)
+        _tell(result, guided=guided)
+        is_found |= bool(result.findings)
+    return int(is_found)
 
 
 def _parser() -> argparse.ArgumentParser:

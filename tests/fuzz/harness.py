@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
+import shutil
 import stat
 import sys
 import tempfile
@@ -29,26 +31,16 @@ PROC: Final = Path("/proc/self")
 
 @dataclass(frozen=True)
 class Harness:
-    """Something to try.
-
-    Parameters
-    ----------
-    check
-        Tries it on bytes: returns, or raises a `RoadevalError`. Whatever else it raises is a
-        finding.
-    seeds
-        Returns the corpus: what cases are made from.
-    random
-        Whether cases are random bytes, by which `check` chooses what to do, instead of changed
-        seeds.
-    quick
-        Cases that the test command tries, about a second's worth.
-    """
+    """Something to try."""
 
     check: Callable[[bytes], None]
+    """Try it on bytes: return, or raise a `RoadevalError`. Any other exception is a finding."""
     seeds: Callable[[], Sequence[bytes]]
+    """Return the corpus: what cases are made from."""
     random: bool = False
+    """Whether `check` chooses what to do by a case's random bytes; else cases are changed seeds."""
     quick: int = 200
+    """Cases that the test command tries, about a second's worth."""
 
 
 class Lost(AssertionError):  # noqa: N818  (what became of a frame)
@@ -71,8 +63,8 @@ class Outcome:
 
 def harness_of(name: str) -> Harness:
     """Return a harness by its name."""
-    found: Harness = import_module(f"tests.fuzz.harnesses.{name}").HARNESS
-    return found
+    harness: Harness = import_module(f"tests.fuzz.harnesses.{name}").HARNESS
+    return harness
 
 
 def run_case(harness: Harness, data: bytes) -> Outcome:
@@ -84,9 +76,10 @@ def run_case(harness: Harness, data: bytes) -> Outcome:
     kind, where = "", ""
     try:
         harness.check(data)
-    except (RoadevalError, KeyboardInterrupt) as error:
-        if isinstance(error, KeyboardInterrupt):
-            raise
+    except RoadevalError:
+        pass
+    except KeyboardInterrupt:
+        raise
     except (Lost, Wrong) as error:
         kind, where = type(error).__name__.lower(), str(error)
     except BaseException as error:
@@ -105,14 +98,9 @@ def run_case(harness: Harness, data: bytes) -> Outcome:
 def scratch() -> Path:
     """Return a folder of this process for the files of its cases, in memory where there is one."""
     memory = Path("/dev/shm")
-    folder = tempfile.TemporaryDirectory(
-        prefix="roadeval-fuzz-", dir=memory if memory.is_dir() else None
-    )
-    _kept.append(folder)
-    return Path(folder.name)
-
-
-_kept: Final[list[tempfile.TemporaryDirectory[str]]] = []
+    folder = tempfile.mkdtemp("", "roadeval-fuzz-", memory if memory.is_dir() else None)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def _memory(*, forget: bool = False) -> int:
@@ -144,8 +132,7 @@ def _text(begin: int) -> str:
 def _place(error: BaseException) -> str:
     """Return the error, and the last place of the package that it passed."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [each for each in frames if "/roadeval/" in each.filename] or frames
-    last = ours[-1]
+    last = ([frame for frame in frames if "/roadeval/" in frame.filename] or frames)[-1]
     file = re.sub(r".*/(?=roadeval/|tests/)", "", last.filename)
     said = " ".join(str(error).replace(str(scratch()), "").split())[:120]
     return f"{type(error).__name__} at {file}:{last.lineno} ({said})"

@@ -124,7 +124,7 @@ def times_in(opcode: int, record: bytes) -> list[int]:
     if opcode != Opcode.CHUNK:
         return []
     chunk = Chunk.read(ReadDataStream(io.BytesIO(record[broken.HEAD :])))
-    return [each.log_time for each in breakup_chunk(chunk) if isinstance(each, Message)]
+    return [one.log_time for one in breakup_chunk(chunk) if isinstance(one, Message)]
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, int]]:
@@ -151,8 +151,8 @@ def read(path: Path, labels: LabelSettings = UNSAID) -> Reading:
                     told.append(str(error))
                     continue
                 truth = None if frame.truth is None else frame.truth.tobytes()
-                image = frame.image.tobytes()
-                frames.append((frame.log_time_ns, Seen(frame.stamp_ns, image, truth)))
+                seen = Seen(frame.stamp_ns, frame.image.tobytes(), truth)
+                frames.append((frame.log_time_ns, seen))
             told += [*log.losses, *stream.accounting.notes]
             without_truth = selection.no_truth
     except LogError as error:
@@ -185,12 +185,10 @@ def street(**options: Any) -> Written:
     mask, encode_mask = drives.ros2_topic(MASK, "Image", IMAGE)
     messages = []
     for number in range(FRAMES):
-        image, road = scene(number)
-        at = drives.stamp(number)
-        data = encode(compressed(at, file_of(".jpg", image)))
-        messages.append(Logged(camera.name, at, at + 1000, data))
-        data = encode_mask(raw(at, road * 255, "mono8"))
-        messages.append(Logged(mask.name, at, at + 2000, data))
+        (image, road), at = scene(number), drives.stamp(number)
+        jpeg, road_mask = compressed(at, file_of(".jpg", image)), raw(at, road * 255, "mono8")
+        messages.append(Logged(CAMERA, at, at + 1000, encode(jpeg)))
+        messages.append(Logged(MASK, at, at + 2000, encode_mask(road_mask)))
     return written((camera, mask), messages, options)
 
 
@@ -213,10 +211,8 @@ def unlabelled(**options: Any) -> Written:
     camera, encode = drives.ros2_topic(CAMERA, "Image", IMAGE)
     messages = []
     for number in range(FRAMES):
-        image, _ = scene(number)
-        at = drives.stamp(number)
-        data = encode(raw(at, np.ascontiguousarray(image[..., ::-1]), "bgr8"))
-        messages.append(Logged(camera.name, at, at + 1000, data))
+        bgr, at = np.ascontiguousarray(scene(number)[0][..., ::-1]), drives.stamp(number)
+        messages.append(Logged(CAMERA, at, at + 1000, encode(raw(at, bgr, "bgr8"))))
     return written((camera,), messages, options)
 
 

@@ -31,7 +31,7 @@ FILE, RAW = b"\xff", b"\xfe"
 
 
 class Kind(NamedTuple):
-    """A kind of message: what decodes it, and one that is sound."""
+    """A kind of message: what describes and decodes it, and one that is sound."""
 
     channel: Channel
     schema: Schema | None
@@ -57,12 +57,10 @@ def check(data: bytes) -> None:
 
 def raw(choices: Choices) -> RawPicture:
     """Return pixels of a small size, whose fields may contradict each other."""
-    width, height = choices.number(40), choices.number(40)
-    encoding = choices.of(sorted(FORMATS))
+    width, height, encoding = choices.number(40), choices.number(40), choices.of(sorted(FORMATS))
     step = choices.of((0, 8 * width, choices.number(400)))
-    length = choices.of((8 * width * height, choices.number(20_000)))
-    big_endian = bool(choices.number(2))
-    return RawPicture(0, width, height, encoding, step, big_endian, memoryview(bytes(length)))
+    data = memoryview(bytes(choices.of((8 * width * height, choices.number(20_000)))))
+    return RawPicture(0, width, height, encoding, step, bool(choices.number(2)), data)
 
 
 def _decode(picture: Picture) -> None:
@@ -84,17 +82,9 @@ def kinds() -> list[Kind]:
         with suppress(NoEncoderError):
             log = flavour.log()
             (topic,) = log.topics
-            channel = Channel(
-                id=1,
-                topic=topic.name,
-                message_encoding=topic.encoding,
-                metadata={},
-                schema_id=1,
-            )
-            schema = None
-            if topic.schema:
-                name, language, text = topic.schema
-                schema = Schema(id=1, name=name, encoding=language, data=text)
+            channel = Channel(1, topic.name, topic.encoding, {}, 1)
+            name, language, text = topic.schema or ("", "", b"")
+            schema = Schema(1, text, language, name) if topic.schema else None
             decoder = decoder_for(channel, schema)
             found.append(Kind(channel, schema, decoder, log.messages[0].data))
     return found
@@ -103,14 +93,11 @@ def kinds() -> list[Kind]:
 def seeds() -> list[bytes]:
     """Return a message of each kind, and image files."""
     messages = [bytes([number]) + kind.sound for number, kind in enumerate(kinds())]
-    image = scenes()[0]
+    image, grey = scenes()[0], scenes()[0][..., 0]
     files = [file_of(suffix, image) for suffix in (".jpg", ".png", ".webp", ".tiff", ".bmp")]
-    files += [file_of(".png", image[..., 0]), file_of(".jpg", image[..., 0])]
-    return [
-        *messages,
-        *(FILE + data for data in files),
-        *(RAW + bytes((6, 0, 4, 0, 7 * n, 0)) + bytes(40) for n in range(len(FORMATS))),
-    ]
+    files += [file_of(suffix, grey) for suffix in (".png", ".jpg")]
+    pixels = [bytes((6, 0, 4, 0, 7 * n, 0)) + bytes(40) for n in range(len(FORMATS))]
+    return [*messages, *(FILE + data for data in files), *(RAW + data for data in pixels)]
 
 
 HARNESS = Harness(check, seeds, quick=1000)

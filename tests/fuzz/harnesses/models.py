@@ -45,11 +45,8 @@ def parts(data: bytes) -> bytes:
     """Return the files of an archive one after the other, each behind its length."""
     with zipfile.ZipFile(io.BytesIO(data)) as opened:
         files = [(name.encode(), opened.read(name)) for name in opened.namelist()]
-    return b"".join(
-        len(each).to_bytes(4, "little") + each
-        for name, content in files
-        for each in (name, content)
-    )
+    texts = [text for pair in files for text in pair]
+    return b"".join(len(text).to_bytes(4, "little") + text for text in texts)
 
 
 def archive(data: bytes) -> bytes:
@@ -71,9 +68,7 @@ def seeds() -> list[bytes]:
     folder = scratch() / "models"
     earlier = [unpack(version, folder).joinpath(MODEL).read_bytes() for version in versions()]
     models = [sound(), *earlier]
-    return [
-        head + data for model in models for head, data in ((FILE, model), (PARTS, parts(model)))
-    ]
+    return [*(FILE + model for model in models), *(PARTS + parts(model) for model in models)]
 
 
 HARNESS = Harness(check, seeds, quick=15)
