@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -93,18 +93,16 @@ class TopicInfo:
 
 def describe_topic(reader: TopicReader) -> TopicInfo:
     """Describe a topic from its messages' places and the first one that can be decoded."""
-    first_channel = reader.channels[0]
-    channel, schema = first_channel.channel, first_channel.schema
+    _, channel, schema, _ = reader.channels[0]
     logs = [source.log for source in reader.channels if source.log.count]
     count = sum(log.count for log in logs)
     first = min((log.first_ns for log in logs), default=None)
     last = max((log.last_ns for log in logs), default=None)
     times = reader.log_times
-    period, rate = median_period(times), None
-    if period > 0:
-        rate = NS / period
-    # Of a topic that is not read, only the number of messages and their time range are known.
-    elif count > 1 and first is not None and last is not None and last > first:
+    period = median_period(times)
+    rate = NS / period if period > 0 else None
+    # A topic that is not read tells only the number of messages and their time range.
+    if rate is None and count > 1 and first is not None and last is not None and last > first:
         rate = (count - 1) * NS / (last - first)
     before = np.flatnonzero(np.diff(times) > GAP * period) if period > 0 else ()
     topic = TopicInfo(
@@ -172,27 +170,14 @@ UNREAD: Final = UNREADABLE - 1
 """A stamp not read yet."""
 
 
-@dataclass(frozen=True)
-class FileChannel:
+class FileChannel(NamedTuple):
     """A channel of one file of the log."""
 
     container: Container
-    channel_id: int
-
-    @property
-    def channel(self) -> Channel:
-        """The channel's record."""
-        return self.container.channels[self.channel_id]
-
-    @property
-    def schema(self) -> Schema | None:
-        """The schema of its messages, if it has one."""
-        return self.container.schemas.get(self.channel.schema_id)
-
-    @property
-    def log(self) -> ChannelLog:
-        """Where its messages lie."""
-        return self.container.logs.get(self.channel_id, ChannelLog(wanted=False))
+    channel: Channel
+    schema: Schema | None
+    log: ChannelLog
+    """Where its messages lie."""
 
 
 class TopicReader:
@@ -218,12 +203,12 @@ class TopicReader:
         # A file that is damaged may have lost the topic itself.
         self._files = files
         self._lacks_files = lacks_files
-        rows = [np.empty((0, 4), np.int64)]
-        for number, source in enumerate(channels):
-            for chunk, entries in source.log.blocks:
-                place = np.full((len(entries), 2), (number, chunk), np.int64)
-                rows.append(np.hstack([entries, place]))
-        table = np.concatenate(rows)
+        rows = [
+            np.hstack([entries, np.full((len(entries), 2), (number, chunk), np.int64)])
+            for number, source in enumerate(channels)
+            for chunk, entries in source.log.blocks
+        ]
+        table = np.concatenate([np.empty((0, 4), np.int64), *rows])
         table = table[np.argsort(table[:, 0], kind="stable")]
         self.log_times: npt.NDArray[np.int64] = np.ascontiguousarray(table[:, 0])
         self._places = table[:, 1:]
@@ -267,8 +252,9 @@ class TopicReader:
             if source.container.is_bad(chunk):
                 raise LostMessageError(f"{self.name} message {position}: {error}") from error
             return None
+        # Times beyond those of int64 are negative in the table.
         same_time = message.log_time == int(self.log_times[position]) % 2**64
-        return message if same_time and message.channel_id == source.channel_id else None
+        return message if same_time and message.channel_id == source.channel.id else None
 
     def _correct(self, position: int) -> None:
         """Correct the places of a chunk's messages by looking into the chunk."""
@@ -276,7 +262,7 @@ class TopicReader:
         source = self.channels[number]
         here = np.flatnonzero((self._places[:, 1:] == (number, chunk)).all(axis=1))
         listed = {(int(self.log_times[i]), int(self._places[i, 0])): i for i in here}
-        entries = [tuple(e) for e in source.container.look(chunk, source.channel_id).tolist()]
+        entries = [tuple(e) for e in source.container.look(chunk, source.channel.id).tolist()]
         missed = [entry for entry in entries if entry not in listed]
         for wrong, right in zip(sorted(listed.keys() - {*entries}), missed, strict=False):
             self.log_times[listed[wrong]], self._places[listed[wrong], 0] = right
@@ -342,7 +328,7 @@ class TopicReader:
 
     def expected(self) -> int:
         """Return how many messages there should be, by the files' own statistics."""
-        return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)
+        return sum(s.container.expected.get(s.channel.id, 0) for s in self.channels)
 
     @property
     def sure(self) -> int:
@@ -350,12 +336,10 @@ class TopicReader:
 
         Damage may have taken an unknown number of messages before the others.
         """
-        ends = [end for end in map(sure_until, self._files) if end is not None]
         if self._lacks_files:
             return 0
-        if not ends:
-            return len(self)
-        return int(np.searchsorted(self.log_times, min(ends), side="right"))
+        ends = [end for end in map(sure_until, self._files) if end is not None]
+        return int(np.searchsorted(self.log_times, min(ends), side="right")) if ends else len(self)
 
     @property
     def is_small(self) -> bool:
@@ -365,11 +349,8 @@ class TopicReader:
     def readable(self) -> int:
         """Count the messages of the log, without those in chunks found to be damaged."""
         chunks, counts = np.unique(self._places[:, 1:], axis=0, return_counts=True)
-        return sum(
-            count
-            for (number, chunk), count in zip(chunks.tolist(), counts.tolist(), strict=True)
-            if not self.channels[number].container.is_bad(chunk)
-        )
+        is_bad = [self.channels[n].container.is_bad(chunk) for n, chunk in chunks.tolist()]
+        return int(counts[~np.array(is_bad, bool)].sum())
 
     def _decoder(self, position: int) -> Decoder:
         source = self.channels[self._places[position, 1]]
@@ -389,7 +370,10 @@ def topic_readers(
     channels: dict[str, list[FileChannel]] = {}
     for container in containers:
         for channel_id, channel in sorted(container.channels.items()):
-            channels.setdefault(channel.topic, []).append(FileChannel(container, channel_id))
+            schema = container.schemas.get(channel.schema_id)
+            log = container.logs.get(channel_id, ChannelLog(wanted=False))
+            carriers = channels.setdefault(channel.topic, [])
+            carriers.append(FileChannel(container, channel, schema, log))
     return {
         topic: TopicReader(topic, carriers, limits, containers, lacks_files=lacks_files)
         for topic, carriers in channels.items()
