@@ -21,7 +21,7 @@ STAMPS = [1_700_000_000 * SECOND + i * SECOND // 10 for i in range(20)]
 
 
 def camera(tmp_path: Path, images: list[dict[str, Any]], labels: list[dict[str, Any]] = ()) -> Path:
-    messages = [("/camera", *each) for each in zip(STAMPS, images, strict=False)]
+    messages = [("/camera", *pair) for pair in zip(STAMPS, images, strict=False)]
     messages += [("/labels", at + 1, label) for at, label in zip(STAMPS, labels, strict=False)]
     return ros2_log(tmp_path / "drive.mcap", sorted(messages, key=lambda message: message[1]))
 

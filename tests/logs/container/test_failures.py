@@ -104,7 +104,7 @@ def test_each_known_failure_is_read_and_said(folder, name, frames, said):
     with open_log(folder / f"{name}.mcap") as log:
         log.verify()
         assert {topic.count for topic in log.topics} == {frames}
-        told = " ".join(str(each) for each in log.damage)
+        told = " ".join(map(str, log.damage))
     assert said in told
     assert bool(said) == bool(told)
     assert process_time() - began < 10

@@ -60,26 +60,26 @@ def fields(encoding: str, name: str, text: tuple[str, str], data: bytes) -> Any:
 @pytest.mark.parametrize("kind", [0, 1, 7, 9])
 def test_a_camera_info_is_read_whatever_its_schema_says(text: tuple[str, str], kind: int):
     """rosbags-convert 0.11.9 writes D, K, R and P, names that mcap-ros2-support 0.5.5 refuses."""
-    found = fields("cdr", "sensor_msgs/msg/CameraInfo", text, packed(numbers(INFO), kind))
-    assert (found.header.frame_id, found.width, found.height) == ("cam", 96, 72)
-    assert (found.distortion_model, found.d, found.k, found.p) == ("plumb_bob", D, K, P)
-    assert (found.binning_x, found.binning_y) == (2, 3)
-    assert (found.roi.x_offset, found.roi.y_offset) == (1, 2)
-    assert (found.roi.width, found.roi.height) == (40, 30)
+    message = fields("cdr", "sensor_msgs/msg/CameraInfo", text, packed(numbers(INFO), kind))
+    assert (message.header.frame_id, message.width, message.height) == ("cam", 96, 72)
+    assert (message.distortion_model, message.d, message.k, message.p) == ("plumb_bob", D, K, P)
+    assert (message.binning_x, message.binning_y) == (2, 3)
+    assert (message.roi.x_offset, message.roi.y_offset) == (1, 2)
+    assert (message.roi.width, message.roi.height) == (40, 30)
 
 
 def test_a_camera_info_of_ros_1_is_read_without_a_text():
     data = packed([1, *numbers(INFO)], ros1=True)
-    found = fields("ros1", "sensor_msgs/CameraInfo", ("", ""), data)
-    assert (found.width, found.d, found.k, found.binning_y) == (96, D, K, 3)
+    message = fields("ros1", "sensor_msgs/CameraInfo", ("", ""), data)
+    assert (message.width, message.d, message.k, message.binning_y) == (96, D, K, 3)
 
 
 @pytest.mark.parametrize("kind", [0, 1, 7])
 def test_transforms_are_read_without_a_text(kind: int):
-    found = fields("cdr", "tf2_msgs/msg/TFMessage", ("", ""), packed(TRANSFORM, kind))
-    (each,) = found.transforms
-    assert (each.header.frame_id, each.child_frame_id) == ("base_link", "cam")
-    assert (each.transform.translation.z, each.transform.rotation.w) == (3.0, 0.8)
+    message = fields("cdr", "tf2_msgs/msg/TFMessage", ("", ""), packed(TRANSFORM, kind))
+    (frame,) = message.transforms
+    assert (frame.header.frame_id, frame.child_frame_id) == ("base_link", "cam")
+    assert (frame.transform.translation.z, frame.transform.rotation.w) == (3.0, 0.8)
 
 
 @pytest.mark.parametrize("cut", [-9, -1, 9])
@@ -111,13 +111,23 @@ def test_foxgloves_flatbuffers_are_read():
     parts |= {"FrameId": builder.CreateString("cam"), "Width": 96}
     builder.Finish(made(builder, CameraCalibration, **parts))
     text = "flatbuffer", ""
-    found = fields("flatbuffer", "foxglove.CameraCalibration", text, bytes(builder.Output()))
-    assert (found.frame_id, found.width, found.d, found.k, found.p) == ("cam", 96, D, K, P)
+    message = fields("flatbuffer", "foxglove.CameraCalibration", text, bytes(builder.Output()))
+    assert (message.frame_id, message.width, message.d, message.k, message.p) == (
+        "cam",
+        96,
+        D,
+        K,
+        P,
+    )
 
     builder = flatbuffers.Builder()
     parent = builder.CreateString("base_link")
     at, turn = made(builder, Vector3, Z=3.0), made(builder, Quaternion, W=0.8)
     parts = {"ParentFrameId": parent, "Translation": at, "Rotation": turn}
     builder.Finish(made(builder, FrameTransform, **parts))
-    found = fields("flatbuffer", "foxglove.FrameTransform", text, bytes(builder.Output()))
-    assert (found.parent_frame_id, found.translation.z, found.rotation.w) == ("base_link", 3.0, 0.8)
+    message = fields("flatbuffer", "foxglove.FrameTransform", text, bytes(builder.Output()))
+    assert (message.parent_frame_id, message.translation.z, message.rotation.w) == (
+        "base_link",
+        3.0,
+        0.8,
+    )

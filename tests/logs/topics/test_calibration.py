@@ -43,7 +43,7 @@ def info(
 ) -> dict[str, Any]:
     """A CameraInfo; ``roi`` are first column and row, width and height; the rest are d, k and p."""
     names = "x_offset", "y_offset", "width", "height"
-    lens = {"d": D, "k": K, "r": [0.0] * 9, "p": [0.0] * 12} | changed
+    numbers = {"d": D, "k": K, "r": [0.0] * 9, "p": [0.0] * 12} | changed
     return {
         "header": header(frame_id),
         "width": size[0],
@@ -51,7 +51,7 @@ def info(
         "distortion_model": model,
         "binning_x": binning[0],
         "binning_y": binning[1],
-        **{name: list(values) for name, values in lens.items()},
+        **{name: list(values) for name, values in numbers.items()},
         "roi": {**dict(zip(names, roi, strict=True)), "do_rectify": False},
     }
 
@@ -97,7 +97,7 @@ def ros2(
     return path
 
 
-def found(path: Path, topic: str | None = None) -> tuple[Calibration | None, str]:
+def lens_in(path: Path, topic: str | None = None) -> tuple[Calibration | None, str]:
     with open_log(path, LogConfig(topics=TopicSettings(image=topic))) as log:
         selection = log.select()
         return selection.calibration, selection.calibration_why
@@ -107,17 +107,17 @@ def front(
     folder: Path, tree: list[Parts] = TREE, topic="/front/image/compressed", **changed: Any
 ) -> tuple[Calibration | None, str]:
     """Return what is known of a camera with a CameraInfo that is changed so."""
-    return found(ros2(folder / "front.mcap", {"/front/info": info(**changed)}, tree, topic))
+    return lens_in(ros2(folder / "front.mcap", {"/front/info": info(**changed)}, tree, topic))
 
 
 def test_a_camera_of_ros_2_is_known_with_its_place_on_the_vehicle(tmp_path: Path):
-    known, _ = front(tmp_path)
-    assert (known.topic, known.width, known.height) == ("/front/info", *SIZE)
-    assert (known.matrix, known.distortion, known.model) == (tuple(K), tuple(D), "plumb_bob")
+    lens, _ = front(tmp_path)
+    assert (lens.topic, lens.width, lens.height) == ("/front/info", *SIZE)
+    assert (lens.matrix, lens.distortion, lens.model) == (tuple(K), tuple(D), "plumb_bob")
     (_, _, at, turn), (_, _, mast_at, mast_turn) = TREE
-    assert known.mounting.parent == "base_link"
-    assert known.mounting.translation == pytest.approx(np.array(mast_at) + mast_turn.apply(at))
-    turned = Rotation.from_quat(known.mounting.rotation)
+    assert lens.mounting.parent == "base_link"
+    assert lens.mounting.translation == pytest.approx(np.array(mast_at) + mast_turn.apply(at))
+    turned = Rotation.from_quat(lens.mounting.rotation)
     assert (turned.inv() * (mast_turn * turn)).magnitude() == pytest.approx(0, abs=1e-12)
 
 
@@ -131,11 +131,11 @@ def picture(topic: str = "/front/image") -> Message:
     return topic, "foxglove.CompressedImage", content
 
 
-def lens(focal: float = K[0]) -> Message:
-    known = {"width": 64, "height": 48, "distortion_model": "rational_polynomial", "D": D}
+def foxglove_lens(focal: float = K[0]) -> Message:
+    size = {"width": 64, "height": 48, "distortion_model": "rational_polynomial", "D": D}
     k = [focal, *K[1:]]
     p = [40.0, 0, 30, 0, 0, 41.0, 20, 0, 0, 0, 1, 0]
-    content = {"timestamp": TIME, "frame_id": "cam", **known, "K": k, "P": p}
+    content = {"timestamp": TIME, "frame_id": "cam", **size, "K": k, "P": p}
     return "/front/calibration", "foxglove.CameraCalibration", content
 
 
@@ -158,37 +158,40 @@ def test_a_camera_of_foxglove_is_known(tmp_path: Path):
     (_, _, at, turn), _ = TREE
     place = {"timestamp": TIME, "parent_frame_id": "car", "child_frame_id": "cam"}
     place |= moved(at, turn)
-    messages = [lens(), ("/tf_static", "foxglove.FrameTransform", place), picture()]
-    known, _ = found(foxglove(tmp_path / "a.mcap", messages))
-    assert (known.matrix, known.model) == (tuple(K), "rational_polynomial")
-    assert (known.mounting.parent, known.mounting.translation) == ("car", at)
+    messages = [foxglove_lens(), ("/tf_static", "foxglove.FrameTransform", place), picture()]
+    lens, _ = lens_in(foxglove(tmp_path / "a.mcap", messages))
+    assert (lens.matrix, lens.model) == (tuple(K), "rational_polynomial")
+    assert (lens.mounting.parent, lens.mounting.translation) == ("car", at)
 
 
 @pytest.mark.parametrize("name", ["P", "D", "distortion_model"])
 def test_fields_that_are_not_needed_may_be_missing(tmp_path: Path, name: str):
-    topic, kind, content = lens()
+    topic, kind, content = foxglove_lens()
     content = {key: value for key, value in content.items() if key != name}
-    known, _ = found(foxglove(tmp_path / "a.mcap", [(topic, kind, content), picture()]))
-    assert known.matrix == tuple(K)
+    lens, _ = lens_in(foxglove(tmp_path / "a.mcap", [(topic, kind, content), picture()]))
+    assert lens.matrix == tuple(K)
 
 
 def test_of_rectified_images_the_projection_holds_without_distortion(tmp_path: Path):
-    messages = [lens(), picture("/front/image_rect")]
-    known, _ = found(foxglove(tmp_path / "a.mcap", messages))
-    assert known.matrix == (40, 0, 30, 0, 41, 20, 0, 0, 1)
-    assert not known.distortion
+    messages = [foxglove_lens(), picture("/front/image_rect")]
+    lens, _ = lens_in(foxglove(tmp_path / "a.mcap", messages))
+    assert lens.matrix == (40, 0, 30, 0, 41, 20, 0, 0, 1)
+    assert not lens.distortion
 
 
 def test_a_calibration_that_changes_within_the_log_is_not_used(tmp_path: Path):
-    path = foxglove(tmp_path / "a.mcap", [lens(), picture(), lens(), lens(focal=60.0)])
-    assert found(path) == (None, "/front/calibration: it changes within the log")
+    path = foxglove(
+        tmp_path / "a.mcap",
+        [foxglove_lens(), picture(), foxglove_lens(), foxglove_lens(focal=60.0)],
+    )
+    assert lens_in(path) == (None, "/front/calibration: it changes within the log")
 
 
 def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
     for frame_id in ("cam_rear", "cam"):
         infos = {"/rear/info": info(frame_id), "/front/info": info()}
-        known, _ = found(ros2(tmp_path / frame_id, infos))
-        assert known.topic == "/front/info"
+        lens, _ = lens_in(ros2(tmp_path / frame_id, infos))
+        assert lens.topic == "/front/info"
 
 
 @pytest.mark.parametrize(
@@ -209,13 +212,13 @@ def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
     ],
 )
 def test_what_cannot_be_used_is_said_and_not_used(tmp_path, given, said):
-    known, why = front(tmp_path, **given)
-    assert known is None
+    lens, why = front(tmp_path, **given)
+    assert lens is None
     assert said in why
 
 
 def test_a_log_without_a_calibration_says_nothing(tmp_path):
-    assert found(ros2(tmp_path / "a.mcap", {})) == (None, "")
+    assert lens_in(ros2(tmp_path / "a.mcap", {})) == (None, "")
 
 
 @pytest.mark.parametrize(
@@ -227,8 +230,8 @@ def test_a_log_without_a_calibration_says_nothing(tmp_path):
     ],
 )
 def test_a_place_that_no_transform_leads_to_is_not_known(tmp_path: Path, tree: list[Parts]):
-    known, _ = front(tmp_path, tree)
-    assert known.mounting is None
+    lens, _ = front(tmp_path, tree)
+    assert lens.mounting is None
 
 
 @pytest.mark.parametrize(
@@ -244,15 +247,15 @@ def test_a_place_that_no_transform_leads_to_is_not_known(tmp_path: Path, tree: l
 def test_a_transform_that_is_none_is_said_and_not_used(tmp_path, at, turn, said):
     rotation = SimpleNamespace(as_quat=lambda: np.array(turn))
     tree = [TREE[0], ("mast", "base_link", at, cast("Rotation", rotation))]
-    known, why = front(tmp_path, tree)
-    assert known.mounting is None
+    lens, why = front(tmp_path, tree)
+    assert lens.mounting is None
     assert why.startswith(f"its place is not known: the transform of {said}")
 
 
 def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
-    known = Calibration("/c", 64, 48, tuple(K)).scaled(32, 16)
+    lens = Calibration("/c", 64, 48, tuple(K)).scaled(32, 16)
     point = np.array([0.3, -0.2, 2.0])
-    whole, less = (np.array(m).reshape(3, 3) @ point for m in (K, known.matrix))
+    whole, less = (np.array(m).reshape(3, 3) @ point for m in (K, lens.matrix))
     # The image's corner, half a pixel before the centre of its first one, stays where it is.
     assert less[:2] / less[2] + 0.5 == pytest.approx((whole[:2] / whole[2] + 0.5) / [2, 3])
 
@@ -280,9 +283,9 @@ def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
     ],
 )
 def test_a_part_of_the_sensor_and_binned_pixels_are_as_ros_means_them(tmp_path, given, matrix):
-    known, why = front(tmp_path, **given)
-    assert (known.width, known.height) == SIZE
-    assert known.matrix == tuple(matrix)
+    lens, why = front(tmp_path, **given)
+    assert (lens.width, lens.height) == SIZE
+    assert lens.matrix == tuple(matrix)
     assert why == ""
 
 
@@ -297,8 +300,8 @@ def test_a_part_of_the_sensor_and_binned_pixels_are_as_ros_means_them(tmp_path, 
     ],
 )
 def test_a_lens_of_another_resolution_is_scaled_or_doubted_and_said(tmp_path, given, focal, said):
-    known, why = front(tmp_path, **given)
-    assert (known.width, known.height, known.matrix[0]) == (*SIZE, focal)
+    lens, why = front(tmp_path, **given)
+    assert (lens.width, lens.height, lens.matrix[0]) == (*SIZE, focal)
     assert said in why
 
 
@@ -322,8 +325,8 @@ SAME = [*K[:3], 0.0, *K[3:6], 0.0, *K[6:], 0.0]
     ],
 )
 def test_names_and_numbers_tell_whether_images_are_rectified(tmp_path, topic, given, focal, bends):
-    known, why = front(tmp_path, topic=topic, **given)
-    assert (known.matrix[0], known.bends) == (focal, bends)
+    lens, why = front(tmp_path, topic=topic, **given)
+    assert (lens.matrix[0], lens.bends) == (focal, bends)
     assert ("taken as not rectified" in why) == (given.get("p") == SAME and bends)
 
 
@@ -338,8 +341,8 @@ def test_rectified_images_without_a_projection_have_no_lens(tmp_path: Path):
 def test_messages_of_zeros_are_passed_over(tmp_path: Path, before: int, right: int, after: int):
     zero = info(k=[0.0] * 9, size=(0, 0))
     messages = [*[zero] * before, *[info()] * right, *[zero] * after]
-    known, why = found(ros2(tmp_path / "a.mcap", {"/front/info": messages}))
-    assert (known.matrix, why) == (tuple(K), "")
+    lens, why = lens_in(ros2(tmp_path / "a.mcap", {"/front/info": messages}))
+    assert (lens.matrix, why) == (tuple(K), "")
 
 
 def test_a_camera_frame_with_the_axes_of_a_vehicle_is_read_so(tmp_path: Path):
@@ -350,22 +353,22 @@ def test_a_camera_frame_with_the_axes_of_a_vehicle_is_read_so(tmp_path: Path):
         tree: list[Parts] = [("cam", "base_link", (1.0, 0.0, 1.2), turn)]
         images.append(front(tmp_path, tree))
     (of_body, why), (of_optical, nothing) = images
-    for known in (of_body, of_optical):
-        apart = Rotation.from_quat(known.mounting.rotation).inv() * optical
+    for lens in (of_body, of_optical):
+        apart = Rotation.from_quat(lens.mounting.rotation).inv() * optical
         assert apart.magnitude() == pytest.approx(0, abs=1e-9)
     assert (why, nothing) == ("cam has the axes of a vehicle, x ahead, and is read so", "")
     assert (of_body.frame_id, of_optical.frame_id) == ("cam_optical", "cam")
 
 
 def test_transforms_that_cannot_be_read_are_said(tmp_path: Path):
-    messages = [lens(), ("/tf_static", "foxglove.FrameTransform", {"x": 1}), picture()]
-    known, why = found(foxglove(tmp_path / "a.mcap", messages))
-    assert known is not None
+    messages = [foxglove_lens(), ("/tf_static", "foxglove.FrameTransform", {"x": 1}), picture()]
+    lens, why = lens_in(foxglove(tmp_path / "a.mcap", messages))
+    assert lens is not None
     assert why == "its place is not known: /tf_static cannot be read"
 
 
 def test_a_calibration_that_cannot_be_read_is_said(tmp_path: Path):
-    topic, name, content = lens()
+    topic, name, content = foxglove_lens()
     path = foxglove(tmp_path / "a.mcap", [(topic, name, {**content, "K": None}), picture()])
     why = "its json messages of foxglove.CameraCalibration cannot be read: give its lens with"
-    assert found(path) == (None, f"/front/calibration: {why} `ground`")
+    assert lens_in(path) == (None, f"/front/calibration: {why} `ground`")
