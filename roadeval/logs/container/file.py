@@ -66,11 +66,7 @@ class ChannelLog:
 
 
 def containers_in(
-    path: Path,
-    wanted: Wanted,
-    stamp_of: StampOf,
-    *,
-    opened: IO[bytes] | None = None,
+    path: Path, wanted: Wanted, stamp_of: StampOf, *, opened: IO[bytes] | None = None
 ) -> Iterator[Container]:
     """Open the log in a file, and those that follow it in the same file.
 

@@ -21,11 +21,6 @@ def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
     assert pixels[0, :, 0].tolist() == [0, 128, 255, 255, 0]
 
 
-def test_padding_between_rows_is_skipped() -> None:
-    padded = picture(b"\x01\x02xx\x03\x04xx", "mono8", 2, 2, step=4)
-    assert to_rgb(padded, LIMITS)[..., 0].tolist() == [[1, 2], [3, 4]]
-
-
 def test_labels_keep_sixteen_bits() -> None:
     assert to_labels(picture(b"\x2c\x01", "16UC1", 1), LIMITS).tolist() == [[300]]
 

@@ -25,12 +25,6 @@ def other(name: str) -> TopicInfo:
     return TopicInfo(name, "sensor_msgs/msg/Imu", "cdr", TopicKind.OTHER, 5)
 
 
-def truth_of(*labels: TopicInfo, image: str = "/front/image") -> str | None:
-    topics = [camera(image), *labels]
-    topic = choose_truth(topics, topics[0], None, LabelSettings()).topic
-    return topic.name if topic else None
-
-
 def test_labels_and_masks_are_no_cameras() -> None:
     topics = [camera("/cam"), label("/labels/semantic"), label("/road_mask"), label("/shadowMask")]
     assert choose_image(topics, None)[0].name == "/cam"
@@ -89,12 +83,9 @@ OTHERS = ["/ego_mask", "/shadow_mask", "/net/road_mask", "/mono", "/truth/shadow
 
 @pytest.mark.parametrize("name", [*ROADS, *OTHERS])
 def test_one_plain_label_image_is_the_truth_and_other_masks_are_none(name: str) -> None:
-    assert truth_of(label(name)) == (name if name in ROADS else None)
-
-
-def test_the_labels_of_the_chosen_camera_are_taken() -> None:
-    labels = (label("/front/labels"), label("/rear/labels"))
-    assert truth_of(*labels, image="/rear/image") == "/rear/labels"
+    topics = [camera("/front/image"), label(name)]
+    topic = choose_truth(topics, topics[0], None, LabelSettings()).topic
+    assert topic == (topics[1] if name in ROADS else None)
 
 
 def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
