@@ -51,6 +51,8 @@ _LENS: Final = "distortion_model:str d:f8[] k:f8[9] r:f8[9] p:f8[12]"
 _MOVED: Final = "translation:vector rotation:quaternion"
 _FRAME: Final = f"timestamp:time parent_frame_id:str child_frame_id:str {_MOVED}"
 NESTED: Final = {
+    "time": _fields("sec:u4 nanosec:u4"),
+    "header": _fields("stamp:time frame_id:str"),
     "region": _fields("x_offset:u4 y_offset:u4 height:u4 width:u4 do_rectify:u1"),
     "vector": _fields("x:f8 y:f8 z:f8"),
     "quaternion": _fields("x:f8 y:f8 z:f8 w:f8"),
@@ -185,12 +187,10 @@ class FieldReader:
         return SimpleNamespace(**{name: self._field(kind) for name, kind in fields})
 
     def _field(self, kind: str) -> Any:
-        if kind == "header":
-            if not self._aligned:
-                self._number("u4")  # ROS 1 counts its headers
-            return SimpleNamespace(stamp=self._field("time"), frame_id=self._field("str"))
-        if kind == "time":
-            return SimpleNamespace(sec=self._number("u4"), nanosec=self._number("u4"))
+        if kind == "header" and not self._aligned:
+            self._number("u4")  # ROS 1 counts its headers
+        if kind in NESTED:
+            return self.read(NESTED[kind])
         if kind == "str":
             return bytes(self._take(self._number("u4"))).rstrip(b"\0").decode("utf-8", "replace")
         if kind == "bytes":
@@ -200,7 +200,7 @@ class FieldReader:
             items = int(length or self._number("u4"))
             # Each takes eight bytes at least: a damaged number of them would take for ever.
             return [self._field(kind) for _ in range(min(items, self.left // 8 + 1))]
-        return self.read(NESTED[kind]) if kind in NESTED else self._number(kind)
+        return self._number(kind)
 
     def _number(self, kind: str) -> Any:
         code = struct.Struct(self._order + _CODES[kind])
