@@ -164,10 +164,11 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
     """
     if isinstance(picture, RawPicture):
         return rows_of(picture, limits) if format_of(picture).dtype != "u1" else None
-    if _file_in(picture) is None:
+    file = _file_in(picture)
+    if file is None:
         return None
     with _bad_message():
-        return decoding.deep_samples(file_of(picture), limits)
+        return decoding.deep_samples(file, limits)
 
 
 def to_labels(picture: Picture, limits: Limits) -> Array:
