@@ -163,6 +163,35 @@ def test_a_bad_method_before_a_standing_vehicle_is_not_called_moved() -> None:
     assert found([road] * FRAMES, images, mine=bad) == []
 
 
+UNTOUCHED: dict[str, Callable[[Masks], Masks]] = {
+    "exact": lambda roads: roads,
+    "wide": lambda roads: rough(roads, grow=3),
+    "narrow with holes": lambda roads: rough(roads, grow=-3, holes=0.2),
+    "shaky": lambda roads: [
+        np.roll(r, (n % 5 - 2, n % 7 - 3), (0, 1)) for n, r in enumerate(roads)
+    ],
+}
+
+
+@pytest.mark.parametrize("method", UNTOUCHED)
+def test_a_straight_empty_road_is_left_alone(method: str) -> None:
+    roads = [road_at(0.0)] * FRAMES
+    dashes = [(np.arange(HEIGHT)[:, None] + 9 * n) % 24 < 12 for n in range(FRAMES)]
+    centre = abs(np.arange(WIDTH) - 80) <= 2
+    images = [
+        np.where((road * dash * centre)[..., None] > 0, np.uint8(240), image_of(road, seed))
+        for seed, (road, dash) in enumerate(zip(roads, dashes, strict=True))
+    ]
+    assert found(roads, images, roads, mine=UNTOUCHED[method](roads)) == []
+
+
+@pytest.mark.parametrize("method", UNTOUCHED)
+def test_a_drive_of_a_frame_a_second_is_left_alone(method: str) -> None:
+    roads = [road_at(15.0 * second) for second in range(FRAMES)]
+    images = [image_of(road, seed) for seed, road in enumerate(roads)]
+    assert found(roads, images, roads, mine=UNTOUCHED[method](roads)) == []
+
+
 def test_few_frames_say_nothing() -> None:
     assert found(late(ROADS, 3)[:5], IMAGES[:5], mine=ROADS[:5]) == []
 
