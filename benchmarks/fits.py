@@ -5,7 +5,8 @@ presets paper, gated and robust, adds a small network that learns from its first
 their masks against truth and images: as they are, late by 1 to 5 frames, early, mirrored, upside
 down, inverted, and moved by 3 to 12 pixels. It prints a line of a table for each drive. Named is
 what is named by its kind, side, frames and pixels, these within two; of a lag of 3 frames and more
-it is enough that it is late or early. CPU is that of one run with masks from elsewhere.
+it is enough that it is late or early. Pixels are judged by what is planted, whatever a method's own
+offset from the truth. CPU is that of one run with masks from elsewhere.
 """
 
 from __future__ import annotations
