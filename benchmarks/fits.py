@@ -25,7 +25,7 @@ from sklearn.neural_network import MLPClassifier
 
 import roadeval
 from roadeval.data import Frame, FrameResult, Packed
-from roadeval.evaluation.score import TRUTH, Finding, FitCheck, Misfit
+from roadeval.evaluation.score.fit import TRUTH, Finding, FitCheck, Misfit
 
 Masks = npt.NDArray[np.uint8]
 LAGS = (1, 2, 3, 4, 5, -1, -2, -3)

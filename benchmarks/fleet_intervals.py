@@ -14,10 +14,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 from scipy import special
 
 from benchmarks.intervals import show
-from roadeval.evaluation.stats import DriveMean, group_means, over_drives
+from roadeval.evaluation.stats import group_means, over_drives
 
 Values = npt.NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Values]
@@ -63,16 +64,13 @@ LAYOUTS: Final = (
 )
 
 
-def fleet(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[DriveMean]:
+def fleet(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> pd.DataFrame:
     """Make up a fleet whose mean is 0 and whose drives differ by 1, in `SCALE`."""
     sizes = rng.integers(1, layout.drives + 1, groups)
     group = np.repeat(np.arange(groups), sizes)
     errors = np.exp(rng.uniform(math.log(layout.least), math.log(layout.most), len(group)))
     measured = _effects(rng, draw, layout, group) + errors * rng.standard_normal(len(group))
-    return [
-        DriveMean(f"{place:05}", f"{group[place]:05}", SCALE * measured[place])
-        for place in range(len(group))
-    ]
+    return pd.DataFrame({"drive": range(len(group)), "group": group, "mean": SCALE * measured})
 
 
 def _effects(

@@ -24,8 +24,7 @@ import roadeval
 from benchmarks.tables import idd
 from benchmarks.world import RenderSettings, write_drive
 from roadeval.data import IGNORE, ROAD
-from roadeval.evaluation.score import chosen
-from roadeval.evaluation.score.unlabelled import entropy
+from roadeval.evaluation.score.unlabelled import chosen, entropy
 from roadeval.evaluation.stats import Estimate, draw_order, estimate
 from roadeval.pipeline.stage import View
 from roadeval.training.learning import fit

@@ -160,8 +160,9 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
                 results.append(done.lines)
             recorder.finish({})
             cost = meter.read()
-            results.append(csv_lines(run.key, sum_rows(run.board)))
-            results.finish(summary.of(run, [], results.tables), "")
+            sums = run.board.summary()
+            results.append(csv_lines(run.key, sum_rows(run.board, sums.windows)))
+            results.finish(summary.of(run, sums, [], results.tables), "")
         return cost
 
 

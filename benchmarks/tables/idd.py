@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
-from roadeval.evaluation.score import BlindPrior
+from roadeval.evaluation.score.frame import BlindPrior
 from roadeval.pipeline.beyond.features import GROUPS
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View

@@ -44,7 +44,7 @@ def usage() -> Iterator[None]:
 
 
 def _condition(texts: list[str] | None) -> list[str] | None:
-    from roadeval.evaluation.comparison import Condition
+    from roadeval.evaluation.comparison.conditions import Condition
 
     with usage():
         for text in texts or ():

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from roadeval.runtime.settings import Checked, Flag
+from roadeval.runtime.settings import Flag
 
 SECTIONS: Final = (
     *("topics", "truth", "labels", "frames", "ground", "training", "evaluation", "output"),
@@ -16,12 +15,6 @@ SECTIONS: Final = (
 )
 """The tables that hold for the whole run, by the names of the fields of
 `roadeval.config.run.RunConfig`."""
-
-
-def _keep(value: object) -> object:
-    if isinstance(value, str) and not re.fullmatch(r"all|none|worst:[1-9]\d{0,5}", value):
-        raise ValueError("must be all, none or worst:N")
-    return value
 
 
 @dataclass(frozen=True)
@@ -62,8 +55,7 @@ class FleetSettings:
     """Score each drive by a model of others: deal drives, or their groups, into K folds. Each fold
     is scored by a model that learnt from the others. Copies of one log are of one group. Without
     folds ``training.model`` scores all, or each drive trains its own."""
-    keep: Annotated[str, Checked(_keep), Flag("--keep", "WHAT")] = "none"
-    """Recordings that stay: ``all``, those of the ``worst:N`` drives by ERR, or ``none``, which
-    means that none is made."""
+    keep: Annotated[Literal["all", "none"], Flag("--keep", "WHAT")] = "none"
+    """Whether every drive is recorded: ``all``, or ``none``."""
     scheduler: Annotated[str | None, Flag("--scheduler", "ADDRESS")] = None
     """A Dask scheduler, as ``tcp://host:8786``, or its file: its workers replay the drives."""

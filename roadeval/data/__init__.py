@@ -48,7 +48,6 @@ from roadeval.data.result import (
     FrameResult,
     Health,
     Output,
-    Rows,
     StageResult,
     Tally,
     Transition,

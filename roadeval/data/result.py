@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Final, NamedTuple, TypeVar
 
-import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.arrays import Floats, Packed, Sums, TruthBits
@@ -267,62 +266,6 @@ class FrameResult:
 Cells = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Rows of a table."""
-
-    columns: Mapping[str, Cells]
-    """``(n,)`` each, by name: text, int64 or float64; an undefined number is NaN."""
-
-    def __len__(self) -> int:
-        return len(next(iter(self.columns.values())))
-
-    def __getitem__(self, name: str) -> Cells:
-        return self.columns[name]
-
-    def take(self, chosen: Cells | slice) -> Rows:
-        """Return the rows at some places, or where a mask of bools holds."""
-        return Rows({name: column[chosen] for name, column in self.columns.items()})
-
-    def of_variant(self, name: str) -> Rows:
-        """Return the rows of a variant."""
-        return self.take(self["variant"] == name)
-
-    def replace(self, **columns: Cells) -> Rows:
-        """Return the rows with some columns added, or in place of their own."""
-        return Rows({**self.columns, **columns})
-
-    def distinct(self, name: str) -> list[Any]:
-        """Return the values of a column, each once, in the order in which they first occur."""
-        values, first = np.unique(self[name], return_index=True)
-        found: list[Any] = values[np.argsort(first)].tolist()
-        return found
-
-    def groups(self, *names: str) -> Iterator[tuple[Any, Cells]]:
-        """Yield the values of some columns, a tuple, and the places of their rows, in order.
-
-        The values of each column are in the order in which they first occur.
-        """
-        groups: list[tuple[Any, Cells]] = [((), np.arange(len(self)))]
-        for column in map(self.columns.__getitem__, names):
-            groups = [
-                ((*known, value), places[own])
-                for known, places in groups
-                for value, own in _each(column[places])
-            ]
-        yield from groups
-
-
-def _each(values: Cells) -> Iterator[tuple[Any, Cells]]:
-    """Yield the different ones of many values, as they first occur, and where each is."""
-    left = np.ones(len(values), bool)
-    while left.any():
-        value = values[left.argmax()]
-        own = values == value
-        left &= ~own
-        yield value.item(), own
-
-
 T = TypeVar("T")
 
 
@@ -332,9 +275,3 @@ def as_tree(items: Iterable[tuple[tuple[str, str], T]]) -> dict[str, dict[str, T
     for (one, other), item in items:
         tree.setdefault(one, {})[other] = item
     return tree
-
-
-def joined(parts: Sequence[Rows]) -> Rows:
-    """Return rows one after the other, with the columns that all have, in the first's order."""
-    names = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
-    return Rows({name: np.concatenate([part[name] for part in parts]) for name in names})

@@ -24,13 +24,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
-from roadeval.logs.topics.reader import (
-    SMALL,
-    TopicInfo,
-    TopicReader,
-    describe_topic,
-    topic_readers,
-)
+from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
 from roadeval.logs.truth.names import shown_name, with_keys
@@ -280,11 +274,7 @@ class Log:
         return replace(self, config=config, of_rig=True)
 
     def frames(
-        self,
-        selection: Selection,
-        only: Collection[int] | None = None,
-        *,
-        labelled: bool = False,
+        self, selection: Selection, only: Collection[int] | None = None, *, labelled: bool = False
     ) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.
 

@@ -33,7 +33,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import IGNORED
 from roadeval.data.words import short_names
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.metrics import TESTED
 from roadeval.geometry.plan import Plan
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns

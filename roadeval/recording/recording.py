@@ -11,14 +11,14 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import ERRORS, Rows, VariantLayout
+from roadeval.data import ERRORS, VariantLayout
 from roadeval.data.arrays import Plane
 from roadeval.data.result import Cells
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError, SeveralCamerasError
 from roadeval.recording.rrd_file import TEXT, RrdFile, whole
 from roadeval.results.facts import Facts, another_format
-from roadeval.results.tables import TableFacts, read_rows, read_table
+from roadeval.results.tables import TableFacts, read_table
 from roadeval.runtime.documents import check_texts, read_json
 from roadeval.version import VERSION
 
@@ -153,10 +153,6 @@ class Recording:
     def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table by its name, as ``oracles``; empty if the run has none."""
         return read_table(name, self._text(name), self._stated)
-
-    def rows(self, name: str) -> Rows:
-        """Return the rows of a table as `table` does, without pandas."""
-        return read_rows(name, self._text(name), self._stated)
 
     @property
     def _stated(self) -> Mapping[str, TableFacts] | None:

@@ -34,8 +34,7 @@ from roadeval.data import (
 )
 from roadeval.data.colours import Colour
 from roadeval.data.words import percent, short_names
-from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.geometry.ground import Ground
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec

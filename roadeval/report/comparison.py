@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from itertools import groupby, pairwise
 from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
-from roadeval.evaluation.comparison import (
+from roadeval.evaluation.comparison.compare import (
     Change,
     ComparedResult,
     Comparison,
     DriveChange,
-    Judgement,
-    MovedFrame,
     RegionChange,
 )
-from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.comparison.conditions import Judgement
+from roadeval.evaluation.comparison.pairing import MovedFrame
+from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -32,7 +32,6 @@ from roadeval.report.blocks import (
 from roadeval.report.blocks import markdown as written
 from roadeval.report.chart import Chart
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import ForestRow
 from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
 
@@ -92,23 +91,10 @@ def document(
 def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
     blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
-    return f"# {_title(judgements)}\n\n{written(blocks)}"
-
-
-def _title(judgements: Sequence[Judgement]) -> str:
-    if not judgements:
-        return "roadeval comparison"
-    return f"roadeval: {told.headline([each.holds for each in judgements])}"
-
-
-def _limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
-    for title, kind, tone in (
-        ("Limits exceeded", True, "warning"),
-        ("Not judged", None, "warning"),
-        ("Limits kept", False, "plain"),
-    ):
-        if own := [told.judged(each) for each in judgements if each.holds is kind]:
-            yield BulletList(title, own, tone)
+    title = "roadeval comparison"
+    if judgements:
+        title = f"roadeval: {told.headline([each.holds for each in judgements])}"
+    return f"# {title}\n\n{written(blocks)}"
 
 
 def _about(result: ComparedResult) -> str:
@@ -129,7 +115,13 @@ def overview(
 
     ``judgements`` are of the limits that were set; at most ``most`` changed settings are named.
     """
-    yield from _limits(judgements)
+    for title, kind, tone in (
+        ("Limits exceeded", True, "warning"),
+        ("Not judged", None, "warning"),
+        ("Limits kept", False, "plain"),
+    ):
+        if lines := [told.judged(each) for each in judgements if each.holds is kind]:
+            yield BulletList(title, lines, tone)
     yield Text(told.verdict(comparison), "verdict")
     yield from (Text(line) for line in told.changed_settings(comparison, most))
     yield from _changes(comparison)
@@ -233,18 +225,32 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         legend = correction(row.difference for row in comparison.regions)
         yield Heading("Where it is better, and where worse", 2)
         if rows := [row for row in comparison.regions if not row.difference.is_zero]:
-            yield _region_table(rows)
+            columns: Columns = {
+                "region": lambda row: row.title,
+                "frames": lambda row: str(row.frames),
+                **_change(lambda row: marked_interval(row.difference)),
+            }
+            yield _table(rows, columns, _REGIONS)
         same = "" if len(rows) == len(comparison.regions) else _SAME
         yield Text(" ".join(filter(None, [legend, same, _LEFT_OUT])), "note")
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
-        yield _moved_table(comparison.moved, inspect)
+        columns = {
+            "frame": lambda row: str(row.frame),
+            "stamp": lambda row: timestamp(row.stamp_ns),
+            "ERR base": lambda row: percent(row.base),
+            "new": lambda row: percent(row.new),
+            "difference": lambda row: Cell(points(row.change), bold=True),
+        }
+        if inspect:
+            columns[_COMMAND] = lambda row: inspect(row.result, row.frame)
+        yield _table(comparison.moved, columns)
 
 
 def changed_drives(comparison: Comparison) -> Iterator[Block]:
     """Yield a table a mask of the drives that changed, the surest first."""
-    for result, variant in _masks(comparison):
-        if rows := [row for row in _own(comparison, result, variant) if row.changed]:
+    for (result, variant), own in _by_mask(comparison).items():
+        if rows := [row for row in own if row.changed]:
             shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
             title = f"{variant} of {result}" if len(comparison.results) > 2 else variant
             yield Heading(f"Drives on which {title} changed{shown}, the surest first", 2)
@@ -272,51 +278,25 @@ def _change(ends: Callable[[Any], str]) -> Columns:
     return dict(zip(CHANGE, cells, strict=True))
 
 
-def _masks(comparison: Comparison) -> list[tuple[str, str]]:
-    return list(dict.fromkeys((row.result, row.variant) for row in comparison.drives))
-
-
-def _own(comparison: Comparison, result: str, variant: str) -> list[DriveChange]:
-    return [row for row in comparison.drives if (row.result, row.variant) == (result, variant)]
+def _by_mask(comparison: Comparison) -> dict[tuple[str, str], list[DriveChange]]:
+    masks: dict[tuple[str, str], list[DriveChange]] = {}
+    for row in comparison.drives:
+        masks.setdefault((row.result, row.variant), []).append(row)
+    return masks
 
 
 def _plot(comparison: Comparison) -> Iterator[Block]:
     """Yield the change of the first mask on every drive."""
-    own = _own(comparison, *_masks(comparison)[0])
-    rows = [
-        ForestRow(row.drive, None, row.difference.mean, row.difference.low, row.difference.high)
-        for row in own
-        if row.difference.units
-    ]
-    if not rows:
-        return
-    key = (own[0].result, own[0].variant, own[0].stage)
-    (over,) = (
-        each.difference[TESTED]
-        for each in comparison.changes
-        if (each.result, each.variant, each.stage) == key
-    )
-    yield charts.forest(rows, over, f"change of {TESTED} of {own[0].variant}")
+    import pandas as pd
 
-
-def _region_table(rows: Sequence[RegionChange]) -> Table:
-    columns: Columns = {
-        "region": lambda row: row.title,
-        "frames": lambda row: str(row.frames),
-        **_change(lambda row: marked_interval(row.difference)),
-    }
-    return _table(rows, columns, _REGIONS)
-
-
-def _moved_table(rows: Sequence[MovedFrame], inspect: Inspect | None) -> Table:
-    """Tabulate the frames whose error rate changed most, with what opens each of the new result."""
-    columns: Columns = {
-        "frame": lambda row: str(row.frame),
-        "stamp": lambda row: timestamp(row.stamp_ns),
-        "ERR base": lambda row: percent(row.base),
-        "new": lambda row: percent(row.new),
-        "difference": lambda row: Cell(points(row.change), bold=True),
-    }
-    if inspect:
-        columns[_COMMAND] = lambda row: inspect(row.result, row.frame)
-    return _table(rows, columns)
+    (result, variant), own = next(iter(_by_mask(comparison).items()))
+    drives = [(row.drive, asdict(row.difference)) for row in own if row.difference.units]
+    if drives:
+        rows = pd.DataFrame([{"name": name, "group": "", **change} for name, change in drives])
+        mask = result, variant, own[0].stage
+        (over,) = (
+            row.difference[TESTED]
+            for row in comparison.changes
+            if (row.result, row.variant, row.stage) == mask
+        )
+        yield charts.forest(rows, over, f"change of {TESTED} of {variant}")

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -19,22 +19,18 @@ from matplotlib.image import FigureImage
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from matplotlib.transforms import Bbox, TransformedBbox
 
-from roadeval.data import (
-    BASELINE,
-    FILTERED,
-    IGNORE,
-    UNFILTERED,
-    Rgb,
-    Rows,
-    as_plain,
-)
-from roadeval.evaluation import score
+from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, Rgb, as_plain
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.tables import finals, values_of
 from roadeval.report.chart import FAINT, thinned
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.images import ExampleFrame, finest_jpeg, pictures_of
 from roadeval.report.pdf.typeset import figure_as
 from roadeval.runtime.text import elided, visible
 from roadeval.runtime.threads import ordered
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DPI: Final = 200
 WIDTH: Final = 8
@@ -71,7 +67,11 @@ RC: Final[dict[str, Any]] = {
 
 
 def write_figures(
-    folder: Path, drive: str, windows: Rows, examples: Sequence[ExampleFrame], camera: str = ""
+    folder: Path,
+    drive: str,
+    windows: pd.DataFrame,
+    examples: Sequence[ExampleFrame],
+    camera: str = "",
 ) -> list[Path]:
     """Write every figure that has something to draw as PNG and PDF; return the files.
 
@@ -137,12 +137,12 @@ _WIDEST: Final = 80
 """Letters that have room in a line of a figure, with a legend's lines beside them."""
 
 
-def error_rate(drive: str, windows: Rows) -> Figure:
+def error_rate(drive: str, windows: pd.DataFrame) -> Figure:
     """Draw figure 3a of the paper: the error rate over the drive, in rows of ten frames."""
-    return _over_drive(f"Error rate on {drive}", windows, {"ERR": "Error rate (ERR)"})
+    return _over_drive(f"Error rate on {drive}", windows, {TESTED: "Error rate (ERR)"})
 
 
-def fp_fn_rate(drive: str, windows: Rows) -> Figure:
+def fp_fn_rate(drive: str, windows: pd.DataFrame) -> Figure:
     """Draw figure 3b of the paper: both kinds of error over the drive, in rows of ten frames."""
     rates = {
         "FPR": "False positives (FPR)\nnon-road called road",
@@ -151,7 +151,7 @@ def fp_fn_rate(drive: str, windows: Rows) -> Figure:
     return _over_drive(f"False positive and false negative rate on {drive}", windows, rates)
 
 
-def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
+def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> Figure:
     """Draw rates of each variant's final mask, each with its label, one below the other."""
     charts = over_windows(windows, [*rates])
     figure = Figure(figsize=(WIDTH, 1.9 + 2 * len(charts)), layout="constrained")
@@ -202,10 +202,9 @@ def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
     return figure
 
 
-def _subtitle(windows: Rows) -> str:
-    stages = ", ".join(score.finals(windows).distinct("stage"))
-    size, count = windows["frames"].max(), len(windows.distinct("window"))
-    rows = -(-count // CROWDED)
+def _subtitle(windows: pd.DataFrame) -> str:
+    stages = ", ".join(values_of(finals(windows), "stage"))
+    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // CROWDED)
     each = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
     return f"Final mask ({stages}); each point is the mean of {each}; lower is better"
 

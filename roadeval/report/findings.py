@@ -6,20 +6,26 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Rows
+from roadeval.data import BASELINE
+from roadeval.data.arrays import Floats
 from roadeval.data.words import defined
-from roadeval.evaluation import score
+from roadeval.evaluation import tables
 from roadeval.evaluation.metres import band_name
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.stats import mean_distribution
+from roadeval.evaluation.tables import grouped, only, values_of
 from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
-from roadeval.results.rows import as_arrays, window_table
+from roadeval.results.tables import read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 WINDOWS: Final = 30
 """Points of the figures over the drive, at most."""
@@ -37,7 +43,7 @@ class NotableFrame:
     rates: Mapping[str, Mapping[str, float]]
     """Of each variant's final mask, as short tables show them; without truth its doubts."""
     parts: Mapping[str, float] = field(default_factory=dict)
-    """The parts of the ERR of ``variant``, by stage, see `Findings.error_parts`."""
+    """The parts of the ERR of ``variant``, by stage, see `roadeval.evaluation.tables.causes`."""
     change: float | None = None
     """The filter's change of ERR, or None."""
     notes: Sequence[str] = ()
@@ -53,12 +59,7 @@ class NotableFrame:
     def error(self) -> float:
         """The ERR of the first variant, or its first doubt; below 0 where none is defined."""
         rates = next(iter(self.rates.values()), {})
-        return next((rates[by] for by in ("ERR", *score.SIGNS) if defined(rates.get(by))), -1.0)
-
-
-def no_rows(table: str) -> Rows:
-    """Return a table without a row."""
-    return as_arrays(table, ())
+        return next((rates[by] for by in (TESTED, *SIGNS) if defined(rates.get(by))), -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +70,8 @@ class Findings:
     """The recording or folder, as it was named."""
     facts: Facts
     """Of an incomplete run, what its tables allow to compute."""
-    table: Callable[[str], Rows] = no_rows
-    """Returns the rows of a table by its name."""
+    table: Callable[[str], pd.DataFrame] = lambda name: read_table(name, "")
+    """Returns a table by its name; by default one without a row."""
     complete: bool = True
     """Whether the run reached its end."""
     again: str = ""
@@ -119,93 +120,61 @@ class Findings:
         return self.totals[variant][self.finals[variant]]
 
     @cached_property
-    def windows(self) -> Rows:
+    def windows(self) -> pd.DataFrame:
         """The rows of ``windows``; longer windows where the drive is long."""
         size, windows = self.facts.evaluation.window, self.table("windows")
-        rows = self.table("frames")
-        count = -(-len(rows.distinct("frame")) // size)
+        frames = self.table("frames")
+        count = -(-frames["frame"].nunique() // size)
         if not count or (count <= WINDOWS and len(windows)):
             return windows
-        size *= -(-count // WINDOWS)
-        return window_table(score.camera_masks(rows), size)
+        return tables.windows(frames, size * -(-count // WINDOWS))
 
     @cached_property
-    def filtered(self) -> Rows:
-        """The filter's effect frame by frame: see `roadeval.evaluation.score.pairs`."""
-        return score.pairs(self.table("frames"), FILTERED, UNFILTERED)
+    def regions(self) -> pd.DataFrame:
+        """See `roadeval.evaluation.tables.by_region`."""
+        return tables.by_region(self.table("regions"))
 
     @cached_property
-    def regions(self) -> Mapping[tuple[str, str], Mapping[str, float]]:
-        """See `roadeval.evaluation.score.by_region`."""
-        return score.by_region(self.table("regions"))
-
-    @cached_property
-    def changes(self) -> Mapping[tuple[str, str], tuple[float, float]]:
+    def changes(self) -> Mapping[tuple[str, str], Sequence[float]]:
         """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
-        changes = self.table("changes")
-        known = (changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)
-        own = changes.take(known)
-        masks = zip(own["to_variant"].tolist(), own["to_stage"].tolist(), strict=True)
-        shares = ((own[name] / own["N"]).tolist() for name in ("repaired", "spoiled"))
-        return dict(zip(masks, zip(*shares, strict=True), strict=True))
-
-    @cached_property
-    def pixels(self) -> tuple[int, int, int] | None:
-        """Pixels that the filter made right and wrong, and labelled ones; None of a killed run."""
-        changes = self.table("changes")
-        chosen = (changes["from_variant"] == UNFILTERED) & (changes["to_variant"] == FILTERED)
-        own = changes.take(chosen & (changes["N"] > 0))
-        columns = (own[name].tolist() for name in ("repaired", "spoiled", "N"))
-        return next(zip(*columns, strict=True), None)
+        steps = self.table("changes").astype({"from_variant": str, "to_variant": str})
+        steps = steps[(steps["from_variant"] == steps["to_variant"]) & (steps["N"] > 0)]
+        shares = steps[["repaired", "spoiled"]].div(steps["N"], axis=0)
+        masks = zip(steps["to_variant"], steps["to_stage"], strict=True)
+        return dict(zip(masks, shares.to_numpy().tolist(), strict=True))
 
     @cached_property
     def error_parts(self) -> Mapping[str, Mapping[str, float]]:
-        """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.score.causes`."""
-        rows = self.table("frames")
-        names = [name for name in rows.distinct("variant") if name != BASELINE]
-        return {name: score.causes(rows, name).means() for name in names}
+        """The parts of each variant's mean ERR, see `roadeval.evaluation.tables.causes`."""
+        frames = self.table("frames")
+        names = [name for name in values_of(frames, "variant") if name != BASELINE]
+        means = ((name, tables.causes(frames, name).mean()) for name in names)
+        return {name: dict(zip(own.index, own, strict=True)) for name, own in means}
 
     @cached_property
-    def heatmaps(self) -> Mapping[str, npt.NDArray[np.float64]]:
+    def heatmaps(self) -> Mapping[str, Floats]:
         """By variant ``(2, rows, columns)``, how often FP and FN are there; NaN if not labelled."""
-        heat, found = self.table("heat"), {}
-        for name in heat.distinct("variant"):
-            cells = heat.of_variant(name)
-            rows, columns = (cells[edge] // cells["side"][0] for edge in ("top", "left"))
-            found[name] = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
-            for share, outcome in zip(found[name], ("FP", "FN"), strict=True):
-                share[rows, columns] = cells[outcome] / cells["labelled"]
-        return found
-
-    @cached_property
-    def oracles(self) -> Sequence[Mapping[str, Any]]:
-        """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
-        return [*score.perfect_stages(self.table("oracles"), self.table("frames"))]
-
-    @cached_property
-    def levels(self) -> Rows:
-        """The rows of ``probabilities``; none where no stage says how probable road is."""
-        return self.table("probabilities")
-
-    @cached_property
-    def metres(self) -> Rows:
-        """The rows of ``metres``; none where the camera is not known."""
-        return self.table("metres")
+        maps = {}
+        for (name,), cells in grouped(self.table("heat"), ["variant"]):
+            rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))
+            maps[name] = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
+            maps[name][:, rows, columns] = cells[["FP", "FN"]].div(cells["labelled"], axis=0).T
+        return maps
 
     @cached_property
     def by_distance(self) -> Mapping[tuple[str, str], Interval]:
         """Mean ERR with its interval, by band of distance and variant."""
-        rows, settings = score.finals(self.table("regions")), self.facts.evaluation
-        found: dict[tuple[str, str], Interval] = {}
-        for variant in rows.distinct("variant"):
-            own = rows.of_variant(variant)
-            for band in (band_name(*ends) for ends in pairwise(settings.distances)):
-                there = own.take((own["region"] == band) & (own["N"] > 0))
-                errors = (there["FP"] + there["FN"]) / there["N"]
-                if len(errors):
+        rows, settings = tables.finals(self.table("regions")), self.facts.evaluation
+        rows = rows[rows["N"] > 0]
+        errors = (rows["FP"] + rows["FN"]) / rows["N"]
+        intervals: dict[tuple[str, str], Interval] = {}
+        for band in (band_name(*ends) for ends in pairwise(settings.distances)):
+            for variant in values_of(rows, "variant"):
+                own = errors[only(rows, region=band, variant=variant).index].to_numpy()
+                if len(own):
                     low = high = None
-                    if len(errors) >= settings.least_frames and np.ptp(errors):
-                        ends = mean_distribution(errors).interval(settings.confidence)
+                    if len(own) >= settings.least_frames and np.ptp(own):
+                        ends = mean_distribution(own).interval(settings.confidence)
                         low, high = np.clip(ends, 0, 1).tolist()
-                    found[band, variant] = float(errors.mean()), low, high
-        return found
+                    intervals[band, variant] = float(own.mean()), low, high
+        return intervals

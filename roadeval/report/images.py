@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from roadeval.data import TRUTH, LayerKind, LayerSpec, Mask, Rgb, Truth, colours, mask_spec
 from roadeval.data.arrays import Floats
+from roadeval.images.decoding import png_of
 from roadeval.report.blocks import ImageFile
 
 ROAD: Final = mask_spec("road", "road")
@@ -152,8 +153,6 @@ def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
 
     ``colour`` is half-way between; NaN is grey.
     """
-    import cv2
-
     known = np.nan_to_num(shares / (top or 1.0))[..., None]
     ends = [np.array(each, float) for each in ((255, 255, 255), colour, colours.MOST_ERRORS)]
     light, dark = np.minimum(2 * known, 1), np.maximum(2 * known - 1, 0)
@@ -162,9 +161,7 @@ def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
     scale = max(WIDTH // shares.shape[1], 1)
     picture = np.rint(cells).astype(np.uint8).repeat(scale, axis=0).repeat(scale, axis=1)
     picture[[0, -1]] = picture[:, [0, -1]] = colours.NEVER_LABELLED
-    done, content = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-    assert done
-    return ImageFile(bytes(content))
+    return ImageFile(png_of(picture))
 
 
 def faded(image: Rgb) -> Rgb:

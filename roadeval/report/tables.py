@@ -6,36 +6,21 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
-from roadeval.data.words import (
-    DASH,
-    MINUS,
-    defined,
-    listing,
-    number,
-    percent,
-    points,
-    short_names,
-)
-from roadeval.evaluation import score
-from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT, SHORT_OVERLAP
-from roadeval.evaluation.score import final_stages
+from roadeval.data.words import DASH, MINUS, defined, listing, number, percent, points, short_names
+from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT, SHORT_OVERLAP, TESTED
+from roadeval.evaluation.tables import final_stages
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
 from roadeval.results.sentences import marked_interval, overconfident
 
-OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
+OTHERS: Final = tuple(rate for rate in SHORT if rate != TESTED)
 """The rates whose differences stand beside that of ERR."""
 
 
 def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
     """Return a variant's name, or a text, with the dot of its colour among ``names``."""
     return Cell(text or name, dot=looks(names)[name].colour)
-
-
-def rate_cells(rates: Mapping[str, float], *, bold: bool) -> list[Cell]:
-    """Return a mask's cells in a short table of rates; its ERR may be bold."""
-    return [Cell(percent(rates.get(name)), bold=bold and name == "ERR") for name in SHORT]
 
 
 def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
@@ -57,20 +42,19 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         columns["drives"] = [number(total["drives"]) for total in finals.values()]
     if not alike:
         columns["frames"] = counts
-    rates = {name: metric.higher_is_better for name, metric in FULL.items()}
-    for rate, higher in (rates | {"pooled_ERR": METRICS["ERR"].higher_is_better}).items():
+    shown = {name.replace("_", " "): (name, metric) for name, metric in FULL.items()}
+    shown[f"pooled {TESTED}"] = f"pooled_{TESTED}", METRICS[TESTED]
+    if not of_fleet:
+        shown |= {name: (f"pooled_{name}", metric) for name, metric in OVERLAP.items()}
+    for title, (rate, metric) in shown.items():
         values = [total.get(rate) for total in finals.values()]
-        columns[rate.replace("_", " ")] = best_bold(values, higher=higher)
+        columns[title] = best_bold(values, higher=metric.higher_is_better)
     if isinstance(facts, FleetFacts):
         caption = (
             "Percent: the mean over drives of each drive's mean rate; pooled ERR is of all pixels "
             "of all drives together, so that long drives count for more. Bold: the best."
         )
     else:
-        overlap = [score.overlap(total) for total in finals.values()]
-        for rate, metric in OVERLAP.items():
-            values = [each[rate] for each in overlap]
-            columns[rate] = best_bold(values, higher=metric.higher_is_better)
         beyond, edge = facts.beyond, ""
         if widths := {each["width"] for each in beyond.values()}:
             for name in ("boundary_F", "boundary_IoU"):
@@ -94,7 +78,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
 
 
 def stages_table(
-    totals: Totals, changes: Mapping[tuple[str, str], tuple[float, float]] | None = None
+    totals: Totals, changes: Mapping[tuple[str, str], Sequence[float]] | None = None
 ) -> Table:
     """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
     finals = final_stages((name, stage) for name, own in totals.items() for stage in own)
@@ -103,15 +87,14 @@ def stages_table(
     for variant, stages in totals.items():
         breaks.append(len(rows))
         for place, (stage, total) in enumerate(stages.items()):
-            bold, overlap = stage == finals[variant], score.overlap(total)
+            bold = stage == finals[variant]
             rows.append(
                 [
                     "" if place else variant_cell(variant, [*totals]),
                     stage,
                     number(total["frames"]),
-                    *(Cell(percent(total.get(n)), bold=bold and n == "ERR") for n in FULL),
-                    percent(total.get("pooled_ERR")),
-                    *(percent(overlap[name]) for name in SHORT_OVERLAP),
+                    *(Cell(percent(total.get(n)), bold=bold and n == TESTED) for n in FULL),
+                    *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_OVERLAP)),
                 ]
             )
             if changes:
@@ -134,11 +117,11 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
     A ``brief`` table has the differences alone: neither both errors, nor how many are better.
     """
     effects, names = facts.final_effects, [*facts.finals]
-    errors = {name: facts.totals[name][stage]["ERR"] for name, stage in facts.finals.items()}
-    unit = effects[0].rates["ERR"].unit
+    errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
+    unit = effects[0].rates[TESTED].unit
     rows: list[list[Cell | str]] = []
     for each in effects:
-        change, words = each.rates["ERR"], f"{each.variant} {MINUS} {each.base}"
+        change, words = each.rates[TESTED], f"{each.variant} {MINUS} {each.base}"
         ends = [percent(errors[name]) for name in (each.base, each.variant)]
         won = [number(count or 0) for count in (change.better, change.worse)]
         if unit == "frames":
@@ -175,7 +158,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
             Cell(percent(own["MaxF"]), bold=True),
             f"{own['threshold']:.5g}" if defined(own["threshold"]) else DASH,
             percent(own.get("ECE")),
-            percent(score.overlap(totals[variant][stage])["F1"]),
+            percent(totals[variant][stage].get("pooled_F1")),
         ]
         for variant, stages in curves.items()
         for stage, own in stages.items()
@@ -197,8 +180,8 @@ def cameras_table(facts: Facts) -> Table:
     pairs = [(each.variant, each.base) for each in facts.final_effects[:1]]
     rows: list[list[Cell | str]] = []
     for camera, own in facts.cameras.items():
-        known = {name: own.totals[name][stage]["ERR"] for name, stage in own.finals.items()}
-        changes = {(e.variant, e.base): e.rates["ERR"] for e in own.final_effects}
+        known = {name: own.totals[name][stage][TESTED] for name, stage in own.finals.items()}
+        changes = {(e.variant, e.base): e.rates[TESTED] for e in own.final_effects}
         row: list[Cell | str] = [names[camera], number(own.frames.evaluated)]
         row += best_bold([known.get(name) for name in masks], higher=False)
         for pair in pairs:

@@ -9,8 +9,9 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from roadeval.data.words import listing, percent, plain_points, setting
-from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.comparison.compare import FALSE, Change, Comparison
+from roadeval.evaluation.comparison.conditions import Judgement
+from roadeval.evaluation.metrics import TESTED
 from roadeval.results.sentences import is_significant, sentence
 from roadeval.runtime.text import visible
 

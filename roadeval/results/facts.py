@@ -18,9 +18,10 @@ from typing import Any, ClassVar, Final, Self
 from pydantic import TypeAdapter, ValidationError
 
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
-from roadeval.evaluation.score import Effect, final_stages
+from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference, Estimate
+from roadeval.evaluation.tables import final_stages
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
 from roadeval.runtime.documents import LONGEST, VALUES, read_bounded, read_json
@@ -33,8 +34,6 @@ FLEET: Final = "fleet.json"
 
 Totals = dict[str, dict[str, dict[str, Any]]]
 """Counts and rates by variant and stage; an undefined rate is NaN, or None where it was read."""
-Differences = dict[str, dict[str, Difference]]
-"""Differences by stage or variant, then by rate."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,9 @@ class DriveFacts:
     height: int = 0
     """Of the frames, in pixels."""
     rate_hz: float | None = None
+    start_ns: int | None = None
+    end_ns: int | None = None
+    """Header stamps of the first and the last evaluated frame."""
     topics: list[str] = field(default_factory=list)
     calibration: Calibration | None = None
     """The camera's, for images of this size."""
@@ -89,7 +91,7 @@ class UnlabelledFacts:
     frames: int
     variant: str
     sign: str | None
-    """By which of `roadeval.evaluation.score.SIGNS` the variant's frames are ranked, if any."""
+    """By which sign of doubt the variant's frames are ranked, if any, see `unlabelled.SIGNS`."""
     look_at: list[int]
     """Numbers of frames, the first of the rank first, one a scene."""
     differing: dict[str, dict[str, float]]
@@ -141,10 +143,18 @@ class Document:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of the document; undefined numbers become None."""
-        content = asdict(self)  # type: ignore[call-overload]
-        known = {k: value for k, value in content.items() if value or k not in self.OPTIONAL}
+        known = {k: value for k, value in self.content().items() if value or k not in self.OPTIONAL}
         document = plain({"format": self.FORMAT, **known})
         return {**document, "digest": digest_of(document, self.RESULTS)}
+
+    def content(self) -> dict[str, Any]:
+        """Return the parts of the document."""
+        return asdict(self)  # type: ignore[call-overload]
+
+    @classmethod
+    def read_content(cls, content: Any) -> Any:
+        """Return the parts of a document as the fields have them."""
+        return content
 
     def text(self) -> str:
         """Return the document."""
@@ -162,9 +172,10 @@ class Document:
             raise cls._damaged(where, error) from error
         check_format(content, cls.FORMAT, where)
         try:
-            facts: Self = _adapter(cls).validate_python(content)  # type: ignore[arg-type]
+            facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
         except ValidationError as error:
             part = error.errors(include_url=False, include_input=False)[0]["loc"][0]
+            part = part if part in content else "difference"
             raise cls._damaged(where, f"`{part}` is not what it must be") from error
         if not is_as_written(content):
             raise cls._damaged(where, "its content is not what was written")
@@ -219,13 +230,8 @@ class Facts(Document):
     """By a variant that learns nothing: its ``own`` threshold on how probable road is, the
     ``threshold`` that errs least on the training frames, and the evaluated frames' ``ERR`` at it,
     of all pixels together; and the ``lines`` of its settings that make it so."""
-    difference: Differences = field(default_factory=dict)
-    """Filtered minus unfiltered, by stage."""
-    against_unfiltered: Differences = field(default_factory=dict)
-    against_blind: Differences = field(default_factory=dict)
-    """Each other variant's final mask minus that of ``unfiltered`` or ``blind``, by variant."""
-    against_method: Differences = field(default_factory=dict)
-    """Each tuned variant's minus that of the method that was tuned, by variant."""
+    effects: list[Effect] = field(default_factory=list)
+    """The paired differences of the drive."""
     oracles: dict[str, Totals] = field(default_factory=dict)
     """Totals where a stage was replaced by the truth."""
     misfits: list[str] = field(default_factory=list)
@@ -282,20 +288,53 @@ class Facts(Document):
         """Each scored variant's final stage."""
         return final_stages((name, stage) for name, own in self.totals.items() for stage in own)
 
-    @cached_property
-    def effects(self) -> list[Effect]:
-        """The paired differences of the drive."""
-        finals, found = self.finals, []
-        for stage, rates in self.difference.items():
-            final = finals[FILTERED] == stage
-            found.append(Effect(UNFILTERED, FILTERED, stage, final, rates))
-        against = {UNFILTERED: self.against_unfiltered, BASELINE: self.against_blind}
-        against |= {"": self.against_method}
-        for base, own in against.items():
-            for name, rates in own.items():
-                of = base or name.removesuffix(TUNED)
-                found.append(Effect(of, name, finals[name], final=True, rates=rates))
-        return found
+    def content(self) -> dict[str, Any]:
+        """Return the parts of the document: differences stand by what is subtracted.
+
+        ``difference`` is filtered minus unfiltered, by stage; by variant each other final mask
+        minus that of ``unfiltered``, that of ``blind``, or that of the method that was tuned.
+        """
+        names = "difference", "against_unfiltered", "against_blind", "against_method"
+        parts: dict[str, dict[str, Any]] = {name: {} for name in names}
+        for effect in self.effects:
+            part, key = "against_unfiltered", effect.variant
+            if effect.base == BASELINE:
+                part = "against_blind"
+            elif effect.variant == effect.base + TUNED:
+                part = "against_method"
+            elif effect.variant == FILTERED:
+                part, key = "difference", effect.stage
+            parts[part][key] = {rate: asdict(change) for rate, change in effect.rates.items()}
+        cameras = {name: facts.content() for name, facts in self.cameras.items()}
+        content: dict[str, Any] = {}
+        for name, part in (asdict(self) | {"cameras": cameras}).items():
+            content |= parts if name == "effects" else {name: part}
+        return content
+
+    @classmethod
+    def read_content(cls, content: Any) -> Any:
+        """Return a document's content with its differences as effects."""
+        names = "base", "variant", "stage", "final", "rates"
+        against = {"unfiltered": UNFILTERED, "blind": BASELINE, "method": ""}
+        try:
+            totals = content["totals"].items()
+            finals = final_stages((name, stage) for name, stages in totals for stage in stages)
+            effects: list[tuple[Any, ...]] = [
+                (UNFILTERED, FILTERED, stage, stage == finals[FILTERED], rates)
+                for stage, rates in content["difference"].items()
+            ]
+            for name, base in against.items():
+                for variant, rates in content.get(f"against_{name}", {}).items():
+                    of = base or variant.removesuffix(TUNED)
+                    effects.append((of, variant, finals[variant], True, rates))
+        except (AttributeError, KeyError, TypeError):
+            return {**content, "effects": None}  # the parts tell what is wrong
+        cameras = content.get("cameras", {}).items()
+        return {
+            **content,
+            "effects": [dict(zip(names, effect, strict=True)) for effect in effects],
+            "cameras": {name: cls.read_content(facts) for name, facts in cameras},
+        }
 
     @property
     def final_effects(self) -> list[Effect]:
@@ -306,23 +345,6 @@ class Facts(Document):
     def log_digest(self) -> str | None:
         """What tells the log from another, where it is known."""
         return self.log.digest if self.log else None
-
-
-def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
-    """Return a drive's differences as the parts of `Facts` that hold them."""
-    parts: dict[str, Differences] = {
-        part: {} for part in ("difference", "against_unfiltered", "against_blind", "against_method")
-    }
-    for each in effects:
-        part, key = "against_unfiltered", each.variant
-        if each.base == BASELINE:
-            part = "against_blind"
-        elif each.variant == each.base + TUNED:
-            part = "against_method"
-        elif each.variant == FILTERED:
-            part, key = "difference", each.stage
-        parts[part][key] = dict(each.rates)
-    return parts
 
 
 @dataclass(frozen=True)
@@ -425,9 +447,7 @@ def another_format(version: object, *, later: bool, remedy: str = "replay the lo
 def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:
     """Return the ``digest`` of a JSON document: which parts it covers, and their SHA-256."""
     covered = [part for part in parts if part in content]
-    text = json.dumps(
-        {part: plain(content[part]) for part in covered}, allow_nan=False, sort_keys=True
-    )
+    text = json.dumps({part: content[part] for part in covered}, allow_nan=False, sort_keys=True)
     return {"parts": covered, "sha256": hashlib.sha256(text.encode()).hexdigest()}
 
 
@@ -436,7 +456,7 @@ def is_as_written(content: Mapping[str, Any]) -> bool:
     try:
         stated = content["digest"]
         return bool(stated == digest_of(content, stated["parts"]))
-    except (TypeError, KeyError):  # the digest is damaged
+    except (TypeError, KeyError, ValueError):  # the digest is damaged, or a number is none
         return False
 
 

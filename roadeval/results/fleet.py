@@ -1,43 +1,53 @@
-"""A fleet's folder: the tables and facts of many drives, and the record of each.
+"""A fleet's folder: the results folders of its drives, and a cache of their tables in Parquet.
 
-A record is written last. A drive is done if its record is there, was made of the same log,
-settings, model and version, and its other files are there.
+Beside a drive's results lies how they were made, written last. A drive is done if that is there,
+and says that the results were made of the same log, settings, model and version. Of each drive the
+frames are cached, and the scores that follow from them; a cache that is missing or old is made anew
+from the results.
 """
 
 from __future__ import annotations
 
 import json
 import shlex
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import is_plain
+import numpy as np
+
+from roadeval.data import BASELINE, is_plain
+from roadeval.evaluation import tables
+from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
-from roadeval.evaluation.score import TESTED, by_region
+from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.tables import is_final, joined, only
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
     Document,
+    Facts,
     FleetFacts,
     Member,
     check_format,
     is_fleet,
 )
+from roadeval.results.folder import ResultsFolder
 from roadeval.results.over_drives import summarise
-from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
+from roadeval.results.rows import Key, beyond_masks, drive_row, effect_rows, scores, table_of
+from roadeval.results.schema import FAILED, OF_DRIVES, TABLES, TAG
 from roadeval.results.tables import (
     AGAIN,
     FLEET_FORMAT,
     ResultsError,
-    TableFile,
-    parquet_rows,
     read_parquet,
+    read_table,
+    write_parquet,
 )
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, check_output, leads_outside, put, writing
@@ -45,34 +55,17 @@ from roadeval.runtime.text import is_utf8
 
 if TYPE_CHECKING:
     import pandas as pd
-    import pyarrow as pa
 
 RUN: Final = "run.toml"
 FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in OF_DRIVES))
 """The files of a fleet's folder; beside them lie folders with files of each drive."""
-RECORDS: Final = "records"
 RESULTS: Final = "results"
-FRAMES: Final = "frames"
 PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
 """Frames that the table of the worst names."""
-
-Cells = Sequence[Any]
-"""A row's values in the order of its table's columns; None if it is undefined."""
-
-
-def record_path(folder: Path, drive: str) -> Path:
-    """Return the file of a drive's record."""
-    return folder / RECORDS / f"{drive}.json"
-
-
-def frames_path(folder: Path, drive: str) -> Path:
-    """Return the table of a drive's frames; its folder's name is no partition's, as ``drive=ID``.
-
-    pandas and Arrow would read that as a second column ``drive``, and refuse the folder.
-    """
-    return folder / FRAMES / drive / "frames.parquet"
+CACHED: Final = ("frames", "regions", "scores", "worst")
+"""Tables of each drive that are cached in folders of these names; ``regions`` of final masks."""
 
 
 def results_path(folder: Path, drive: str) -> Path:
@@ -80,9 +73,22 @@ def results_path(folder: Path, drive: str) -> Path:
     return folder / RESULTS / drive
 
 
+def made_path(folder: Path, drive: str) -> Path:
+    """Return the file that says how a drive's results were made."""
+    return folder / RESULTS / f"{drive}.json"
+
+
 def recording_path(folder: Path, drive: str) -> Path:
     """Return the recording of a drive, which may not have been kept."""
     return folder / RECORDINGS / f"{drive}.rrd"
+
+
+def cached_path(folder: Path, name: str, drive: str) -> Path:
+    """Return a table of a drive; its folder's name is no partition's, as ``drive=ID``.
+
+    pandas and Arrow would read that as a second column ``drive``, and refuse the folder.
+    """
+    return folder / name / drive / f"{name}.parquet"
 
 
 def inside(path: Path, folder: Path) -> Path:
@@ -92,9 +98,45 @@ def inside(path: Path, folder: Path) -> Path:
     return path
 
 
-def is_final(row: Mapping[str, Any]) -> bool:
-    """Return whether a row is of a final mask, on all pixels where the table has regions."""
-    return bool(row["final"]) and row.get("region", ALL) == ALL
+@dataclass(frozen=True)
+class Made(Document):
+    """How the results of a drive were made; its numbers are in the results themselves."""
+
+    drive: str
+    """Its name in the fleet."""
+    asked: str
+    """Digest of what was asked: settings, model and version."""
+    stamp: Mapping[Any, Any] | None
+    """Sizes and times of the log's files, which show cheaply whether it has changed; None where
+    they could not be read. A file's name may hold bytes that are no text."""
+    fold: int | None = None
+    model: str | None = None
+    problem: str = ""
+    """Why the drive failed: there are no results then."""
+    exit_code: int = 0
+    seconds: float | None = None
+
+    FORMAT = FLEET_FORMAT
+    AGAIN = AGAIN
+    RESULTS = ("drive", "asked", "stamp", "problem")
+
+    def write(self, folder: Path) -> None:
+        """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
+        content = json.dumps(self.as_dict(), allow_nan=False)
+        put(made_path(folder, self.drive), content.encode())
+
+
+def read_made(folder: Path, drive: str) -> Made | None:
+    """Read how a drive's results were made; None unless they are there, of this version."""
+    path = made_path(folder, drive)
+    try:
+        made = Made.parse(read_bounded(path), path)
+    except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
+        return None  # not there, not ours, or not whole: it is made again
+    except OSError as error:
+        raise ResultsError(f"{path}: {error.strerror}") from error
+    is_whole = made.problem or (results_path(folder, drive) / SUMMARY).exists()
+    return made if made.drive == drive and is_whole else None
 
 
 class FleetFolder:
@@ -129,27 +171,44 @@ class FleetFolder:
         """Return where the results folder of a drive lies, as of `recording`."""
         return inside(results_path(self.path, drive), self.path)
 
-    def table(self, name: str) -> pa.Table:
-        """Read a table."""
-        path = self.path / f"{name}.parquet"
-        try:
-            return read_parquet(path, name)
-        except FileNotFoundError:
-            raise ResultsError(f"{path}: is not there; {AGAIN}") from None
+    def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
+        """Read a table of all drives, or of some of them.
+
+        Those of `roadeval.results.schema.OF_DRIVES` are the folder's own, ``frames`` and
+        ``regions``, which have the rows of final masks, those cached of each drive; others are read
+        from the drives' results.
+        """
+        if name in OF_DRIVES:
+            rows = read_parquet([self.path / f"{name}.parquet"], name)
+            return rows if drives is None else rows[rows["drive"].isin([*drives])]
+        known = self.drives
+        scored = known["drive"][known["evaluated"].fillna(0) > 0]
+        chosen = [drive for drive in scored if drives is None or drive in drives]
+        if name in CACHED:
+            paths = [inside(cached_path(self.path, name, drive), self.path) for drive in chosen]
+            remedy = f"remove {self.path / name} and {AGAIN}"
+            return read_parquet(paths, name, remedy)[[*TABLES[name].names]]
+        folders = ((drive, ResultsFolder(self.results(drive))) for drive in chosen)
+        return joined(
+            [read_table(name, ""), *(of_drive(own, name, drive) for drive, own in folders)]
+        )
 
     @cached_property
-    def drives(self) -> dict[str, dict[str, Any]]:
-        """The rows of ``drives`` by the drives' names in the fleet, in the tables' order."""
-        return {row["drive"]: row for row in self.table("drives").to_pylist()}
+    def drives(self) -> pd.DataFrame:
+        """The rows of ``drives``; the index are the drives' names in the fleet."""
+        rows = self.table("drives").set_index("drive", drop=False)
+        if not rows.index.is_unique:
+            raise ResultsError(
+                f"{self.path}: damaged (a drive is in drives.parquet twice); {AGAIN}"
+            )
+        return rows
 
     @cached_property
     def names(self) -> dict[str, str]:
         """The drives' names for people, no two of them equal, by their names in the fleet."""
-        times = Counter(row["name"] for row in self.drives.values())
-        return {
-            drive: row["name"] if times[row["name"]] == 1 else drive
-            for drive, row in self.drives.items()
-        }
+        names = dict(self.drives["name"])
+        times = Counter(names.values())
+        return {drive: name if times[name] == 1 else drive for drive, name in names.items()}
 
     @property
     def finals(self) -> dict[str, str]:
@@ -157,47 +216,36 @@ class FleetFolder:
         return self.facts.finals
 
     @cached_property
-    def first_scores(self) -> dict[str, dict[str, Any]]:
-        """By drive the row of ``scores`` of the first variant's final mask, on all pixels."""
-        first = next(iter(self.finals), None)
-        rows = self._final("scores") if first else []
-        return {row["drive"]: row for row in rows if row["variant"] == first}
-
-    def _final(self, name: str) -> list[dict[str, Any]]:
-        """Return the rows of the final masks, on all pixels where the table has regions."""
-        table = self.table(name)
-        table = table.filter(table["final"])
-        if "region" in table.column_names:  # in Arrow, for there are many
-            from pyarrow import compute
-
-            table = table.filter(compute.equal(table["region"], ALL))
-        rows: list[dict[str, Any]] = table.to_pylist()
-        return rows
+    def scores(self) -> pd.DataFrame:
+        """The rows of ``scores``."""
+        return self.table("scores")
 
     @cached_property
-    def regions(self) -> dict[tuple[str, str], dict[str, float]]:
-        """See `roadeval.evaluation.score.by_region`: of all drives together."""
-        rows = parquet_rows(self.table("scores"), "scores")
-        return by_region(rows.take(rows["final"] & (rows["region"] != ALL)))
+    def effects(self) -> pd.DataFrame:
+        """The rows of ``effects`` of the final masks' ERR, where it is known."""
+        rows = self.table("effects")
+        return rows[rows["final"] & (rows["metric"] == TESTED) & rows["mean"].notna()]
 
     @cached_property
-    def effects(self) -> dict[tuple[str, str], list[dict[str, Any]]]:
-        """Rows of ``effects`` of the final masks' ERR, where it is known, by base and variant."""
-        found: defaultdict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
-        for row in self._final("effects"):
-            if row["metric"] == TESTED and row["mean"] is not None:
-                found[row["base"], row["variant"]].append(row)
-        return dict(found)
+    def first_scores(self) -> pd.DataFrame:
+        """The rows of ``scores`` of the first variant's final mask, on all pixels, by drive."""
+        first = only(self.scores, final=True, region=ALL, variant=next(iter(self.finals), ""))
+        return first.set_index("drive", drop=False)
 
     @cached_property
-    def worst(self) -> list[dict[str, Any]]:
+    def regions(self) -> pd.DataFrame:
+        """See `roadeval.evaluation.tables.by_region`: of all drives together."""
+        rows = only(self.scores, final=True)
+        return tables.by_region(rows[rows["region"] != ALL])
+
+    @cached_property
+    def worst(self) -> pd.DataFrame:
         """The rows of ``worst``: the worst frames over all drives."""
-        rows: list[dict[str, Any]] = self.table("worst").to_pylist()
-        return rows
+        return self.table("worst")
 
     def picture(self, frame: Mapping[str, Any]) -> bytes | None:
         """Return the JPEG of a row of ``worst``; None of one from elsewhere, or that is cut."""
-        path = self.path / (frame["picture"] or "")
+        path = self.path / str(frame["picture"] or "")
         if not path.resolve().is_relative_to(self.path.resolve()):
             return None
         with suppress(OSError):
@@ -213,88 +261,45 @@ class FleetFolder:
     @property
     def height(self) -> int:
         """Height of the frames in pixels; 0 where drives differ."""
-        heights = {row["height"] or 0 for row in self.drives.values() if row["evaluated"]}
-        return heights.pop() if len(heights) == 1 else 0
-
-    def frames(self, drive: str) -> pa.Table:
-        """Read the rows of a drive's frames; a FileNotFoundError if none was scored."""
-        remedy = f"remove {record_path(self.path, drive)} and {AGAIN}"
-        return read_parquet(frames_path(self.path, drive), "frames", remedy=remedy)
-
-    def all_frames(self) -> Iterator[pd.DataFrame]:
-        """Yield the rows of each scored drive's frames."""
-        for drive, row in self.drives.items():
-            if row["evaluated"]:
-                yield self.frames(drive).to_pandas()
+        heights = self.drives["height"][self.drives["evaluated"].fillna(0) > 0].dropna().unique()
+        return int(heights[0]) if len(heights) == 1 else 0
 
 
-@dataclass(frozen=True)
-class Record(Document):
-    """The record of a drive: its rows in the fleet's tables, and what they were made of."""
+def of_drive(results: ResultsFolder, name: str, drive: str) -> pd.DataFrame:
+    """Return a table of a drive's results under the drive's name in its fleet."""
+    import pandas as pd
 
-    drive: str
-    """Its name in the fleet."""
-    asked: str
-    """Digest of what was asked: settings, model and version."""
-    stamp: Mapping[Any, Any] | None
-    """Sizes and times of the log's files, which show cheaply whether it has changed; None where
-    they could not be read. A file's name may hold bytes that are no text."""
-    rows: Mapping[str, Sequence[Cells]] = field(default_factory=dict)
-    """Its rows of each table in `roadeval.results.schema.OF_DRIVES`."""
-
-    FORMAT = FLEET_FORMAT
-    AGAIN = AGAIN
-    RESULTS = ("drive", "asked", "stamp", "rows")
-
-    def table(self, name: str) -> list[dict[str, Any]]:
-        """Return its rows of a table."""
-        names = TABLES[name].names
-        return [dict(zip(names, row, strict=True)) for row in self.rows[name]]
-
-    def value(self, column: str) -> Any:
-        """Return a value of the drive's own row in ``drives``."""
-        return self.table("drives")[0][column]
-
-    @property
-    def failed(self) -> bool:
-        """Whether the drive could not be used at all."""
-        return bool(self.value("status") == FAILED)
-
-    def is_whole(self, folder: Path) -> bool:
-        """Return whether the drive's other files are there, too."""
-        if self.failed:
-            return True
-        needed = [results_path(folder, self.drive) / SUMMARY]
-        if self.value("evaluated"):
-            needed.append(frames_path(folder, self.drive))
-        return all(path.exists() for path in needed)
-
-    @property
-    def fits(self) -> bool:
-        """Whether the rows have their tables' columns, and the drive its row."""
-        widths = all(
-            len(row) == len(TABLES[name].names)
-            for name in OF_DRIVES
-            for row in self.rows.get(name, ())
-        )
-        return widths and {*OF_DRIVES} == self.rows.keys() and len(self.rows["drives"]) == 1
-
-    def write(self, folder: Path) -> None:
-        """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
-        content = json.dumps(self.as_dict(), allow_nan=False)
-        put(record_path(folder, self.drive), content.encode())
+    rows = results.table(name)
+    return rows.assign(drive=pd.Categorical.from_codes([0] * len(rows), pd.Index([drive])))
 
 
-def read_record(folder: Path, drive: str) -> Record | None:
-    """Read the record of a drive; None without one that is whole and of this version."""
-    path = record_path(folder, drive)
-    try:
-        record = Record.parse(read_bounded(path), path)
-    except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
-        return None  # not there, not ours, or not whole: it is made again
-    except OSError as error:
-        raise ResultsError(f"{path}: {error.strerror}") from error
-    return record if record.drive == drive and record.fits else None
+def cache(folder: Path, drive: str) -> None:
+    """Write the Parquet tables of a drive, unless they are there and newer than its results."""
+    path = results_path(folder, drive)
+    made = (path / SUMMARY).stat().st_mtime_ns
+    files = {name: cached_path(folder, name, drive) for name in CACHED}
+    if all(file.exists() and file.stat().st_mtime_ns >= made for file in files.values()):
+        return
+    results = ResultsFolder(path)
+    key = Key(drive, results.facts.drive.camera)
+    frames, regions = (of_drive(results, name, drive) for name in ("frames", "regions"))
+    frames = frames.assign(final=is_final(frames))
+    rows = {
+        "frames": frames,
+        "regions": tables.finals(regions),
+        "scores": scores(frames, regions, beyond_masks(results.facts, key)),
+        "worst": _pictured(folder, drive, frames).assign(rank=0),
+    }
+    write_parquet({files[name]: (name, rows[name]) for name in CACHED})
+
+
+def _pictured(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of ``worst``: of a drive's frames those that have pictures."""
+    rows = frames[frames["final"] & (frames["variant"] != BASELINE)]
+    place = Path(PICTURES, drive)
+    numbers = [int(path.stem) for path in (folder / place).glob("*.jpg")]
+    rows = rows[~rows.duplicated("frame") & rows["frame"].isin(numbers)]
+    return rows.assign(picture=[(place / f"{number}.jpg").as_posix() for number in rows["frame"]])
 
 
 class FleetWriter:
@@ -320,16 +325,16 @@ class FleetWriter:
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
             elif (
-                not (self.folder / RECORDS).is_dir()
+                not (self.folder / RESULTS).is_dir()
                 and self.folder.is_dir()
                 and any(self.folder.iterdir())
             ):
                 raise ResultsError(
                     f"{self.folder}: holds other files and is no fleet's folder; name a new one"
                 )
-            (self.folder / RECORDS).mkdir(parents=True, exist_ok=True)
-            for each in self.folder.iterdir():  # the folder may come from anybody
-                inside(each, self.folder)
+            (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
+            for path in self.folder.iterdir():  # the folder may come from anybody
+                inside(path, self.folder)
 
     def finish(
         self,
@@ -342,64 +347,79 @@ class FleetWriter:
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
-        The members are in the tables' order; each has its record. ``run`` and ``run_toml`` are the
-        configuration of the fleet, as plain data and as a text. ``asked`` has the digests of what
-        each drive's record must have been made for; anything by default.
+        The members are in the tables' order. ``run`` and ``run_toml`` are the configuration of the
+        fleet, as plain data and as a text. ``asked`` has the digests of what each drive's results
+        must have been made for; anything by default.
         """
         # Two commands may replay drives of one folder together.
         with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
-            tables = self._write_tables(members, asked or {})
-            facts = summarise(tables, members, settings, dict(run))
+            finals, within = self._write_tables(members, asked or {})
+            facts = summarise(finals, members, settings, dict(run), within)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts
 
     def _write_tables(
         self, members: Sequence[Member], asked: Mapping[str, str]
-    ) -> dict[str, list[dict[str, Any]]]:
-        """Write every table but that of frames; all are whole before one takes its name.
+    ) -> tuple[dict[str, pd.DataFrame], list[Effect]]:
+        """Write every table; all are whole before one takes its name.
 
-        Records are looked up one at a time: all together would fill the memory. Returned are the
-        rows of which the facts are made, see `summarise`.
+        Returned are those of which the facts are made: ``drives``, and of ``scores`` and
+        ``effects`` the rows of final masks, on all pixels; and the differences within the only
+        drive, where one alone was scored.
         """
         tags = sorted({key for member in members for key in member.tags})
-        kept: dict[str, list[dict[str, Any]]] = {"drives": [], "scores": [], "effects": []}
-        worst: list[dict[str, Any]] = []
-        with ExitStack() as stack:
-            files = {
-                name: stack.enter_context(
-                    TableFile(
-                        self.folder / f"{name}.parquet", name, tags if name == "drives" else ()
-                    )
-                )
-                for name in OF_DRIVES
-            }
-            for member in members:
-                record = self._record(member.drive, asked)
-                (own,) = record.table("drives")
-                own |= {"name": member.name, "source": member.source, "group": member.group}
-                kept["drives"].append(own)
-                files["drives"].add([[*own.values(), *(member.tags.get(tag) for tag in tags)]])
-                for name in ("scores", "effects"):
-                    files[name].add(record.rows[name])
-                    kept[name] += filter(is_final, record.table(name))
-                worst += record.table("worst")
-                worst.sort(key=lambda row: (-row["ERR"], row["drive"], row["frame"]))
-                del worst[WORST:]
-            files["worst"].add((row | {"rank": n}).values() for n, row in enumerate(worst, 1))
-            for file in files.values():
-                file.finish()
-        return kept
-
-    def _record(self, drive: str, asked: Mapping[str, str]) -> Record:
-        record = read_record(self.folder, drive)
-        if record is None:
-            raise ResultsError(
-                f"{self.folder}: the record of {drive} has gone; run the same command again"
+        rows: dict[str, list[Any]] = {"drives": [], "effects": [], "within": [], "cached": []}
+        for member in members:
+            self._add(member, self._made(member.drive, asked), rows)
+        made = {
+            name: read_parquet(
+                [cached_path(self.folder, name, drive) for drive in rows["cached"]], name
             )
-        if asked.get(drive, record.asked) != record.asked:
+            for name in ("scores", "worst")
+        }
+        made["drives"] = table_of("drives", rows["drives"], tags)
+        made["effects"] = table_of("effects", rows["effects"])
+        words = made["worst"].astype({"drive": "str"})
+        order = {TESTED: False, "drive": True, "frame": True}
+        worst = words.sort_values([*order], ascending=[*order.values()]).head(WORST)
+        made["worst"] = worst.assign(rank=np.arange(1, len(worst) + 1))
+        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in OF_DRIVES})
+        finals = {
+            "drives": made["drives"],
+            "scores": only(made["scores"], final=True, region=ALL),
+            "effects": only(made["effects"], final=True),
+        }
+        return finals, rows["within"] if len(finals["effects"]["drive"].unique()) == 1 else []
+
+    def _add(self, member: Member, made: Made, rows: Mapping[str, list[Any]]) -> None:
+        """Add a drive's rows to those of each table."""
+        how: dict[str, Any] = {"drive": member.drive, "name": member.name, "source": member.source}
+        how |= {"group": member.group, "fold": made.fold, "model": made.model, "camera": ""}
+        how |= {f"{TAG}{key}": value for key, value in member.tags.items()}
+        if made.problem:
+            failure = {"status": FAILED, "reason": made.problem, "exit_code": made.exit_code}
+            rows["drives"].append({**how, **failure})
+            return
+        facts = Facts.read(results_path(self.folder, member.drive) / SUMMARY)
+        key = Key(member.drive, facts.drive.camera)
+        how |= {"camera": key.camera, "seconds": made.seconds}
+        rows["effects"] += effect_rows(facts, key)
+        rows["within"] += facts.final_effects
+        if facts.frames.evaluated:
+            cache(self.folder, member.drive)
+            rows["cached"].append(member.drive)
+        rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
+
+    def _made(self, drive: str, asked: Mapping[str, str]) -> Made:
+        made = read_made(self.folder, drive)
+        if made is None:
+            raise ResultsError(
+                f"{self.folder}: the results of {drive} have gone; run the same command again"
+            )
+        if asked.get(drive, made.asked) != made.asked:
             raise ResultsError(
                 f"{self.folder}: another command has replayed {drive} with other settings "
                 "meanwhile; run the same command again, or give each a folder of its own"
             )
-        return record
+        return made

@@ -12,10 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
-from roadeval.data import Rows
 from roadeval.results.facts import SUMMARY, Facts
 from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
-from roadeval.results.tables import ResultsError, TableFacts, read_rows, read_table
+from roadeval.results.tables import ResultsError, TableFacts, read_table
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import Content, NewFolder, writing
 
@@ -157,10 +156,6 @@ class ResultsFolder:
         damaged, or not the one that the summary states.
         """
         return read_table(name, self._path(name), self._whole.tables, self._camera)
-
-    def rows(self, name: str) -> Rows:
-        """Read a table as `table` does, without pandas."""
-        return read_rows(name, self._path(name), self._whole.tables, self._camera)
 
     def _path(self, name: str) -> Path:
         return self._folder / f"{name}.csv"

@@ -6,27 +6,31 @@ Numbers are written so that they read back the same. An undefined rate is an emp
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import Doubt, Frame, FrameResult, Rows, Tally
+from roadeval.data import Doubt, Frame, FrameResult, Tally
 from roadeval.evaluation.regions import ALL
-from roadeval.evaluation.score import SIGNS, Camera, at_levels, windows
-from roadeval.results.schema import DAMAGED, KEY, SCORED, TABLES, TYPES, UNSCORED
+from roadeval.evaluation.score.thresholds import at_levels
+from roadeval.evaluation.score.unlabelled import SIGNS
+from roadeval.evaluation.tables import KEY, MASK, grouped, is_final, joined, totals
+from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, UNSCORED, Kind
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
-    from roadeval.evaluation.score import Scoreboard
+    import pandas as pd
+
+    from roadeval.evaluation.score.scoreboard import Scoreboard
     from roadeval.results.facts import Facts
 
 Row = tuple[Any, ...]
 """A row's cells in the order of its table's columns, without the key."""
 LOST: Final = 3
 """Exit code of a replay that has lost a part of its log."""
+OF_DRIVE: Final = ("start_ns", "end_ns", "rate_hz", "width", "height")
 ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
 
 
@@ -86,7 +90,7 @@ def _numbers(tally: Tally) -> Row:
     return *tally.counts, tally.counts.n, *tally.rates.values()
 
 
-def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
+def sum_rows(board: Scoreboard, windows: pd.DataFrame) -> dict[str, list[Row]]:
     """Return the rows of each table of sums over the drive.
 
     Cells of heat maps that are never labelled, and levels of probabilities that do not occur, have
@@ -105,7 +109,7 @@ def sum_rows(board: Scoreboard) -> dict[str, list[Row]]:
         columns = np.column_stack((levels, road[levels], other[levels]))
         probabilities += [(*name, *row) for row in columns.tolist()]
     return {
-        "windows": [tuple(row.values()) for row in board.windows()],
+        "windows": [*windows.drop(columns=KEY).itertuples(index=False, name=None)],
         "changes": [(*step, *change) for step, change in board.changes.items()],
         "heat": heat,
         "probabilities": probabilities,
@@ -128,19 +132,6 @@ def _cell(value: str | int | float) -> str:
     return "" if isinstance(value, float) and math.isnan(value) else str(value)
 
 
-def as_arrays(name: str, rows: Iterable[Row]) -> Rows:
-    """Return rows of a table as arrays, without the key."""
-    columns = TABLES[name].columns[len(KEY) :]
-    cells = [*zip(*rows, strict=True)] or [()] * len(columns)
-    pairs = zip(columns, cells, strict=True)
-    return Rows({column.name: np.array(each, TYPES[column.kind]) for column, each in pairs})
-
-
-def window_table(masks: Camera, size: int) -> Rows:
-    """Return the rows of ``windows`` of so many frames, see `roadeval.evaluation.score.windows`."""
-    return as_arrays("windows", (tuple(row.values()) for row in windows(masks, size)))
-
-
 def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
     """Return the row of ``drives`` of a drive that was replayed, under a name, from a source."""
     status = (DAMAGED if facts.losses else SCORED) if facts.totals else UNSCORED
@@ -151,7 +142,7 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
         "exit_code": LOST if facts.losses else 0,
         "reason": None if facts.totals else next(iter(facts.warnings), None),
         "log_digest": facts.log_digest,
-        **{column: getattr(facts.drive, column) for column in ("rate_hz", "width", "height")},
+        **{column: getattr(facts.drive, column) for column in OF_DRIVE},
         **{column: getattr(facts.frames, column) for column in ACCOUNT},
         "losses": "\n".join(facts.losses) or None,
         "warnings": "\n".join(facts.warnings) or None,
@@ -160,42 +151,75 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
     }
 
 
-def score_rows(
-    facts: Facts, regions: Mapping[tuple[str, str, str], Mapping[str, Any]]
-) -> Iterator[dict[str, Any]]:
-    """Yield the rows of ``scores``: each mask on every labelled pixel, then region by region.
+def scores(
+    frames: pd.DataFrame, regions: pd.DataFrame, beyond: Sequence[Mapping[str, Any]]
+) -> pd.DataFrame:
+    """Make the table ``scores`` of any number of drives: each mask, whole and region by region.
 
-    ``regions`` has frames, counts and rates by variant, stage and region.
+    ``frames`` and ``regions`` are the tables of these names. ``beyond`` has what is known of final
+    masks besides, as of `beyond_masks`. A region counts on the frames that label any of it.
     """
-    for variant, own in facts.totals.items():
-        beyond = facts.beyond.get(variant, {})
-        for stage, total in own.items():
-            final = facts.finals[variant] == stage
-            mask = {"variant": variant, "stage": stage, "final": final}
-            further = {
-                **beyond,
-                "boundary_f": beyond.get("boundary_F"),
-                "boundary_iou": beyond.get("boundary_IoU"),
-                "episodes": beyond.get("episodes", {}).get("episodes"),
-                "episode_seconds": beyond.get("episodes", {}).get("seconds"),
-            }
-            yield {**mask, "region": ALL, **(further if final else {}), **total}
-            for (name, after, region), sums in regions.items():
-                if (name, after) == (variant, stage):
-                    yield {**mask, "region": region, **sums}
+    import pandas as pd
+
+    by = [*KEY, *MASK]
+    whole = totals(frames, by).reset_index().assign(region=ALL, final=is_final)
+    parts = totals(regions[regions["N"] > 0], [*by, "region"]).reset_index()
+    parts = parts.merge(whole[[*by, "final"]], on=by)
+    if beyond:
+        known = pd.DataFrame([*beyond]).assign(final=True)
+        whole = whole.merge(known, on=[*KEY, "variant", "final"], how="left")
+    rows = joined([whole, parts])
+    order = grouped(rows, by).ngroup().to_numpy()
+    return rows.iloc[np.argsort(order, kind="stable")].reindex(columns=TABLES["scores"].names)
 
 
-def effect_rows(facts: Facts) -> Iterator[dict[str, Any]]:
+def beyond_masks(facts: Facts, key: Key) -> list[dict[str, Any]]:
+    """Return what a drive's facts know of each final mask beyond its counts, for `scores`."""
+    rows = []
+    for variant, known in facts.beyond.items():
+        episodes = known.get("episodes", {})
+        further = {
+            "boundary_f": known.get("boundary_F"),
+            "boundary_iou": known.get("boundary_IoU"),
+            "episodes": episodes.get("episodes"),
+            "episode_seconds": episodes.get("seconds"),
+        }
+        flicker = {name: known.get(name) for name in ("flicker", "truth_flicker")}
+        rows.append({**key._asdict(), "variant": variant, **further, **flicker})
+    return rows
+
+
+def effect_rows(facts: Facts, key: Key) -> Iterator[dict[str, Any]]:
     """Yield the rows of ``effects``: each variant minus ``unfiltered``, and minus ``blind``."""
-    for each in facts.effects:
-        mask = {"base": each.base, "variant": each.variant, "stage": each.stage}
-        for metric, found in each.rates.items():
-            frames = {"frames": found.units, "effective_frames": found.effective}
-            yield {**mask, "final": each.final, "metric": metric, **asdict(found), **frames}
+    for effect in facts.effects:
+        mask = {"base": effect.base, "variant": effect.variant, "stage": effect.stage}
+        for metric, change in effect.rates.items():
+            frames = {"frames": change.units, "effective_frames": change.effective}
+            numbers = {**vars(change), **frames}
+            yield {**key._asdict(), **mask, "final": effect.final, "metric": metric, **numbers}
 
 
-def cells(table: str, key: Key, rows: Iterable[Mapping[str, Any]]) -> list[list[Any]]:
-    """Put rows into the order of a table's columns, with their key; what a row lacks is None."""
-    names = TABLES[table].names
-    own = key._asdict()
-    return [[own.get(name, row.get(name)) for name in names] for row in rows]
+def table_of(
+    name: str, rows: Iterable[Mapping[str, Any]], tags: Iterable[str] = ()
+) -> pd.DataFrame:
+    """Return rows as a table of drives, with its columns and their types; None is unknown."""
+    import pandas as pd
+
+    types = {column.name: _TYPES[column.kind] for column in TABLES[name].columns}
+    types |= {f"{TAG}{tag}": "str" for tag in tags}
+    return pd.DataFrame([*rows], columns=[*types]).astype(types)
+
+
+_TYPES: Final[Mapping[Kind, str]] = {
+    **dict.fromkeys((Kind.NAME, Kind.TEXT), "str"),
+    **dict.fromkeys((Kind.COUNT, Kind.TIME), "Int64"),
+    **dict.fromkeys((Kind.RATE, Kind.NUMBER), "float64"),
+    Kind.FLAG: "bool",
+}
+"""Types of tables of drives, of which some were not scored."""
+
+
+def records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a table as dictionaries; what is unknown is None."""
+    plain = table.astype(object)
+    return plain.where(table.notna(), None).to_dict("records")  # type: ignore[return-value]

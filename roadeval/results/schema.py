@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.score import SIGNS
+from roadeval.evaluation.score.unlabelled import SIGNS
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -43,11 +43,13 @@ TYPES: Final = dict(
 
 
 class Column(NamedTuple):
-    """A column of a table, with one line of documentation."""
+    """A column of a table."""
 
     name: str
     kind: Kind
     doc: str
+    """Its meaning."""
+    unit: str = ""
 
     @property
     def is_word(self) -> bool:
@@ -76,7 +78,7 @@ class TableSchema(NamedTuple):
     @property
     def of_a_fleet(self) -> tuple[Column, ...]:
         """Further columns in the file of a fleet."""
-        return _columns(_FINAL) if self.name == "frames" else ()
+        return (_FINAL,) if self.name == "frames" else ()
 
     @property
     def header(self) -> str:
@@ -90,19 +92,6 @@ class TableSchema(NamedTuple):
         return pa.schema([(c.name, TYPES[c.kind]) for c in (*self.columns, *self.of_a_fleet)])
 
 
-def _columns(text: str) -> tuple[Column, ...]:
-    """Return the columns that a text describes, a line each: name, kind and meaning."""
-    lines = (line.split(maxsplit=2) for line in text.strip().splitlines())
-    return tuple(Column(name, Kind(kind), doc) for name, kind, doc in lines)
-
-
-def _tables(text: str) -> tuple[TableSchema, ...]:
-    """Return the tables of a text: of each its name, what a row is, and a line a column."""
-    parts = (part.split("\n", 1) for part in text.strip().split("\n\n"))
-    named = ((*head.split(": ", 1), columns) for head, columns in parts)
-    return tuple(TableSchema(name, doc, _columns(columns)) for name, doc, columns in named)
-
-
 SCORED: Final = "scored"
 DAMAGED: Final = "damaged"
 UNSCORED: Final = "unscored"
@@ -111,215 +100,242 @@ FAILED: Final = "failed"
 TAG: Final = "tag_"
 """Begins the name of a column of ``drives`` that holds a tag."""
 
-_KEY: Final = """\
-drive        text   the log's name; in a fleet, its own name there
-camera       text   the image topic"""
-KEY: Final = _columns(_KEY)
+KEY: Final = (
+    Column("drive", Kind.TEXT, "the log's name; in a fleet, its own name there"),
+    Column("camera", Kind.TEXT, "the image topic"),
+)
 """The first columns of every table."""
-_IN_FRAME: Final = f"{_KEY}\nframe count position in the image topic by log time, from 0"
-_STAMP: Final = "stamp_ns time   header stamp"
-_VARIANT: Final = "variant  name   whose mask; `blind` is the baseline"
-_STAGE: Final = "stage    name   after which stage of the chain"
-_MASK: Final = f"{_VARIANT}\n{_STAGE}"
-_FINAL: Final = "final    flag   whether that is the variant's last stage"
-_LABELLED: Final = "N        count  labelled pixels"
-_COUNTS: Final = f"""\
-TP           count  road classified as road, in pixels
-TN           count  non-road classified as non-road
-FP           count  non-road classified as road
-FN           count  road classified as non-road
-{_LABELLED}"""
+_IN_FRAME: Final = (
+    *KEY,
+    Column("frame", Kind.COUNT, "position in the image topic by log time, from 0"),
+)
+_STAMP: Final = Column("stamp_ns", Kind.TIME, "header stamp")
+_VARIANT: Final = Column("variant", Kind.NAME, "whose mask; `blind` is the baseline")
+_STAGE: Final = Column("stage", Kind.NAME, "after which stage of the chain")
+_MASK: Final = (_VARIANT, _STAGE)
+_FINAL: Final = Column("final", Kind.FLAG, "whether that is the variant's last stage")
+_LABELLED: Final = Column("N", Kind.COUNT, "labelled pixels", "pixels")
+_COUNTS: Final = (
+    Column("TP", Kind.COUNT, "road classified as road", "pixels"),
+    Column("TN", Kind.COUNT, "non-road classified as non-road", "pixels"),
+    Column("FP", Kind.COUNT, "non-road classified as road", "pixels"),
+    Column("FN", Kind.COUNT, "road classified as non-road", "pixels"),
+    _LABELLED,
+)
 _RATES: Final = {
-    name: f"{name} rate {metric.title}, {metric.formula} ({metric.unit})"
+    name: Column(name, Kind.RATE, f"{metric.title}, {metric.formula}", metric.unit)
     for name, metric in METRICS.items()
 }
-_EACH_RATE: Final = "\n".join(_RATES.values())
-_DOUBTS: Final = "\n".join(f"{sign} rate {words}" for sign, words in SIGNS.items())
-_MEANS: Final = "\n".join(
-    [
-        *(f"{name} rate mean of the frames' {name}" for name in METRICS),
-        *(f"pooled_{name} rate {name} of the summed counts" for name in METRICS),
-    ]
+_DOUBTS: Final = tuple(Column(sign, Kind.RATE, words) for sign, words in SIGNS.items())
+_MEANS: Final = (
+    *(Column(name, Kind.RATE, f"mean of the frames' {name}") for name in METRICS),
+    *(Column(f"pooled_{name}", Kind.RATE, f"{name} of the summed counts") for name in METRICS),
 )
-_MEASURE: Final = """\
-measure      name   `left_edge`, `right_edge`, `free_distance`, a rate
-where        name   as `10m`, `ahead`, `0-10m`, `from_above`"""
+_MEASURE: Final = (
+    Column("measure", Kind.NAME, "`left_edge`, `right_edge`, `free_distance`, a rate"),
+    Column("where", Kind.NAME, "as `10m`, `ahead`, `0-10m`, `from_above`"),
+)
 """Measures of a camera that is known: metres to the left, or ahead, on flat ground."""
 
-_OF_FRAMES: Final = _tables(f"""
-frames: A row per evaluated frame, variant and stage; in a fleet, in a folder per drive.
-{_IN_FRAME}
-{_STAMP}
-log_time_ns  time   when the recorder logged it
-{_MASK}
-{_COUNTS}
-{_EACH_RATE}
-truth        count  checksum of the truth's pixels, of all masks of the frame
+_OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
+    "frames": (
+        *_IN_FRAME,
+        _STAMP,
+        Column("log_time_ns", Kind.TIME, "when the recorder logged it"),
+        *_MASK,
+        *_COUNTS,
+        *_RATES.values(),
+        Column("truth", Kind.COUNT, "checksum of the truth's pixels, of all masks of the frame"),
+    ),
+    "regions": (
+        *_IN_FRAME,
+        *_MASK,
+        Column("region", Kind.NAME, "the pixels that are counted"),
+        *_COUNTS,
+    ),
+    "oracles": (
+        *_IN_FRAME,
+        _VARIANT,
+        Column("oracle", Kind.NAME, "the stage that is replaced"),
+        _STAGE,
+        *_COUNTS,
+        *_RATES.values(),
+    ),
+    "disagreements": (
+        *_IN_FRAME,
+        Column("from_variant", Kind.NAME, "the first mask's"),
+        Column("to_variant", Kind.NAME, "the second mask's"),
+        Column("repaired", Kind.COUNT, "pixels that only the second mask has right", "pixels"),
+        Column("spoiled", Kind.COUNT, "pixels that only the first mask has right", "pixels"),
+        _LABELLED,
+    ),
+    "unlabelled": (*_IN_FRAME, _STAMP, *_MASK, *_DOUBTS),
+    "edges": (
+        *_IN_FRAME,
+        *_MASK,
+        *_MEASURE,
+        Column("mask_m", Kind.NUMBER, "where the mask's road ends; empty if it does not", "m"),
+        Column("truth_m", Kind.NUMBER, "where the truth's does", "m"),
+    ),
+}
 
-regions: A row per evaluated frame, variant, stage and region.
-{_IN_FRAME}
-{_MASK}
-region       name   the pixels that are counted
-{_COUNTS}
+_OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
+    "windows": (
+        *KEY,
+        Column("window", Kind.COUNT, "from 0"),
+        Column("first_frame", Kind.COUNT, "number of its first frame"),
+        Column("last_frame", Kind.COUNT, "number of its last frame, inclusive"),
+        Column("frames", Kind.COUNT, "evaluated frames that have this mask"),
+        *_MASK,
+        *_MEANS,
+    ),
+    "changes": (
+        *KEY,
+        Column("from_variant", Kind.NAME, "the mask before: its variant"),
+        Column("from_stage", Kind.NAME, "and its stage"),
+        Column("to_variant", Kind.NAME, "the mask after: its variant"),
+        Column("to_stage", Kind.NAME, "and its stage"),
+        Column("repaired", Kind.COUNT, "pixels of the drive that are wrong before only", "pixels"),
+        Column("spoiled", Kind.COUNT, "pixels of the drive that are wrong after only", "pixels"),
+        _LABELLED,
+    ),
+    "heat": (
+        *KEY,
+        _VARIANT,
+        Column("top", Kind.COUNT, "first row of the cell, in pixels", "pixels"),
+        Column("left", Kind.COUNT, "first column of the cell", "pixels"),
+        Column("side", Kind.COUNT, "of the cell, in pixels", "pixels"),
+        Column("labelled", Kind.COUNT, "how often a pixel of it was labelled"),
+        Column("FP", Kind.COUNT, "how often one was a false positive"),
+        Column("FN", Kind.COUNT, "how often one was a false negative"),
+    ),
+    "probabilities": (
+        *KEY,
+        *_MASK,
+        Column("level", Kind.COUNT, "0 to 255, equally wide, from improbable to certain"),
+        Column("road", Kind.COUNT, "labelled road pixels of the drive at this level", "pixels"),
+        Column("other", Kind.COUNT, "labelled non-road pixels", "pixels"),
+    ),
+    "metres": (
+        *KEY,
+        _VARIANT,
+        *_MEASURE,
+        Column("frames", Kind.COUNT, "evaluated frames on which the truth has it; 0 of a sum"),
+        Column("missing", Kind.COUNT, "of these, frames on which the mask has not"),
+        Column("value", Kind.NUMBER, "median of mask minus truth, outwards or ahead; or rate"),
+        Column("p95", Kind.NUMBER, "95th percentile of the size of the difference"),
+        Column("low", Kind.NUMBER, "least value as the camera might stand"),
+        Column("high", Kind.NUMBER, "greatest value as it might stand"),
+    ),
+}
 
-oracles: A row per evaluated frame, variant, stage replaced by the truth, and stage after it.
-{_IN_FRAME}
-{_VARIANT}
-oracle       name   the stage that is replaced
-{_STAGE}
-{_COUNTS}
-{_EACH_RATE}
+_OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
+    "drives": (
+        *KEY,
+        Column("name", Kind.TEXT, "of its log, for people; two may have the same"),
+        Column("source", Kind.TEXT, "path or URL of the log"),
+        Column("group", Kind.TEXT, "drives of one day or route share one"),
+        Column("fold", Kind.COUNT, "the fold whose model scored it; empty without folds"),
+        Column(
+            "status",
+            Kind.NAME,
+            "scored, damaged (scored but for what is lost), unscored (no truth), failed",
+        ),
+        Column("exit_code", Kind.COUNT, "that `replay` of this drive alone ends with"),
+        Column("reason", Kind.TEXT, "why it was not scored"),
+        Column("seconds", Kind.NUMBER, "that the last attempt took", "s"),
+        Column("log_digest", Kind.NAME, "tells the log from another: of its index and checksums"),
+        Column("start_ns", Kind.TIME, "header stamp of the first evaluated frame"),
+        Column("end_ns", Kind.TIME, "of the last one"),
+        Column("rate_hz", Kind.NUMBER, "of the camera", "Hz"),
+        Column("width", Kind.COUNT, "of the frames, in pixels", "pixels"),
+        Column("height", Kind.COUNT, "of the frames, in pixels", "pixels"),
+        Column("in_log", Kind.COUNT, "frames of the camera's topic"),
+        Column("read", Kind.COUNT, "frames that were read"),
+        Column("decoded", Kind.COUNT, "frames that could be decoded"),
+        Column("labelled", Kind.COUNT, "frames that have a truth"),
+        Column("trained_on", Kind.COUNT, "frames left out because a model learnt from them"),
+        Column("evaluated", Kind.COUNT, "frames that were scored"),
+        Column("losses", Kind.TEXT, "what was lost of the log, a sentence a line"),
+        Column("warnings", Kind.TEXT, "warnings, a sentence a line"),
+        Column(
+            "misfits", Kind.TEXT, "truth or masks that do not fit the images, a sentence a line"
+        ),
+        Column("verdict", Kind.TEXT, "the verdict on this drive alone"),
+        Column("model", Kind.NAME, "SHA-256 of the model file; empty if it trained its own"),
+    ),
+    "scores": (
+        *KEY,
+        *_MASK,
+        _FINAL,
+        Column("region", Kind.NAME, "the pixels that are counted; `all` is every one"),
+        Column("frames", Kind.COUNT, "evaluated frames that have this mask and region"),
+        *_COUNTS,
+        *_MEANS,
+        Column("boundary_f", Kind.RATE, "mean boundary F of the final mask"),
+        Column("boundary_iou", Kind.RATE, "mean boundary IoU of the final mask"),
+        Column("episodes", Kind.COUNT, "stretches of frames with an ERR of 15 % or more"),
+        Column("episode_seconds", Kind.NUMBER, "how long these are, in all", "s"),
+        Column("flicker", Kind.RATE, "share of pixels that change from frame to frame"),
+        Column("truth_flicker", Kind.RATE, "the same of the truth"),
+    ),
+    "effects": (
+        *KEY,
+        Column("base", Kind.NAME, "the variant that is subtracted: `unfiltered` or `blind`"),
+        *_MASK,
+        _FINAL,
+        Column("metric", Kind.NAME, "the rate"),
+        Column("mean", Kind.RATE, "of the frames' differences"),
+        Column("standard_error", Kind.NUMBER, "of that, as frames of a drive are alike"),
+        Column("low", Kind.RATE, "lower end of its interval"),
+        Column("high", Kind.RATE, "upper end"),
+        Column("p", Kind.RATE, "p-value of no difference"),
+        Column("frames", Kind.COUNT, "frames that have a difference"),
+        Column("effective_frames", Kind.NUMBER, "independent frames that tell as much"),
+        Column("worse", Kind.COUNT, "frames on which it is worse than the base"),
+        Column("better", Kind.COUNT, "frames on which it is better"),
+    ),
+    "worst": (
+        Column("rank", Kind.COUNT, "1 is the worst"),
+        *_IN_FRAME,
+        _STAMP,
+        *_MASK,
+        _RATES["ERR"],
+        _RATES["FNR"],
+        _RATES["FPR"],
+        Column("picture", Kind.TEXT, "its file in the fleet's folder, errors in colour"),
+    ),
+}
 
-disagreements: A row per evaluated frame and pair of final masks.
-{_IN_FRAME}
-from_variant name   the first mask's
-to_variant   name   the second mask's
-repaired     count  pixels that only the second mask has right
-spoiled      count  pixels that only the first mask has right
-{_LABELLED}
-
-unlabelled: A row per frame without truth and variant: how doubtful its mask is, not how wrong.
-{_IN_FRAME}
-{_STAMP}
-{_MASK}
-{_DOUBTS}
-
-edges: A row per evaluated frame, final mask and place where the road ends, in metres.
-{_IN_FRAME}
-{_MASK}
-{_MEASURE}
-mask_m       number where the mask's road ends; empty if it does not
-truth_m      number where the truth's does
-""")
-_OF_SUMS: Final = _tables(f"""
-windows: A row per window of consecutive evaluated frames, variant and stage.
-{_KEY}
-window       count  from 0
-first_frame  count  number of its first frame
-last_frame   count  number of its last frame, inclusive
-frames       count  evaluated frames that have this mask
-{_MASK}
-{_MEANS}
-
-changes: A row per mask and the one before it: stage to stage, and final mask to final mask.
-{_KEY}
-from_variant name   the mask before: its variant
-from_stage   name   and its stage
-to_variant   name   the mask after: its variant
-to_stage     name   and its stage
-repaired     count  pixels of the drive that are wrong before only
-spoiled      count  pixels of the drive that are wrong after only
-{_LABELLED}
-
-heat: A row per variant and square cell of the image: where the final mask errs.
-{_KEY}
-{_VARIANT}
-top          count  first row of the cell, in pixels
-left         count  first column of the cell
-side         count  of the cell, in pixels
-labelled     count  how often a pixel of it was labelled
-FP           count  how often one was a false positive
-FN           count  how often one was a false negative
-
-probabilities: A row per variant, stage and level of its road probability, for curves.
-{_KEY}
-{_MASK}
-level        count  0 to 255, equally wide, from improbable to certain
-road         count  labelled road pixels of the drive at this level
-other        count  labelled non-road pixels
-
-metres: A row per final mask and measure on the ground; see the how-to on metres.
-{_KEY}
-{_VARIANT}
-{_MEASURE}
-frames       count  evaluated frames on which the truth has it; 0 of a sum
-missing      count  of these, frames on which the mask has not
-value        number median of mask minus truth, outwards or ahead; or rate
-p95          number 95th percentile of the size of the difference
-low          number least value as the camera might stand
-high         number greatest value as it might stand
-""")
-_OF_DRIVES: Final = _tables(f"""
-drives: A row per drive and camera, scored or not; a column `tag_<key>` for each tag.
-{_KEY}
-name         text   of its log, for people; two may have the same
-source       text   path or URL of the log
-group        text   drives of one day or route share one
-fold         count  the fold whose model scored it; empty without folds
-status       name   scored, damaged (scored but for what is lost), unscored (no truth), failed
-exit_code    count  that `replay` of this drive alone ends with
-reason       text   why it was not scored
-seconds      number that the last attempt took
-log_digest   name   tells the log from another: of its index and checksums
-start_ns     time   header stamp of the first evaluated frame
-end_ns       time   of the last one
-rate_hz      number of the camera
-width        count  of the frames, in pixels
-height       count  of the frames, in pixels
-in_log       count  frames of the camera's topic
-read         count  frames that were read
-decoded      count  frames that could be decoded
-labelled     count  frames that have a truth
-trained_on   count  frames left out because a model learnt from them
-evaluated    count  frames that were scored
-losses       text   what was lost of the log, a sentence a line
-warnings     text   warnings, a sentence a line
-misfits      text   truth or masks that do not fit the images, a sentence a line
-verdict      text   the verdict on this drive alone
-model        name   SHA-256 of the model file; empty if it trained its own
-
-scores: A row per drive, camera, variant, stage and region.
-{_KEY}
-{_MASK}
-{_FINAL}
-region       name   the pixels that are counted; `all` is every one
-frames       count  evaluated frames that have this mask and region
-{_COUNTS}
-{_MEANS}
-boundary_f   rate   mean boundary F of the final mask
-boundary_iou rate   mean boundary IoU of the final mask
-episodes     count  stretches of frames with an ERR of 15 % or more
-episode_seconds number how long these are, in all
-flicker      rate   share of pixels that change from frame to frame
-truth_flicker rate  the same of the truth
-
-effects: A row per drive, camera, difference between two masks, and rate.
-{_KEY}
-base         name   the variant that is subtracted: `unfiltered` or `blind`
-{_MASK}
-{_FINAL}
-metric       name   the rate
-mean         rate   of the frames' differences
-standard_error number of that, as frames of a drive are alike
-low          rate   lower end of its interval
-high         rate   upper end
-p            rate   p-value of no difference
-frames       count  frames that have a difference
-effective_frames number independent frames that tell as much
-worse        count  frames on which it is worse than the base
-better       count  frames on which it is better
-
-worst: A row per frame among the worst of all, by ERR of the first variant's final mask.
-rank         count  1 is the worst
-{_IN_FRAME}
-{_STAMP}
-{_MASK}
-{_RATES["ERR"]}
-{_RATES["FNR"]}
-{_RATES["FPR"]}
-picture      text   its file in the fleet's folder, errors in colour
-""")
-
+_ROWS: Final = {
+    "frames": "A row per evaluated frame, variant and stage; in a fleet, in a folder per drive.",
+    "regions": "A row per evaluated frame, variant, stage and region.",
+    "oracles": "A row per evaluated frame, variant, stage replaced by the truth and later stage.",
+    "disagreements": "A row per evaluated frame and pair of final masks.",
+    "unlabelled": "A row per frame without truth and variant: how doubtful its mask is.",
+    "edges": "A row per evaluated frame, final mask and place where the road ends, in metres.",
+    "windows": "A row per window of consecutive evaluated frames, variant and stage.",
+    "changes": "A row per mask and the one before: stage to stage, final mask to final mask.",
+    "heat": "A row per variant and square cell of the image: where the final mask errs.",
+    "probabilities": "A row per variant, stage and level of its road probability, for curves.",
+    "metres": "A row per final mask and measure on the ground; see the how-to on metres.",
+    "drives": "A row per drive and camera, scored or not; a column `tag_<key>` for each tag.",
+    "scores": "A row per drive, camera, variant, stage and region.",
+    "effects": "A row per drive, camera, difference between two masks, and rate.",
+    "worst": "A row per frame among the worst of all, by ERR of the first variant's final mask.",
+}
+"""What a row of each table is."""
 TABLES: Final[Mapping[str, TableSchema]] = {
-    table.name: table for table in (*_OF_FRAMES, *_OF_SUMS, *_OF_DRIVES)
+    name: TableSchema(name, _ROWS[name], columns)
+    for name, columns in (_OF_FRAMES | _OF_SUMS | _OF_DRIVES).items()
 }
 """Every table by its name."""
-STREAMED: Final = tuple(table.name for table in _OF_FRAMES)
+STREAMED: Final = (*_OF_FRAMES,)
 """The tables whose rows come with each frame; the others of a drive are sums over it."""
-OF_A_DRIVE: Final = tuple(table.name for table in (*_OF_FRAMES, *_OF_SUMS))
+OF_A_DRIVE: Final = (*_OF_FRAMES, *_OF_SUMS)
 """The tables of one drive, in the order in which they are written."""
-OF_DRIVES: Final = tuple(table.name for table in _OF_DRIVES)
-"""The tables of a fleet beside ``frames``: each drive's rows are kept in its record."""
+OF_DRIVES: Final = (*_OF_DRIVES,)
+"""The tables of a fleet beside ``frames``."""
 
 
 def documentation(tables: Iterable[str], ending: str) -> str:
@@ -328,7 +344,7 @@ def documentation(tables: Iterable[str], ending: str) -> str:
     for table in (TABLES[name] for name in tables):
         columns = (*table.columns, *(table.of_a_fleet if ending == "parquet" else ()))
         parts += [f"### {table.name}.{ending}", "", table.doc, ""]
-        parts += ["| column | holds | meaning |", "| --- | --- | --- |"]
-        parts += [f"| `{c.name}` | {c.kind} | {c.doc} |" for c in columns]
+        parts += ["| column | holds | unit | meaning |", "| --- | --- | --- | --- |"]
+        parts += [f"| `{c.name}` | {c.kind} | {c.unit} | {c.doc} |" for c in columns]
         parts.append("")
     return "\n".join(parts)

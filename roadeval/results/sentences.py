@@ -9,26 +9,13 @@ from operator import itemgetter
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Tally
-from roadeval.data.words import (
-    counted,
-    defined,
-    in_percent,
-    interval,
-    listing,
-    number,
-    percent,
-)
-from roadeval.evaluation.score import (
-    FILTER,
-    TESTED,
-    TRUTH,
-    Effect,
-    Finding,
-    Misfit,
-    final_stages,
-)
+from roadeval.data.words import counted, defined, in_percent, interval, listing, number, percent
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
+from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.tables import FILTER, final_stages
 from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
 
 FINE: Final = 0.005
@@ -500,4 +487,4 @@ CLAIMED: Final = {
     "svm_ERR": "ERR of the SVM is lower than that of the colour distance (section 4.3)",
     "post_ERR": "ERR after post-processing is lower than after the SVM (section 4.4)",
 }
-"""By the names of `roadeval.evaluation.score.CLAIMS`; the last two are of the filtered variant."""
+"""By the names of `CLAIMS` in the scoreboard; the last two are of the filtered variant."""

@@ -116,7 +116,7 @@ def _in_words() -> Iterator[None]:
 def check_texts(texts: Iterable[str]) -> None:
     """Raise a ValueError for texts that would take too long to show."""
     together = 0
-    for text in (line for lines in texts for line in lines.split("\n")):
+    for text in (line for lines in texts if len(lines) > LONG for line in lines.split("\n")):
         if len(text) > LONGEST:
             raise ValueError(
                 f"it holds a text of {len(text):,} letters, and at most {LONGEST:,} are read"

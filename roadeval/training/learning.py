@@ -13,7 +13,7 @@ import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Role, Truth
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.score import BlindPrior
+from roadeval.evaluation.score.frame import BlindPrior
 from roadeval.logs.frames import LoggedFrame
 from roadeval.logs.truth.picks import Picks, Why
 from roadeval.pipeline.chain import Pipeline

@@ -56,7 +56,7 @@ OTHER = {
     "run.jobs": 1,
     "run.patience_s": 5.0,
     "fleet.folds": 5,
-    "fleet.keep": "worst:3",
+    "fleet.keep": "all",
     "fleet.scheduler": "tcp://host:8786",
 }
 """A value other than the default for every option of the command line."""

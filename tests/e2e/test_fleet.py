@@ -19,7 +19,7 @@ from roadeval.jobs.results.compare import compare
 from roadeval.jobs.run.fleet_work import train_fold
 from roadeval.logs.log import open_log
 from roadeval.logs.writing.writer import LogWriter
-from roadeval.results.fleet import record_path
+from roadeval.results.fleet import made_path
 from tests.e2e.commands import here
 from tests.fixtures.make import make
 from tests.training.making import frame
@@ -94,9 +94,9 @@ def finals(folder):
 
 @pytest.fixture(scope="module")
 def ran(drives, tmp_path_factory):
-    """A fleet of which the recording of the worst drive was kept."""
+    """A fleet whose recordings were kept."""
     folder = tmp_path_factory.mktemp("fleet") / "f"
-    found, _ = run(drives, folder, keep="worst:1")
+    found, _ = run(drives, folder, keep="all")
     return found
 
 
@@ -161,19 +161,10 @@ def test_the_same_command_again_tries_what_failed_or_has_gone_alone(gone, drives
     before = tables(folder)
     for name in gone:
         shutil.rmtree(next((folder / "results").glob(f"{name}-*")))
-    again, submitted = run(drives, folder, keep="worst:1")
+    again, submitted = run(drives, folder, keep="all")
     assert (again.replayed, submitted) == (1 + len(gone), ["b", *gone])
     assert (again.counts, again.problems) == (ran.counts, ran.problems)
     assert tables(folder) == before
-
-
-def test_of_recordings_that_are_not_kept_none_stays_of_a_drive_without_a_score(tmp_path):
-    folder = tmp_path / "logs"
-    write(folder / "a.mcap", 0)
-    make("drives/unlabelled.mcap", folder)
-    found, _ = run(folder, tmp_path / "f", keep="worst:1")
-    assert found.counts == {"scored": 1, "unscored": 1}
-    assert [path.stem[0] for path in (tmp_path / "f" / "recordings").glob("*")] == ["a"]
 
 
 def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
@@ -273,20 +264,18 @@ def test_a_full_disk_ends_the_run_and_what_was_done_before_stays(
         said = f"f: cannot be written: {os.strerror(number)}; "
         with pytest.raises(RoadevalError, match=said):
             run(drives, folder)
-    _, submitted = run(drives, folder, keep="worst:1")
+    _, submitted = run(drives, folder, keep="all")
     assert submitted == ["a", "b"]
     assert tables(folder) == tables(ran.folder)
 
 
-def test_a_record_that_another_command_has_made_meanwhile_is_not_mixed_with_ours(drives, tmp_path):
+def test_results_that_another_command_has_made_meanwhile_are_not_mixed_with_ours(drives, tmp_path):
     class Meanwhile(Here):
         def submit(self, do, /, task):
             future = super().submit(do, task)
             if task.entry.name == "a":
-                shutil.copy(
-                    record_path(tmp_path / "other", task.entry.id),
-                    record_path(task.folder, task.entry.id),
-                )
+                own = task.entry.id
+                shutil.copy(made_path(tmp_path / "other", own), made_path(task.folder, own))
             return future
 
     run(drives, tmp_path / "other", keep="none")

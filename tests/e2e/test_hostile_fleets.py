@@ -189,13 +189,13 @@ def test_a_report_is_not_written_through_a_link(fleet):
     assert "a link leads out of the folder" in runs["report"].stderr
 
 
-@pytest.mark.parametrize("name", ["worst.parquet", "run.toml", "records"])
+@pytest.mark.parametrize("name", ["worst.parquet", "run.toml", "results"])
 def test_the_fleets_own_command_writes_through_no_link(fleet, made, name):
     if (fleet / name).is_dir():
         shutil.rmtree(fleet / name)
     else:
         (fleet / name).unlink()
-    (fleet / name).symlink_to(fleet.parent / "mine" / ("" if name == "records" else "kept.txt"))
+    (fleet / name).symlink_to(fleet.parent / "mine" / ("" if name == "results" else "kept.txt"))
     before = outside(fleet)
     done = here("fleet", made.parent / "logs", "-o", fleet, "--train-frames", 4)
     assert done.returncode == 1

@@ -6,6 +6,7 @@ import cv2
 import pytest
 
 from roadeval.cli.app import main
+from roadeval.evaluation.tables import only
 from roadeval.jobs.results import inspect as inspecting
 from roadeval.jobs.results.result import DriveResult
 from roadeval.recording import viewer
@@ -98,7 +99,7 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
 
 def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
     opened = DriveResult(unlabelled.recording)
-    rows = opened.table("unlabelled").of_variant("filtered")
+    rows = only(opened.table("unlabelled"), variant="filtered")
     first = int(rows["frame"][rows["disagreement"].argmax()])
     assert inspecting.worst(opened).frame == first
     assert inspecting.worst(opened, "unfiltered").by == "disagreement"

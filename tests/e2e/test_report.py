@@ -86,7 +86,7 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(kille
 def test_a_killed_run_of_sparse_truth_shows_no_scored_frame_whose_truth_is_missing(killed):
     opened = DriveResult(killed)
     seen = set(opened.pictured)
-    scored = set(opened.frames["frame"])
+    scored = set(opened.rows["frame"])
     assert len(seen & scored) > 1
     for frame in seen & scored:
         opened.recording.truth(frame)

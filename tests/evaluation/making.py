@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,21 +13,23 @@ from scipy import signal
 
 from roadeval.data import (
     OUTCOMES,
-    Counts,
     Frame,
     Mask,
     Output,
     Packed,
-    Rows,
     StageResult,
     Truth,
     VariantResult,
 )
 from roadeval.data.arrays import Bits
-from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison import Change, ComparedResult, Comparison, Part, Side
+from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
+from roadeval.evaluation.comparison.pairing import ComparedDrive, Side
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.tables import joined, rates_of
+from roadeval.results.schema import TABLES
+from roadeval.results.tables import read_table
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:
@@ -59,39 +62,36 @@ def a_variant(
     return VariantResult(name, tuple(stages))
 
 
-def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) -> pd.DataFrame:
-    """A ``frames.csv`` by variant and stage: how many of a frame's 100 pixels are wrong.
-
-    Half the pixels are road; all errors are false positives.
-    """
-    rows = []
-    for number in range(max(map(len, errors.values()))):
-        for (variant, stage), wrong in errors.items():
-            if number < len(wrong):
-                counts = Counts(tp=50, tn=50 - wrong[number], fp=wrong[number])
-                rows.append(
-                    {
-                        "frame": number,
-                        "stamp_ns": round(number * 1e9 / hertz),
-                        "log_time_ns": round(number * 1e9 / hertz),
-                        "variant": variant,
-                        "stage": stage,
-                        "TP": counts.tp,
-                        "TN": counts.tn,
-                        "FP": counts.fp,
-                        "FN": counts.fn,
-                        "N": counts.n,
-                        **metrics.of(counts),
-                        "truth": 7,
-                    }
-                )
-    return pd.DataFrame(rows)
+CAMERA = "/camera/image"
+Wrong = Mapping[tuple[str, str], Sequence[int]]
+"""By variant and stage: how many of a frame's 100 pixels are wrong, frame by frame."""
 
 
-def rows_of(table: pd.DataFrame) -> Rows:
-    """The rows of a table as `roadeval.results.tables.read_rows` gives them."""
-    texts = {"variant", "stage", "region", "from_variant", "to_variant"}
-    return Rows({n: np.array(table[n].tolist(), str if n in texts else None) for n in table})
+def table_of(name: str, rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """The rows of a drive's table, typed as they are read: names are categoricals."""
+    if not rows:
+        return read_table(name, "")
+    table = pd.DataFrame([{"drive": "street", "camera": CAMERA, **row} for row in rows])
+    words = (c.name for c in TABLES[name].columns if c.is_word)
+    for word in (word for word in words if word in table):
+        table[word] = pd.Categorical(table[word], [*dict.fromkeys(table[word])])
+    return table
+
+
+def a_table(errors: Wrong, hertz: float = 10, **key: Any) -> pd.DataFrame:
+    """The rows of ``frames``. Half the pixels are road; all errors are false positives."""
+    counts = [
+        (number, variant, stage, 50, 50 - wrong[number], wrong[number], 0, 100)
+        for number in range(max(map(len, errors.values())))
+        for (variant, stage), wrong in errors.items()
+        if number < len(wrong)
+    ]
+    names = ("frame", "variant", "stage", *OUTCOMES, "N")
+    rows = [{**dict(zip(names, row, strict=True)), **key} for row in counts]
+    table = table_of("frames", rows)
+    stamps = (table["frame"] * 1e9 / hertz).round().astype(np.int64)
+    table = table.assign(stamp_ns=stamps, log_time_ns=stamps, truth=7)
+    return table.join(rates_of(table, METRICS)) if rows else table
 
 
 def autoregression(rng: np.random.Generator, frames: int, rho: float) -> npt.NDArray[np.float64]:
@@ -101,41 +101,42 @@ def autoregression(rng: np.random.Generator, frames: int, rho: float) -> npt.NDA
     return series * np.sqrt(1 - rho**2)
 
 
-def compared_drive(
-    tables: Mapping[str, Rows], drive: str = "street", digest: str | None = "d1", **more: Any
-) -> Part:
-    """A drive of a result that is compared, with some tables."""
-    known = {**_NOTHING, **tables}
-    scored = "frames" in tables and len(tables["frames"]) > 0
-    return Part(drive, drive, digest, scored, more.pop("asked", {}), known.__getitem__, **more)
+Drive = tuple[ComparedDrive, Mapping[str, pd.DataFrame]]
 
 
-_NOTHING = {
-    "scores": rows_of(
-        pd.DataFrame(
-            {name: [] for name in ("variant", "stage", "region", "frames", "ERR", *OUTCOMES)}
-        )
-    ),
-    "regions": rows_of(pd.DataFrame({"variant": [], "stage": [], "region": [], "frame": []})),
-    "disagreements": rows_of(
-        pd.DataFrame(
-            {
-                name: []
-                for name in ("from_variant", "to_variant", "frame", "repaired", "spoiled", "N")
-            }
-        )
-    ),
-}
+def a_drive(errors: Wrong, drive: str = "street", digest: str | None = "d1", **more: Any) -> Drive:
+    """A drive of a result that is compared, with ``tables`` beside ``frames``."""
+    key = {"drive": drive, "camera": more.pop("camera", CAMERA)}
+    tables = {"frames": a_table(errors, **key), **more.pop("tables", {})}
+    about = {"name": drive, "asked": {}, "frames": tables["frames"]["frame"].nunique()}
+    return ComparedDrive(**key, digest=digest, **about | more), tables
 
 
-def a_part(errors: Mapping[tuple[str, str], Sequence[int]], **more: Any) -> Part:
-    """A drive whose frames have so many wrong pixels of 100 by variant and stage, at 10 Hz."""
-    return compared_drive({"frames": rows_of(a_table(errors))}, **more)
+def a_result(label: str, *drives: Drive) -> Side:
+    """A result of some drives."""
+
+    def table(name: str, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
+        parts = (own[name] for about, own in drives if about.key in keys and name in own)
+        return joined([*parts, table_of(name, [])])
+
+    return Side(label, [about for about, _ in drives], table)
 
 
 def a_side(label: str, errors: Sequence[int], **more: Any) -> Side:
     """A result of one drive with a variant ``filtered``, which has so many wrong pixels of 100."""
-    return Side(label, [a_part({("filtered", "post"): errors}, **more)])
+    return a_result(label, a_drive({("filtered", "post"): errors}, **more))
+
+
+def altered(side: Side, **columns: Callable[[pd.Series[Any]], Any]) -> Side:
+    """The result with columns of its frames replaced by what these functions make of them."""
+
+    def table(name: str, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
+        rows = side.tables(name, keys)
+        if name != "frames":
+            return rows
+        return rows.assign(**{column: make(rows[column]) for column, make in columns.items()})
+
+    return replace(side, tables=table)
 
 
 def a_difference(

@@ -4,30 +4,18 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from roadeval.evaluation.comparison import (
-    ComparisonError,
-    Condition,
-    Side,
-    compare,
-    judge,
-    variants_as_sides,
-)
+from roadeval.evaluation.comparison.compare import ComparisonError, compare, variants_as_sides
+from roadeval.evaluation.comparison.conditions import Condition, judge
+from roadeval.evaluation.comparison.pairing import disagreements
 from roadeval.evaluation.settings import EvaluationSettings
-from tests.evaluation.making import a_part, a_side, a_table, compared_drive, rows_of
+from tests.evaluation.making import CAMERA, a_drive, a_result, a_side, altered, table_of
 from tests.evaluation.stats.test_difference import within
 
 SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
-
-
-def altered(side, **columns):
-    """The result with columns of its frames replaced by what these functions make of them."""
-    (part,) = side.parts
-    frames = part.rows("frames")
-    frames = frames.replace(**{name: make(frames[name]) for name, make in columns.items()})
-    return replace(side, parts=[compared_drive({"frames": frames}, asked=part.asked)])
 
 
 def unjudged(found, text):
@@ -100,8 +88,8 @@ def test_nothing_in_common_is_an_error():
 
 
 def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_same():
-    rows = rows_of(a_table({POST: [10] * 12, ("unfiltered", "post"): [12] * 12}))
-    street = Side("street", [compared_drive({"frames": rows}, digest=None)])
+    errors = {POST: [10] * 12, ("unfiltered", "post"): [12] * 12}
+    street = a_result("street", a_drive(errors, digest=None))
     sides = variants_as_sides(street, ["filtered", "unfiltered"])
     found = compare(sides, SETTINGS, across_variants=True)
     assert found.changes[0].difference["ERR"].mean == pytest.approx(-0.02)
@@ -110,7 +98,7 @@ def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_sa
 def test_final_masks_of_all_results_are_one_family_and_the_baseline_is_not_of_it():
     rng = np.random.default_rng(3)
 
-    def a_result(label):
+    def a_run(label):
         masks = {
             POST: 12,
             ("filtered", "svm"): 20,
@@ -118,9 +106,9 @@ def test_final_masks_of_all_results_are_one_family_and_the_baseline_is_not_of_it
             ("blind", "post"): 9,
         }
         own = {mask: (level + rng.integers(0, 5, 40)).tolist() for mask, level in masks.items()}
-        return Side(label, [a_part(own)])
+        return a_result(label, a_drive(own))
 
-    found = compare([a_result(name) for name in ("base", "new", "newer")], SETTINGS)
+    found = compare([a_run(name) for name in ("base", "new", "newer")], SETTINGS)
     sizes = {(c.variant, c.stage): c.difference["ERR"].comparisons for c in found.changes}
     assert sizes == {
         ("filtered", "post"): 4,
@@ -135,14 +123,14 @@ def test_final_masks_of_all_results_are_one_family_and_the_baseline_is_not_of_it
 
 def a_fleet(label, errors, *, groups=None, digests=None):
     """A result of drives ``0``, ``1`` ..., each with so many wrong pixels frame by frame."""
-    parts = []
+    drives = []
     for place, own in enumerate(errors):
         about = {
             "digest": digests[place] if digests else f"d{place}",
             "group": groups[place] if groups else None,
         }
-        parts.append(a_part({POST: list(own)}, drive=str(place), **about))
-    return Side(label, parts)
+        drives.append(a_drive({POST: list(own)}, drive=str(place), **about))
+    return a_result(label, *drives)
 
 
 def noisy(drives, mean=10, seed=5):
@@ -152,7 +140,7 @@ def noisy(drives, mean=10, seed=5):
 def test_a_drive_of_a_fleet_has_the_numbers_of_the_comparison_of_its_two_results():
     base, new = a_fleet("a", noisy(8)), a_fleet("b", noisy(8, 12, 6))
     row = next(row for row in compare([base, new], SETTINGS).drives if row.drive == "3")
-    alone = [replace(side, parts=side.parts[3:4]) for side in (base, new)]
+    alone = [replace(side, drives=side.drives[3:4]) for side in (base, new)]
     (change,) = compare(alone, SETTINGS).changes
     assert replace(change.difference["ERR"], p_holm=None, comparisons=None) == row.difference
     assert (row.base, row.new) == (change.base["ERR"], change.new["ERR"])
@@ -161,7 +149,7 @@ def test_a_drive_of_a_fleet_has_the_numbers_of_the_comparison_of_its_two_results
 
 def test_a_drive_is_compared_with_a_fleet_that_has_it():
     fleet = a_fleet("fleet", noisy(5))
-    alone = Side("alone", [a_part({POST: [20] * 40}, drive="other name", digest="d2")])
+    alone = a_result("alone", a_drive({POST: [20] * 40}, drive="other name", digest="d2"))
     found = compare([fleet, alone], SETTINGS)
     (change,) = found.changes
     assert (change.drives, change.difference["ERR"].unit) == (1, "frames")
@@ -195,20 +183,19 @@ def test_drives_are_ranked_and_few_of_those_called_changed_are_not():
 
 
 def test_drives_that_are_left_out_or_have_moved_are_told():
-    base, new = a_fleet("a", noisy(3)), a_fleet("b", noisy(4))
-    moved = [
-        replace(part, drive=f"new/{part.drive}", name=f"new/{part.drive}") for part in new.parts
+    drives = [
+        a_drive({POST: list(own)}, drive=f"new/{place}", digest=f"d{place}")
+        for place, own in enumerate(noisy(4))
     ]
-    assert compare([base, replace(new, parts=moved)], SETTINGS).warnings == (
+    assert compare([a_fleet("a", noisy(3)), a_result("b", *drives)], SETTINGS).warnings == (
         "1 drive is left out of b (not in a): new/3",
     )
 
 
 def test_half_of_the_drives_must_be_in_common_for_a_condition_on_a_change():
-    base, new = a_fleet("a", noisy(9)), a_fleet("b", noisy(9, 12, 6))
-    few = replace(new, parts=[*new.parts[:4], *a_fleet("", noisy(5), digests="vwxyz").parts])
-    renamed = [replace(p, drive=f"{i}") for i, p in enumerate(few.parts)]
-    found = compare([base, replace(few, parts=renamed)], SETTINGS)
+    digests = ["d0", "d1", "d2", "d3", *"vwxyz"]
+    few = a_fleet("b", noisy(9, 12, 6), digests=digests)
+    found = compare([a_fleet("a", noisy(9)), few], SETTINGS)
     why = unjudged(found, "post.filtered.ERR > 1pp")
     assert "have 4 drives in common, fewer than half of the 9" in why
     (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 5%")], SETTINGS)
@@ -252,3 +239,156 @@ def test_a_condition_is_judged_where_half_of_the_shorter_range_is_common(common,
     (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
     assert judged.holds is holds
     assert holds or "fewer than half of the 40 of the smaller one" in judged.why
+
+
+# --- Regions and disagreement ---------------------------------------------------------------------
+
+
+def regions(wrong, drive="street", stage="post", more=0):
+    """Rows of regions of 100 pixels, half of them road: wrong pixels by variant and region.
+
+    Frame by frame; -1 is a frame without a pixel there. ``more`` pixels are other than road.
+    """
+    rows = []
+    for (variant, region), errors in wrong.items():
+        for frame, n in enumerate(errors):
+            counts = {"TP": 50, "TN": 50 + more - n, "FP": n, "FN": 0, "N": 100 + more}
+            counts = counts if n >= 0 else dict.fromkeys(counts, 0)
+            mask = {"variant": variant, "stage": stage, "region": region}
+            rows.append({"drive": drive, "frame": frame, **mask, **counts})
+    return table_of("regions", rows)
+
+
+def a_run(first, second, own=None):
+    """A result of two variants, with rows of regions."""
+    errors = {("first", "post"): first, ("second", "post"): second}
+    return a_result("street", a_drive(errors, tables={"regions": own} if own is not None else {}))
+
+
+def test_a_mask_may_be_better_in_one_region_and_worse_in_another():
+    frames = range(40)
+    rows = regions(
+        {
+            ("first", "lit"): [10 + n % 3 for n in frames],
+            ("first", "shadow"): [10 + n % 2 for n in frames],
+            ("second", "lit"): [30 + n % 5 for n in frames],
+            ("second", "shadow"): [2 + n % 2 for n in frames],
+        }
+    )
+    run = a_run([10] * 40, [16] * 40, rows)
+    found = compare(variants_as_sides(run, ["first", "second"]), SETTINGS, across_variants=True)
+    shadow, lit = found.regions
+    assert (shadow.region, lit.region) == ("shadow", "lit")
+    assert shadow.difference.high < 0 < lit.difference.low
+    assert (shadow.base, shadow.new) == (pytest.approx(0.105), pytest.approx(0.025))
+    assert shadow.difference.comparisons == 2
+    assert (lit.variant, lit.frames) == ("second", 40)
+
+
+def test_over_drives_a_region_is_the_mean_of_the_drives_that_have_it():
+    wrong = {"one": {"lit": 10, "shadow": 10}, "two": {"lit": 20}}
+
+    def run(more):
+        drives = []
+        for name, errors in wrong.items():
+            rows = {("first", region): [own + more] * 20 for region, own in errors.items()}
+            about = {"drive": name, "digest": name, "tables": {"regions": regions(rows, name)}}
+            drives.append(a_drive({("first", "post"): [10] * 20}, **about))
+        return a_result(f"{more} more", *drives)
+
+    shadow, lit = compare([run(0), run(5)], SETTINGS).regions
+    assert (lit.frames, lit.base, lit.new) == (40, pytest.approx(0.15), pytest.approx(0.2))
+    assert (shadow.frames, shadow.base, shadow.new) == (20, pytest.approx(0.1), pytest.approx(0.15))
+
+
+def test_a_region_of_other_pixels_is_left_out_and_so_is_a_frame_that_labels_none_of_it():
+    lit, shadow = {("first", "lit"): [10, 20, -1] * 8}, {("first", "shadow"): [10] * 24}
+    base = pd.concat([regions(lit), regions(shadow)])
+    other = pd.concat([regions(lit), regions(shadow, more=1)])
+    runs = [a_run([10] * 24, [20] * 24, own) for own in (base, other)]
+    (row,) = compare(runs, SETTINGS).regions
+    assert (row.region, row.frames, row.base) == ("lit", 16, pytest.approx(0.15))
+
+
+def test_regions_of_final_masks_under_another_stage_s_name_are_compared():
+    errors = {("first", "lit"): [10] * 12}
+    base = a_run([10] * 12, [10] * 12, regions(errors))
+    drive = a_drive({("first", "svm"): [20] * 12}, tables={"regions": regions(errors, stage="svm")})
+    (row,) = compare([base, a_result("new", drive)], SETTINGS).regions
+    assert (row.region, row.frames, row.difference.mean) == ("lit", 12, 0)
+
+
+def disagreed(rows, seconds, *names):
+    """The frames of most disagreement; rows are number, repaired and spoiled of 100 pixels."""
+    keys = {"from_variant": "a", "to_variant": "b", "N": 100}
+    cells = [{"frame": f, **keys, "repaired": r, "spoiled": s} for f, r, s in rows]
+    stamps = (np.array(seconds) * 1e9).astype(np.int64)
+    pairs = pd.DataFrame({"frame": [frame for frame, *_ in rows], "stamp_ns": stamps})
+    return disagreements(table_of("disagreements", cells), pairs, *names)
+
+
+def test_frames_of_most_disagreement_tell_who_is_right():
+    rows = [(0, 1, 2), (40, 30, 5), (80, 0, 0)]
+    first, second = disagreed(rows, [0, 4, 8], "a", "b")
+    assert (first.frame, first.stamp_ns) == (40, 4 * 10**9)
+    assert (first.new_right, first.base_right) == (0.30, 0.05)
+    assert second.frame == 0
+    (turned, _) = disagreed(rows, [0, 4, 8], "b", "a")
+    assert (turned.new_right, turned.base_right) == (0.05, 0.30)
+
+
+def test_neighbours_disagree_alike_and_only_one_is_named():
+    rows = [(frame, 10 + frame, 0) for frame in range(30)]
+    assert next(disagreed(rows, range(30), "a", "b")).frame == 29
+    near = disagreed([*rows, (30, 90, 0)], [*range(30), 29.5], "a", "b")
+    assert {each.frame for each in near} & {29, 30} == {30}
+
+
+# --- What may be odd ------------------------------------------------------------------------------
+
+
+def test_variants_that_look_like_numbers_and_frames_without_a_rate_are_compared():
+    base, new = (
+        a_result(label, a_drive({("10", "post"): errors}))
+        for label, errors in (("base", [10, 20, 30]), ("new", [12, 26, 30]))
+    )
+    undefined = altered(new, ERR=lambda rates: rates.where(rates < 0.3), FP=lambda n: n)
+    (change,) = compare([base, undefined], SETTINGS).changes
+    assert (change.variant, change.frames) == ("10", 3)
+    assert change.difference["ERR"].mean == pytest.approx(0.04)
+    assert change.difference["ERR"].units == 2
+
+
+def test_one_frame_alone_is_compared_without_an_interval():
+    (change,) = compare([a_side("base", [10]), a_side("new", [12])], SETTINGS).changes
+    told = change.difference["ERR"]
+    assert (told.units, told.mean, told.low) == (1, pytest.approx(0.02), None)
+
+
+def test_of_a_mask_that_is_missing_on_some_frames_those_that_have_it_are_compared():
+    masks = {POST: [10] * 4, ("net", "post"): [20] * 2}
+    sides = [a_result(label, a_drive(masks)) for label in ("base", "new")]
+    found = compare(sides, SETTINGS)
+    assert {change.variant: change.frames for change in found.changes} == {"filtered": 4, "net": 2}
+    assert found.warnings == ()
+
+
+def test_several_cameras_of_a_drive_are_matched_each_with_its_own():
+    def a_rig(label, front, rear):
+        cameras = {CAMERA: front, "/rear": rear}
+        drives = [a_drive({POST: errors}, camera=name) for name, errors in cameras.items()]
+        return a_result(label, *drives)
+
+    found = compare([a_rig("a", [10] * 12, [20] * 12), a_rig("b", [13] * 12, [21] * 12)], SETTINGS)
+    (change,) = found.changes
+    assert (change.drives, change.frames) == (2, 24)
+    assert change.difference["ERR"].mean == pytest.approx(0.02)
+    assert change.difference["ERR"].unit == "frames"
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_result_without_a_scored_frame_is_not_compared(place):
+    sides = [a_side("there", [10] * 12)]
+    sides.insert(place, a_result("empty", a_drive({POST: []})))
+    with pytest.raises(ComparisonError, match="empty: nothing was scored"):
+        compare(sides, SETTINGS)

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import Change, Condition, ConditionError
+from roadeval.evaluation.comparison.compare import Change
+from roadeval.evaluation.comparison.conditions import Condition, ConditionError
 from roadeval.evaluation.stats import Difference
 
 MASK = Change(

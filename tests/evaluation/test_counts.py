@@ -8,8 +8,8 @@ from hypothesis.extra.numpy import arrays
 from sklearn.metrics import confusion_matrix
 
 from roadeval.data import Counts, Packed, TruthBits
-from roadeval.evaluation import score
-from roadeval.evaluation.score import error_map
+from roadeval.evaluation.score import counts
+from roadeval.evaluation.score.counts import error_map
 from tests.evaluation.making import pixels
 
 TRUTH = pixels("##..", "##.?")
@@ -19,7 +19,7 @@ def count(masks, truth, regions):
     """Count masks and regions that are not packed yet."""
     packed = TruthBits.of(truth)
     inside = packed.bits_of(map(Packed.of, regions.values()))
-    counted = score.count(packed.bits_of(map(Packed.of, masks)), packed, list(inside))
+    counted = counts.count(packed.bits_of(map(Packed.of, masks)), packed, list(inside))
     for rows in counted.tolist():
         whole, *parts = (Counts(*row) for row in rows)
         yield whole, dict(zip(regions, parts, strict=True))

@@ -9,9 +9,8 @@ from scipy.ndimage import distance_transform_cdt, distance_transform_edt
 from skimage.segmentation import find_boundaries
 
 from roadeval.data import IGNORE, FrameResult, Role, TruthBits, pack
-from roadeval.evaluation import score
-from roadeval.evaluation.score import EdgesAndFlicker
-from roadeval.evaluation.score.counts import TRIMAP
+from roadeval.evaluation.score import counts
+from roadeval.evaluation.score.counts import TRIMAP, EdgesAndFlicker
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 
 TRUTH = pixels("##..", "##.?")
@@ -19,7 +18,7 @@ TRUTH = pixels("##..", "##.?")
 
 def contour(mask, truth, width=1, widths=TRIMAP):
     """Boundary F, boundary IoU and trimap of a mask."""
-    return score.contours({"net": pack(mask)}, TruthBits.of(truth), width, widths)["net"]
+    return counts.contours({"net": pack(mask)}, TruthBits.of(truth), width, widths)["net"]
 
 
 def one(mask, truth, width=1):
@@ -27,7 +26,7 @@ def one(mask, truth, width=1):
 
 
 def edge_of(labels):
-    return unpacked(score.edge_of(TruthBits.of(labels)), labels.shape[1])
+    return unpacked(counts.edge_of(TruthBits.of(labels)), labels.shape[1])
 
 
 def test_neither_the_border_nor_an_ignored_pixel_makes_an_edge():

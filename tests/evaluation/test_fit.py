@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import Frame, Packed
-from roadeval.evaluation.score import TRUTH, Finding, FitCheck, Misfit
+from roadeval.evaluation.score.fit import TRUTH, Finding, FitCheck, Misfit
 
 FRAMES = 40
 HEIGHT, WIDTH = 120, 160

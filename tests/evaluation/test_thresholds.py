@@ -7,7 +7,7 @@ import pytest
 from sklearn.metrics import average_precision_score, f1_score, precision_recall_curve
 
 from roadeval.data import CODES, histogram
-from roadeval.evaluation.score import Thresholds, at_levels, calibration
+from roadeval.evaluation.score.thresholds import Thresholds, at_levels, calibration
 
 TOP = CODES - 1
 

@@ -5,8 +5,8 @@ import pytest
 from scipy import stats
 
 from roadeval.data import Output, Packed, Role, StageResult, VariantResult
-from roadeval.evaluation.score import Scoreboard, sign_of
-from roadeval.evaluation.score.unlabelled import Unlabelled, chosen, doubts_of, entropy
+from roadeval.evaluation.score.scoreboard import Scoreboard
+from roadeval.evaluation.score.unlabelled import Unlabelled, chosen, doubts_of, entropy, sign_of
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, pixels
 
@@ -17,7 +17,7 @@ def variant(name, mask, codes=None):
 
 
 def a_board(*names):
-    return Scoreboard(EvaluationSettings(), names, None)
+    return Scoreboard(("street", "/camera"), EvaluationSettings(), names, None)
 
 
 def seen(board, number, *variants, truth=None):
@@ -69,9 +69,9 @@ def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
         for number in range(2):
             masks = {"sure": pixels("#..."), "plain": pixels("....")}
             seen(board, number, *(variant(name, masks[name], codes.get(name)) for name in names))
-        found[names[0]] = sign_of(board.unlabelled.rows(), names[0])
+        found[names[0]] = sign_of(board.unlabelled.rows())
     assert found == {"sure": "entropy", "plain": "disagreement"}
-    assert sign_of(Unlabelled().rows(), "nobody") is None
+    assert sign_of(Unlabelled().rows()) is None
 
 
 def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():

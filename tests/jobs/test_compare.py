@@ -12,7 +12,7 @@ import pytest
 from roadeval import compare, configure, replay, replay_fleet
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import stages
-from roadeval.results.fleet import FleetFolder, frames_path
+from roadeval.results.fleet import FleetFolder, cached_path
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, settings, write_log
 from tests.results.fleet.making import fleet_of
@@ -95,8 +95,7 @@ def test_labels_that_moved_are_told_and_no_change_is_judged(tmp_path, moved, fra
 
 def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):
     cut = shutil.copytree(fleets[1], tmp_path / "cut")
-    drive = FleetFolder(cut).facts.drives[0].drive
-    path = frames_path(cut, drive)
+    path = cached_path(cut, "frames", FleetFolder(cut).facts.drives[0].drive)
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RoadevalError, match=r"frames\.parquet: damaged"):
         compare([fleets[0], cut])

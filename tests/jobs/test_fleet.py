@@ -22,9 +22,9 @@ def logs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def ran(logs, tmp_path_factory):
-    """A fleet in one go that keeps the recording of its worst drive."""
+    """A fleet in one go that keeps its recordings."""
     folder = tmp_path_factory.mktemp("fleet") / "f"
-    run(logs, folder, keep="worst:1")
+    run(logs, folder, keep="all")
     return folder
 
 
@@ -38,8 +38,8 @@ def files(folder):
 
 
 def drive(folder, name="a"):
-    (found,) = (folder / "results").glob(f"{name}-*")
-    return found.name
+    (found,) = (folder / "results").glob(f"{name}-*.json")
+    return found.stem
 
 
 def rewritten(path, change):
@@ -76,12 +76,12 @@ def test_of_a_log_that_is_none_any_more_no_results_are_left(logs, tmp_path):
     (mine / "a.mcap").write_bytes(b"nothing of the kind")
     again, _ = run(mine, tmp_path / "f", keep="all")
     assert again.counts == {"scored": 1, "failed": 1}
-    assert [name for name in files(tmp_path / "f") if own in name] == [f"records/{own}.json"]
+    assert [name for name in files(tmp_path / "f") if own in name] == [f"results/{own}.json"]
 
 
 def test_other_versions_of_what_computes_replay_every_drive(logs, folder, monkeypatch):
     monkeypatch.setattr(prepared, "computing", lambda: {"opencv-python-headless": "4.14"})
-    assert run(logs, folder, keep="worst:1")[0].replayed == 2
+    assert run(logs, folder, keep="all")[0].replayed == 2
 
 
 def test_a_worker_with_another_version_is_refused(logs, tmp_path, monkeypatch):
@@ -116,17 +116,17 @@ def test_a_model_that_changes_while_the_fleet_runs_ends_it(logs, tmp_path):
 
 def test_what_a_killed_worker_has_left_is_in_no_table_and_goes(logs, ran, folder):
     own = drive(folder)
-    (folder / "records" / f"{own}.json").unlink()
+    (folder / "results" / f"{own}.json").unlink()
     left = {
         Path("recordings", f"{own}.0123abcd.partial.rrd"): b"half a recording",
-        Path("records", f".{own}.0123abcd.partial.json"): b"{",
+        Path("results", f".{own}.0123abcd.partial.json"): b"{",
         Path("frames", own, ".frames.0123abcd.partial.parquet"): b"PAR1",
-        Path("records", f".{own}.json.lock"): b"process 1",
+        Path("results", f".{own}.json.lock"): b"process 1",
         Path(".drives.0123abcd.partial.parquet"): b"PAR1",
     }
     for path, content in left.items():
         (folder / path).write_bytes(content)
-    run(logs, folder, keep="worst:1")
+    run(logs, folder, keep="all")
     assert files(folder) == files(ran)
     assert tables(folder) == tables(ran)
 
@@ -134,15 +134,10 @@ def test_what_a_killed_worker_has_left_is_in_no_table_and_goes(logs, ran, folder
 # --- What a command that was killed has left ------------------------------------------------------
 
 
-@pytest.mark.parametrize("lost", [True, False])
-def test_the_worst_drives_recording_alone_is_kept_whatever_was_left(lost, logs, ran, folder):
-    (kept,) = (folder / "recordings").iterdir()
-    other = next(each for each in (drive(folder, name) for name in "ab") if each != kept.stem)
-    shutil.copy(kept, kept.with_stem(other))
-    if lost:
-        kept.unlink()
-    again, _ = run(logs, folder, keep="worst:1")
-    assert again.replayed == int(lost)
+def test_a_drive_whose_recording_has_gone_is_replayed(logs, ran, folder):
+    next((folder / "recordings").iterdir()).unlink()
+    again, _ = run(logs, folder, keep="all")
+    assert again.replayed == 1
     assert files(folder) == files(ran)
 
 

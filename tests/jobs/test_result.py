@@ -50,7 +50,7 @@ def test_a_recording_and_the_folder_beside_it_hold_the_same(made):
 
 def test_several_results_are_one_table_with_their_drives(made):
     both = roadeval.Result(made.alone, made.many)
-    assert len({*both.scores["drive"]}) == len(both.parts) == len(both.drives) == 2
+    assert len({*both.scores["drive"]}) == len(both.compared) == len(both.drives) == 2
     one, other = both.frames.groupby("drive").ERR.mean()
     assert one == other
     assert roadeval.Result(made.recording).recording == made.recording

@@ -78,7 +78,7 @@ def test_every_drive_has_every_replay_with_every_seed():
 def demo():
     """Numbers of two frames and their pixels; some trees are enough to be counted."""
     few = {"frames": {"max_frames": 5}, "training": {"frames": 3}}
-    return overlap.replayed(**few, trees={"trees": 15, "hidden": 8})
+    return overlap.replayed(**few, trees={"trees": 15})
 
 
 def test_libraries_of_others_compute_the_overlap_numbers_that_are_printed(demo):

@@ -12,7 +12,6 @@ from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Details, Document
 from roadeval.report.findings import Findings
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
-from roadeval.results.rows import as_arrays
 
 
 def a_document(*blocks, title="street"):
@@ -31,9 +30,6 @@ def text(content):
     return re.sub(r"\s+", " ", " ".join(pages))
 
 
-NO_WINDOWS = as_arrays("windows", [])
-
-
 VARIANTS = ("filtered", "unfiltered", "blind")
 
 
@@ -46,7 +42,8 @@ def rates(err, fpr=0.25, fnr=0.5, **more):
 def a_total(err, fpr=0.25, fnr=0.5, tp=6):
     """Rates of a mask over a drive of 1,200 frames, and what it counts of 20 pixels."""
     counts = {"TP": tp, "TN": 16 - tp, "FP": 3, "FN": 1}
-    pooled = {"pooled_ERR": err + 0.01, "pooled_FPR": 0.25, "pooled_TPR": 0.83}
+    pooled = {"ERR": err + 0.01, "FPR": 0.25, "TPR": 0.83, "precision": tp / (tp + 3)}
+    pooled = {f"pooled_{name}": rate for name, rate in pooled.items()}
     return rates(err, fpr, fnr, frames=1200, undefined={}, **counts, **pooled)
 
 

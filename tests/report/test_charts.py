@@ -1,9 +1,11 @@
 """Which charts are made of which rows: each number where it belongs, in its own look."""
 
+import pandas as pd
+
 from roadeval.evaluation.stats import Difference
 from roadeval.report.chart import ChartKind, looks_of_results
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import DRAWN, MEAN, ForestRow
+from roadeval.report.charts.standard import DRAWN, MEAN
 
 # --- Looks ----------------------------------------------------------------------------------------
 
@@ -22,8 +24,9 @@ def test_of_several_results_a_variant_keeps_its_hue_and_a_result_its_dash():
 OVER = Difference(0.01, -0.01, 0.03, 0.2, 0.95, "drives", 3)
 
 
-def drives(count, group=None):
-    return [ForestRow(f"drive_{n}", group, n / 1000, (n - 1) / 1000, None) for n in range(count)]
+def drives(count):
+    rows = [(f"drive_{n}", None, n / 1000, (n - 1) / 1000, None) for n in range(count)]
+    return pd.DataFrame(rows, columns=["name", "group", "mean", "low", "high"])
 
 
 def test_few_drives_have_a_row_each_and_below_them_the_mean():

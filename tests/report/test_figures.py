@@ -28,8 +28,7 @@ from roadeval.report.figures import (
     write_figures,
 )
 from roadeval.report.images import ExampleFrame
-from tests.evaluation.making import rows_of
-from tests.report.making import NO_WINDOWS
+from roadeval.results.tables import read_table
 
 BY_DEFAULT = ("filtered", "unfiltered", "blind")
 
@@ -102,13 +101,13 @@ def placed(figure: Figure) -> list[Picture]:
 
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
-    ax = drawn(fp_fn_rate("drive", rows_of(table))).axes[1]
+    ax = drawn(fp_fn_rate("drive", table)).axes[1]
     assert ax.texts[0].get_text() == "undefined on every frame"
 
 
 def test_a_long_drive_is_drawn_as_means_of_rows() -> None:
     table = a_table(3600)
-    figure = error_rate("drive", rows_of(table))
+    figure = error_rate("drive", table)
     *_, line = figure.axes[0].lines
     assert len(line.get_ydata()) == CROWDED
     assert CROWDED / line.get_markevery() == MARKED
@@ -144,7 +143,7 @@ def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
 
 
 def test_a_png_shows_what_matplotlib_would_save(tmp_path: Path) -> None:
-    windows = rows_of(a_table(3))
+    windows = a_table(3)
     write_figures(tmp_path, "drive", windows, [])
     mine = Image.open(tmp_path / "fig3a_error_rate.png")
     content = BytesIO()
@@ -162,9 +161,7 @@ def test_a_png_shows_what_matplotlib_would_save(tmp_path: Path) -> None:
 def twice(tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
     """The files of one drive, written twice."""
     folders = [tmp_path_factory.mktemp("figures") / "new" for _ in range(2)]
-    return [
-        write_figures(folder, "drive", rows_of(a_table(3)), [an_example()]) for folder in folders
-    ]
+    return [write_figures(folder, "drive", a_table(3), [an_example()]) for folder in folders]
 
 
 def test_equal_results_give_equal_files(twice: list[list[Path]]) -> None:
@@ -178,5 +175,5 @@ def test_a_pdf_holds_each_picture_once_and_as_jpeg(twice: list[list[Path]]) -> N
 
 
 def test_without_rates_only_masks_are_drawn(tmp_path: Path) -> None:
-    write_figures(tmp_path, "drive", NO_WINDOWS, [an_example(truth=False)])
+    write_figures(tmp_path, "drive", read_table("windows", ""), [an_example(truth=False)])
     assert {path.name for path in tmp_path.iterdir()} == {"fig2_masks.png", "fig2_masks.pdf"}

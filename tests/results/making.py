@@ -2,6 +2,8 @@
 
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
+from roadeval.results.schema import TABLES
+from roadeval.results.tables import read_table
 
 KEY = Key("street", "/camera/image")
 
@@ -10,8 +12,14 @@ def lines(result):
     return csv_lines(KEY, frame_rows(result))
 
 
-def sum_lines(board):
-    return csv_lines(KEY, sum_rows(board))
+def sum_lines(board, windows):
+    return csv_lines(KEY, sum_rows(board, windows))
+
+
+def frames_of(results):
+    """The table ``frames`` that the lines of results read back as."""
+    text = "".join(lines(result)["frames"] for result in results)
+    return read_table("frames", TABLES["frames"].header + text)
 
 
 def facts_of(**parts):

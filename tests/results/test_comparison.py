@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import Condition
+from roadeval.evaluation.comparison.conditions import Condition
 from roadeval.results.comparison import (
     changed_settings,
     headline,

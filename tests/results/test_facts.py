@@ -2,24 +2,24 @@
 
 import json
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import pytest
 
-from roadeval.results.facts import Facts, LogFacts, as_parts, digest_of
+from roadeval.results.facts import Facts, LogFacts, digest_of
 from roadeval.results.tables import ResultsError
-from tests.evaluation.test_effects import a_mask, effects_of
+from tests.evaluation.test_effects import effects_of
 from tests.results.making import facts_of
 
 NAMES = ("filtered", "unfiltered", "net", "net_tuned", "blind")
 TOTALS = {name: {"post": {"ERR": 0.1, "frames": 100}} for name in NAMES}
-EFFECTS = effects_of([a_mask(n, "post", [3] * 12) for n in NAMES])
+EFFECTS = effects_of({(name, "post"): [3] * 12 for name in NAMES})
 WRITTEN = facts_of(
     totals=TOTALS,
     claims={"filter_ERR": {"held": 2}},
     run={"output": {"save": "out.rrd"}, "evaluation": {"window": 7, "from_the_future": 1}},
     log=LogFacts("street.mcap", "abc"),
-    **as_parts(EFFECTS),
+    effects=EFFECTS,
 )
 
 
@@ -41,11 +41,23 @@ def test_what_is_read_is_what_was_written():
 def test_undefined_numbers_are_null_and_read_as_undefined():
     (effect,) = (e for e in EFFECTS if (e.base, e.variant) == ("unfiltered", "filtered"))
     nothing = replace(effect.rates["ERR"], mean=math.nan, units=0)
-    facts = replace(WRITTEN, difference={"post": {"ERR": nothing}})
-    assert json.loads(facts.text())["difference"]["post"]["ERR"]["mean"] is None
-    read = Facts.parse(facts.text(), "here").difference["post"]["ERR"]
-    assert math.isnan(read.mean)
-    assert asdict(read) | {"mean": 0} == asdict(nothing) | {"mean": 0}
+    facts = replace(WRITTEN, effects=[replace(effect, rates={"ERR": nothing})])
+    written = json.loads(facts.text())
+    assert written["difference"]["post"]["ERR"]["mean"] is None
+    (read,) = Facts.parse(facts.text(), "here").effects
+    assert math.isnan(read.rates["ERR"].mean)
+    assert replace(read.rates["ERR"], mean=0) == replace(nothing, mean=0)
+
+
+def test_each_difference_is_under_what_is_subtracted_too():
+    content = json.loads(WRITTEN.text())
+    assert [*content["difference"]] == ["post"]
+    parts = {part: [*content[f"against_{part}"]] for part in ("unfiltered", "blind", "method")}
+    assert parts == {
+        "unfiltered": ["net", "net_tuned"],
+        "blind": ["filtered", "unfiltered", "net", "net_tuned"],
+        "method": ["net_tuned"],
+    }
 
 
 @pytest.mark.parametrize("given", [{"confidence": 2}, {"window": None}, 5, None])
@@ -65,7 +77,7 @@ def test_damaged_settings_are_one_line(given):
             {"format": {**Facts.FORMAT, "version": 2}, "versions": {"roadeval": "0.2.0"}},
             "made by roadeval 0.2.0, whose format",
         ),
-        ({"format": {**Facts.FORMAT, "version": 5}}, "made by a later version: update roadeval"),
+        ({"format": {**Facts.FORMAT, "version": 99}}, "made by a later version: update roadeval"),
         ({"format": {**Facts.FORMAT, "version": "x"}}, "not of format roadeval-summary"),
         ([3], "not of format roadeval-summary"),
     ],
@@ -87,7 +99,7 @@ def test_a_summary_of_another_format_is_refused_with_who_wrote_it(summary, told)
         ("run", []),
         ("drive", {}),
         ("frames", {"evaluated": "many"}),
-        ("difference", {"post": {"ERR": {"mean": 0.1}}}),
+        ("difference", {"post": {"ERR": {"mean": "high"}}}),
     ],
 )
 def test_a_part_of_another_shape_is_damage(part, value):

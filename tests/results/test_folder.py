@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from roadeval.data import FrameResult, Packed, Role
-from roadeval.evaluation.score import BlindPrior, Scoreboard
+from roadeval.evaluation.score.frame import BlindPrior
+from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
@@ -22,7 +23,7 @@ from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
 from roadeval.results.tables import ResultsError
 from tests.evaluation.making import a_frame, a_variant, pixels
-from tests.results.making import facts_of, lines, sum_lines
+from tests.results.making import KEY, facts_of, lines, sum_lines
 
 TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
 MASK = pixels("#.#.", "##..")
@@ -34,7 +35,7 @@ OF_A_DRIVE = [name for name in ALL_TABLES if name != "unlabelled"]
 def a_board() -> Scoreboard:
     settings = EvaluationSettings(window=2, boundary_width=1, bands=2)
     ground, _ = ground_of(None, GroundSettings(height=1.5, pitch=30, fov=60), (4, 2))
-    return Scoreboard(settings, ["filtered"], BlindPrior.of_truths(TRUTHS), ground)
+    return Scoreboard(KEY, settings, ["filtered"], BlindPrior.of_truths(TRUTHS), ground)
 
 
 def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResult]:
@@ -51,8 +52,8 @@ def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResu
 
 def the_rest(board: Scoreboard) -> Facts:
     """Facts with the board's parts, and empty ones for those that it does not know."""
-    account = FrameAccount(evaluated=board.roles().get(Role.EVALUATED, 0))
-    return facts_of(frames=account, **board.summary())
+    account, sums = FrameAccount(evaluated=board.roles().get(Role.EVALUATED, 0)), board.summary()
+    return facts_of(frames=account, effects=sums.effects, **sums.parts)
 
 
 def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
@@ -60,7 +61,7 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
     with ResultsWriter(folder) as writer:
         for result in scored(board, role):
             writer.append(lines(result))
-        writer.append(sum_lines(board))
+        writer.append(sum_lines(board, board.summary().windows))
         files = writer.finish(the_rest(board), RUN_TOML).files
     return [folder / name for name in files]
 

@@ -90,7 +90,7 @@ def _show(
     opened: Result, frame: int | None, rank: int | None, variant: str | None, *, file: Path | None
 ) -> None:
     """Open the viewer at a frame, by its number or rank, or draw it into a file."""
-    from roadeval.evaluation.score import TESTED
+    from roadeval.evaluation.metrics import TESTED
     from roadeval.jobs.results import inspect as job
 
     drive, of, why = opened.drive, "", ""

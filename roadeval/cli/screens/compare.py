@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from roadeval.cli.screens import tables
-from roadeval.evaluation.comparison import Comparison, Judgement
+from roadeval.evaluation.comparison.compare import Comparison
+from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.report.comparison import changed_drives, overview
 from roadeval.results.comparison import NAMED
 

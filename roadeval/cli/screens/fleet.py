@@ -53,6 +53,6 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     """Yield what to know first, and why drives failed, with the first drives of each reason."""
     yield from outcome.facts.warnings
     fleet = FleetFolder(outcome.folder)
-    failed = (fleet.drives[drive] for drive in outcome.problems)
+    failed = fleet.drives.loc[[*outcome.problems]]
     for reason, drives in by_reason(fleet, failed).items():
         yield f"{first_of(drives, NAMED)}: {reason}"

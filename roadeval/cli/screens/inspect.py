@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from roadeval.cli.screens.tables import ascii_of, show_table
 from roadeval.data.words import percent, points, short_names
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Table
 from roadeval.results.sentences import without_filter
 

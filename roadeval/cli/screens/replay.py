@@ -11,7 +11,7 @@ from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
 from roadeval.data.words import counted
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections.ground import distance_table

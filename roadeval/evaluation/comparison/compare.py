@@ -9,24 +9,22 @@ Where one drive is compared, intervals are those of its frames; where several ar
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
-from typing import Any, Final
+import math
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, product
+from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from roadeval.data import BASELINE, OUTCOMES, UNFILTERED, Counts, Rows
+from roadeval.data import BASELINE, UNFILTERED
 from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison.pairing import (
+    ComparedDrive,
     Disagreement,
-    MaskPair,
     MovedFrame,
     Pair,
-    Part,
     Side,
     common_masks,
     common_regions,
@@ -34,32 +32,27 @@ from roadeval.evaluation.comparison.pairing import (
     left_out,
     match_drives,
     moved_frames,
-    region_counts,
+    renamed,
     truth_differs,
 )
-from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import (
-    TESTED,
-    FrameCounts,
-    Name,
-    Total,
-    camera_masks,
-    final_stages,
-    means,
-    sum_up,
-    within,
-)
+from roadeval.evaluation.score.scoreboard import within
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import (
-    CameraRates,
-    Difference,
-    DriveMean,
-    benjamini_hochberg,
-    group_means,
-    holm,
-    over_drives,
+from roadeval.evaluation.stats import Difference, benjamini_hochberg, holm, over_drives
+from roadeval.evaluation.tables import (
+    COUNTS,
+    KEY,
+    MASK,
+    grouped,
+    is_final,
+    only,
+    rates_of,
+    values_of,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FALSE: Final = 0.05
 """The share of the drives called changed that may be false, on average."""
@@ -226,39 +219,31 @@ def compare(
         if not side.scored:
             raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
     base, *others = sides
-    found = []
+    parts = []
     for new in others:
-        own = base
+        old, match = base, match_drives(base, new)
         if across_variants:
-            match: Match = [(part, part) for part in base.scored], []
-            own = replace(base, variants={base.label: new.label})
-        else:
-            match = match_drives(base, new)
-        if not match[0]:
-            raise ComparisonError(_apart(base, new))
-        found.append(_Against(own, new, match, settings, across=across_variants))
-    frames = [found[0].frames[0], *(each.frames[1] for each in found)]
-    relabelled = [0, *(each.relabelled for each in found)]
-    regions = [row for each in found for row in each.regions()]
+            old = replace(base, variants={base.label: new.label})
+            match = [(drive, drive) for drive in base.scored], []
+        parts.append(_against(old, new, match, settings, across=across_variants))
+    kinds = ("levels", "drives", "moved", "disagreements", "warnings")
+    together = {kind: tuple(chain(*(getattr(part, kind) for part in parts))) for kind in kinds}
+    regions = [row for part in parts for row in part.regions]
     corrected = holm([row.difference for row in regions])
     return Comparison(
-        results=tuple(map(_result, sides, frames, relabelled)),
-        changed_settings={each.label: each.changed for each in found if each.changed},
-        changes=tuple(_corrected([row for each in found for row in each.changes(each.masks)])),
-        levels=tuple(row for each in found for row in each.changes(each.levels)),
-        drives=tuple(row for each in found for row in each.drives()),
+        results=(_result(base, parts[0].results[0].frames), *(part.results[1] for part in parts)),
+        changed_settings={k: v for part in parts for k, v in part.changed_settings.items()},
+        changes=tuple(_corrected([row for part in parts for row in part.changes])),
         regions=tuple(replace(r, difference=d) for r, d in zip(regions, corrected, strict=True)),
-        moved=tuple(frame for each in found for frame in each.moved),
-        disagreements=tuple(frame for each in found for frame in each.disagreements),
-        warnings=tuple(sentence for each in found for sentence in each.warnings()),
         settings=settings,
+        **together,
     )
 
 
 def _apart(base: Side, new: Side) -> str:
     """Return why two results have no drive in common."""
     for side in (new, base):
-        if any(part.digest is None for part in side.scored):
+        if any(drive.digest is None for drive in side.scored):
             return f"{side.label} does not say which log it is of, so nothing can be compared"
     return (
         f"{base.label} and {new.label} are of different drives, whose difference would mix the "
@@ -266,15 +251,15 @@ def _apart(base: Side, new: Side) -> str:
     )
 
 
-def _result(side: Side, frames: int, relabelled: int) -> ComparedResult:
-    only = side.parts[0] if len(side.parts) == 1 else None
-    scales = {part.asked.get("frames.scale") for part in side.scored}
+def _result(side: Side, frames: int, relabelled: int = 0) -> ComparedResult:
+    alone = side.drives[0] if len(side.drives) == 1 else None
+    scales = {drive.asked.get("frames.scale") for drive in side.scored}
     return ComparedResult(
         label=side.label,
-        drives=len(side.parts),
+        drives=len(side.drives),
         scored=len(side.scored),
-        drive=only.name if only else None,
-        log_digest=only.digest if only else None,
+        drive=alone.name if alone else None,
+        log_digest=alone.digest if alone else None,
         frames=frames,
         scale=scales.pop() if len(scales) == 1 else None,
         relabelled=relabelled,
@@ -291,232 +276,266 @@ def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
         yield replace(each, difference={**each.difference, **difference})
 
 
-@dataclass(frozen=True, eq=False)
-class _OnDrive:
-    """A mask, or a region of it, on one drive."""
-
-    part: Part
-    group: str
-    final: bool
-    new: Total
-    base: Total | None = None
-    """None where nothing is subtracted, and there are no differences."""
-    change: Mapping[str, float] = field(default_factory=dict)
-    """The means of the frames' differences, by rate."""
-    rates: CameraRates | None = None
-    """Of the one drive: the frames' rates, ``(n, m)`` each."""
-    within: Difference | None = None
-    """Of a final mask on one of several drives: what changed in `TESTED`."""
+FRAMES: Final = 20_000
+"""Evaluated frames of a new result that are in memory together, or those of one drive."""
 
 
-_Masks = defaultdict[Name, list[_OnDrive]]
-"""Drives by variant and stage, or region."""
-Match = tuple[list[Pair], list[str]]
-"""As of `match_drives`."""
+def _against(
+    base: Side,
+    new: Side,
+    match: tuple[list[Pair], list[str]],
+    settings: EvaluationSettings,
+    *,
+    across: bool,
+) -> Comparison:
+    """Compare a new result with the base, on the frames that both evaluated."""
+    import pandas as pd
+
+    matched, left = match
+    if not matched:
+        raise ComparisonError(_apart(base, new))
+    over = _Over.of(new, matched, settings)
+    old_keys = {drive.key: old.key for old, drive in matched}
+    sums = Counter[str]()
+    levels, masks, regions = [], [], []
+    drives: list[DriveChange] = []
+    apart: list[str] = []
+    pairs = parts = pd.DataFrame()
+    for batch in _batches(new.scored):
+        own = {key: key for key in batch}
+        frames = renamed(new.table("frames", own), own)
+        sums["new"] += _frames(frames)
+        levels.append(by_drive(frames.assign(final=is_final(frames)), MASK))
+        olds = {old_keys[key]: key for key in batch if key in old_keys}
+        if not olds:
+            continue
+        old_frames = renamed(base.table("frames", olds), olds)
+        sums["base"] += _frames(old_frames)
+        found = common_masks(old_frames, frames)
+        there = {*zip(found["drive"], found["camera"], strict=True)}
+        apart += [over.names[key] for key in olds.values() if key not in there]
+        if not there:
+            continue
+        both = [_of_drives(table, there) for table in (old_frames, frames)]
+        sums["lost by new"] += _frames(both[0]) - _frames(found, "_base")
+        sums["lost by base"] += _frames(both[1]) - _frames(found)
+        sums["relabelled"] += truth_differs(*both)
+        pairs = found
+        masks.append(by_drive(pairs, MASK))
+        tested = only(pairs, final=True)
+        tested = tested[tested["variant"] != BASELINE]
+        drives += over.within_drives(tested)
+        own = {key: key for key in olds.values()}
+        of_regions = (new.table("regions", own), own), (base.table("regions", olds), olds)
+        parts = common_regions(tested, *(renamed(*each) for each in of_regions))
+        regions.append(by_drive(parts, ["variant", "region"]))
+    if not masks:
+        raise ComparisonError(
+            f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
+            "nothing can be compared; replay the same range into both"
+        )
+    moved: Iterable[MovedFrame] = ()
+    disagreed: Iterable[Disagreement] = ()
+    changed, labels = _changed_settings(matched), (base.label, new.label)
+    if len(matched) == 1:  # one camera of one drive, whose frames have numbers of their own
+        moved = moved_frames(new.label, pairs)
+        if across:
+            disagreed = disagreements(new.table("disagreements", [*old_keys]), pairs, *labels)
+    return Comparison(
+        results=(_result(base, sums["base"]), _result(new, sums["new"], sums["relabelled"])),
+        changed_settings={new.label: changed} if changed else {},
+        changes=tuple(over.changes(pd.concat(masks), pairs)),
+        levels=tuple(over.changes(pd.concat(levels))),
+        drives=tuple(over.drives(drives)),
+        regions=tuple(over.regions(pd.concat(regions), parts)),
+        moved=tuple(moved),
+        disagreements=tuple(disagreed),
+        warnings=(*left, *_warnings(labels, apart, sums, changed)),
+        settings=settings,
+    )
 
 
-def _drive_means(
-    own: Sequence[_OnDrive], means: Iterable[Mapping[str, Any]], rate: str
-) -> list[DriveMean]:
-    pairs = zip(own, means, strict=True)
-    return [DriveMean(each.part.drive, each.group, known[rate]) for each, known in pairs]
+def _batches(drives: Sequence[ComparedDrive]) -> Iterator[list[tuple[str, str]]]:
+    """Yield the keys of drives that are compared together: all cameras of each."""
+    by_name: dict[str, list[ComparedDrive]] = {}
+    for drive in drives:
+        by_name.setdefault(drive.drive, []).append(drive)
+    batch: list[ComparedDrive] = []
+    for cameras in by_name.values():
+        if batch and sum(drive.frames for drive in (*batch, *cameras)) > FRAMES:
+            yield [drive.key for drive in batch]
+            batch = []
+        batch += cameras
+    yield [drive.key for drive in batch]
 
 
-def _mean(own: Sequence[_OnDrive], totals: Sequence[Total], rate: str) -> float:
-    """Average drives as their differences are, so that these lie between two rates."""
-    known = group_means(_drive_means(own, totals, rate))
-    return float(known.mean()) if len(known) else np.nan
+def _of_drives(rows: pd.DataFrame, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
+    return rows[[key in keys for key in zip(rows["drive"], rows["camera"], strict=True)]]
 
 
-def _over(own: Sequence[_OnDrive], totals: Sequence[Total]) -> dict[str, float]:
-    """Return the means over drives, and the rates of all their pixels together."""
-    if not totals:
-        return {}
-    counts = np.array([sum(each[name] for each in totals) for name in OUTCOMES])
-    rates = {name: _mean(own, totals, name) for name in METRICS}
-    overlap = metrics.overlap(Counts(*counts.tolist()))
-    return rates | overlap | metrics.pooled(counts, metrics.ALL)
+def by_drive(rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    """Sum up each drive's rows of frames, or pairs of them, by the columns ``by``.
+
+    Returned are ``frames``, whether all are ``final``, the summed counts, and the means of the
+    frames' rates; of pairs also those of the base, which end in ``_base``, and of the differences,
+    as ``change_ERR``.
+    """
+    import pandas as pd
+
+    counts, rates = [*COUNTS], [rates_of(rows, METRICS)]
+    if "TP_base" in rows:
+        old_counts = [f"{name}_base" for name in COUNTS]
+        old = rates_of(rows[old_counts].set_axis(COUNTS, axis=1), METRICS)
+        rates += [old.add_suffix("_base"), (rates[0] - old).add_prefix("change_")]
+        counts += old_counts
+    keys = [*KEY, *by]
+    groups, rated = grouped(rows, keys), pd.concat([rows[keys], *rates], axis=1)
+    sums = groups[counts].sum().assign(frames=groups.size(), final=groups["final"].all())
+    return sums.join(grouped(rated, keys).mean()).reset_index()
 
 
-class _Against:
-    """A new result against the base, on the frames that both evaluated."""
+@dataclass(frozen=True)
+class _Over:
+    """How a new result is averaged over its drives, or over the frames of the only one."""
 
-    def __init__(
-        self, base: Side, new: Side, match: Match, settings: EvaluationSettings, *, across: bool
-    ) -> None:
-        pairs, self._left_out = match
-        self.label = new.label
-        self._base, self._new, self._settings, self._across = base, new, settings, across
-        self._several = len({new.drive for _, new in pairs}) > 1
-        self._alone = len(pairs) == 1
-        """Whether it is one camera of one drive, whose frames have numbers of their own."""
-        self.changed = _changed_settings(pairs)
-        self.frames, self._lost = [0, 0], [0, 0]
-        """Of the base and of the new result: evaluated frames, and those that the other lacks."""
-        self.relabelled = 0
-        self._apart: list[str] = []
-        self.levels, self.masks, self._regions = _Masks(list), _Masks(list), _Masks(list)
-        self._known: dict[str, None] = {}  # the regions of all drives
-        self.moved: list[MovedFrame] = []
-        self.disagreements: list[Disagreement] = []
-        firsts = {part.digest: part.drive for part in reversed(new.scored)}
-        before = {id(own): other for other, own in pairs}
-        for part in new.scored:
-            rows, other = new.rows(part, "frames"), before.get(id(part))
-            masks = camera_masks(rows)
-            # Copies of a log count as one drive.
-            group = part.group or (other and other.group) or firsts[part.digest]
-            last = final_stages(mask.name for mask in masks)
-            for mask in masks:
-                final = mask.stage == last[mask.variant]
-                self.levels[mask.name].append(_OnDrive(part, group, final, sum_up(mask.counts)))
-            self.frames[1] += _frames(masks)
-            if other is not None:
-                self._add(other, part, group, rows)
-        if not self.masks:
-            raise ComparisonError(
-                f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
-                "nothing can be compared; replay the same range into both"
-            )
+    label: str
+    settings: EvaluationSettings
+    groups: Mapping[tuple[str, str], str]
+    """By drive and camera: the group that counts as one; copies of a log are one."""
+    names: Mapping[tuple[str, str], str]
+    several: bool
+    """Whether several drives are compared, so that intervals are over these."""
 
-    def _add(self, base: Part, new: Part, group: str, rows: Rows) -> None:
-        """Add a drive that both have, and the new result's rows of its frames."""
-        old_rows = self._base.rows(base, "frames")
-        before, after = camera_masks(old_rows), camera_masks(rows)
-        self.frames[0] += _frames(before)
-        pairs = common_masks(before, after)
-        if not pairs:
-            self._apart.append(new.name)
-            return
-        self._lost[0] += _frames(before) - _frames([pair.base for pair in pairs])
-        self._lost[1] += _frames(after) - _frames([pair.new for pair in pairs])
-        self.relabelled += truth_differs(old_rows, rows)
-        for pair in pairs:
-            tested = pair.final and pair.new.variant != BASELINE
-            self.masks[pair.new.name].append(self._on_drive(new, group, pair, tested=tested))
-            if tested:
-                self._add_regions(base, new, group, pair)
-        if self._alone:
-            first = next((pair for pair in pairs if pair.final), pairs[-1])
-            self.moved = [*moved_frames(self.label, first)]
-            if self._across:
-                table, names = new.rows("disagreements"), (self._base.label, self.label)
-                self.disagreements = [*disagreements(table, pairs[0].new, *names)]
+    @classmethod
+    def of(cls, new: Side, matched: Sequence[Pair], settings: EvaluationSettings) -> _Over:
+        firsts = {drive.digest: drive.drive for drive in reversed(new.scored)}
+        groups = {drive.key: drive.group or firsts[drive.digest] for drive in new.scored}
+        of_base = {drive.key: old.group for old, drive in matched if old.group and not drive.group}
+        names = {drive.key: drive.name for drive in new.drives}
+        several = len({drive.drive for _, drive in matched}) > 1
+        return cls(new.label, settings, groups | of_base, names, several)
 
-    def _on_drive(self, part: Part, group: str, pair: MaskPair, *, tested: bool) -> _OnDrive:
-        rates, sums = pair.rates, (sum_up(pair.new.counts), sum_up(pair.base.counts))
-        made = _OnDrive(part, group, pair.final, *sums, means(rates.rates - rates.base))
-        if not self._several:
-            return replace(made, rates=rates)
-        return replace(made, within=within([rates], TESTED, self._settings) if tested else None)
+    def _group(self, rows: pd.DataFrame) -> list[str]:
+        return [self.groups[key] for key in zip(rows["drive"], rows["camera"], strict=True)]
 
-    def _add_regions(self, base: Part, new: Part, group: str, pair: MaskPair) -> None:
-        """Add what changed by region in a final mask that looks at the image."""
-        before = region_counts(self._base.rows(base, "regions"), pair.base)
-        after = region_counts(self._new.rows(new, "regions"), pair.new)
-        self._known.update(dict.fromkeys(before))
-        for region, known in common_regions(before, after):
-            own, other = (
-                mask._replace(counts=counts[region]).take(np.flatnonzero(known))
-                for mask, counts in ((pair.base, before), (pair.new, after))
-            )
-            made = self._on_drive(new, group, MaskPair(own, other, True), tested=True)
-            self._regions[pair.new.variant, region].append(made)
+    def mean(self, rows: pd.DataFrame, names: Sequence[str]) -> list[float]:
+        """Average drives as their differences are, so that these lie between two rates."""
+        means: list[float] = rows.groupby(self._group(rows))[[*names]].mean().mean().tolist()
+        return means
 
-    def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
-        """Return the difference within the one drive, or over several."""
-        if not self._several:
-            return within([each.rates for each in own if each.rates], rate, self._settings)
-        drives = _drive_means(own, (each.change for each in own), rate)
+    def difference(self, rows: pd.DataFrame, rate: str, pairs: pd.DataFrame) -> Difference:
+        """Return the difference over drives, or within the one drive whose ``pairs`` are given."""
+        if not self.several:
+            return within(pairs, rate, self.settings)
+        drives = rows.assign(group=self._group(rows), mean=rows[f"change_{rate}"])
         better = METRICS[rate].higher_is_better
-        return over_drives(drives, self._settings.confidence, higher_is_better=better)
+        return over_drives(drives, self.settings.confidence, higher_is_better=better)
 
-    def changes(self, masks: _Masks) -> Iterator[Change]:
-        """Yield a row for each mask; where the base has none of it, its rates alone."""
-        for (variant, stage), own in masks.items():
-            base = [each.base for each in own if each.base]
+    def rates(self, rows: pd.DataFrame, end: str = "") -> dict[str, float]:
+        """Return the means over drives of a mask's rates, and those of all its pixels together."""
+        means = self.mean(rows, [f"{name}{end}" for name in METRICS])
+        sums = rows[[f"{name}{end}" for name in COUNTS]].sum().to_frame().T.set_axis(COUNTS, axis=1)
+        pooled = rates_of(sums, metrics.OVERLAP).join(rates_of(sums, prefix="pooled_"))
+        rest = {str(name): float(value) for name, value in pooled.iloc[0].items()}
+        return dict(zip(METRICS, means, strict=True)) | rest
+
+    def changes(self, rows: pd.DataFrame, pairs: pd.DataFrame | None = None) -> Iterator[Change]:
+        """Yield a row for each mask; without pairs its rates alone."""
+        for (variant, stage), mask in grouped(rows, MASK):
+            difference = {}
+            if pairs is not None:
+                frames = pairs if self.several else only(pairs, variant=variant, stage=stage)
+                difference = {rate: self.difference(mask, rate, frames) for rate in COMPARED}
             yield Change(
                 result=self.label,
                 variant=variant,
                 stage=stage,
-                final=all(each.final for each in own),
-                drives=len(own),
-                frames=sum(each.new["frames"] for each in own),
-                base=_over(own, base),
-                new=_over(own, [each.new for each in own]),
-                difference={rate: self._difference(own, rate) for rate in COMPARED if base},
+                final=bool(mask["final"].all()),
+                drives=len(mask),
+                frames=int(mask["frames"].sum()),
+                base=self.rates(mask, "_base") if difference else {},
+                new=self.rates(mask),
+                difference=difference,
             )
 
-    def regions(self) -> Iterator[RegionChange]:
+    def regions(self, rows: pd.DataFrame, parts: pd.DataFrame) -> Iterator[RegionChange]:
         """Yield what changed by region."""
-        named = titles([*self._known])
-        variants = dict.fromkeys(variant for variant, _ in self._regions)
-        for variant, (region, title) in product(variants, named.items()):
-            if own := self._regions.get((variant, region)):
-                yield RegionChange(
-                    result=self.label,
-                    variant=variant,
-                    region=region,
-                    title=title,
-                    frames=sum(each.new["frames"] for each in own),
-                    base=_mean(own, [each.base for each in own if each.base], TESTED),
-                    new=_mean(own, [each.new for each in own], TESTED),
-                    difference=self._difference(own, TESTED),
-                )
+        for variant, (region, title) in product(
+            values_of(rows, "variant"), titles(values_of(rows, "region")).items()
+        ):
+            drives = only(rows, variant=variant, region=region)
+            if len(drives):
+                frames = parts if self.several else only(parts, variant=variant, region=region)
+                base, new = self.mean(drives, [f"{TESTED}_base", TESTED])
+                change = self.difference(drives, TESTED, frames)
+                about = self.label, variant, region, title, int(drives["frames"].sum())
+                yield RegionChange(*about, base, new, change)
 
-    def drives(self) -> Iterator[DriveChange]:
-        """Yield each of several drives' changes of final masks, the surest first."""
-        for (variant, stage), tested in self.masks.items() if self._several else ():
-            own = [(e, e.base, e.within) for e in tested if e.base and e.within]
-            values = benjamini_hochberg([within.p for _, _, within in own])
-            rows = [
-                DriveChange(
-                    *(self.label, variant, stage, each.part.name, each.new["frames"]),
-                    *(base[TESTED], each.new[TESTED], within, q, q is not None and q <= FALSE),
-                )
-                for (each, base, within), q in zip(own, values, strict=True)
-            ]
-            yield from sorted(
-                rows,
-                key=lambda row: (
-                    *(2.0 if row.q is None else row.q, -abs(np.nan_to_num(row.difference.mean))),
-                    row.drive,
-                ),
+    def within_drives(self, pairs: pd.DataFrame) -> Iterator[DriveChange]:
+        """Yield each of several drives' changes of final masks, not corrected for their number."""
+        by_mask = grouped(pairs, [*KEY, *MASK])
+        means = by_mask[[f"{TESTED}_base", TESTED]].mean()
+        for (drive, camera, variant, stage), rows in by_mask if self.several else ():
+            base, new = means.loc[drive, camera, variant, stage].tolist()
+            change = within(rows, TESTED, self.settings)
+            about = self.label, variant, stage, self.names[drive, camera], len(rows)
+            yield DriveChange(*about, base, new, change, q=None, changed=False)
+
+    def drives(self, changes: Sequence[DriveChange]) -> Iterator[DriveChange]:
+        """Yield the changes on single drives, mask by mask, the surest first."""
+        for mask in dict.fromkeys((change.variant, change.stage) for change in changes):
+            rows = [change for change in changes if (change.variant, change.stage) == mask]
+            values = benjamini_hochberg([row.difference.p for row in rows])
+            corrected = (
+                replace(row, q=q, changed=q is not None and q <= FALSE)
+                for row, q in zip(rows, values, strict=True)
             )
+            yield from sorted(corrected, key=_surest_first)
 
-    def warnings(self) -> Iterator[str]:
-        """Yield what was left out, and what makes the two less comparable than they look."""
-        base, new = self._base.label, self.label
-        yield from self._left_out
-        if apart := self._apart:
-            yield left_out(apart, new, f"no evaluated frame in common with {base}")
-        for label, other, frames in zip((base, new), (new, base), self._lost, strict=True):
-            if frames:
-                yield (
-                    f"{frames} frames that {label} evaluated are left out against {other}, which "
-                    "lacks them or trained on them"
-                )
-        of_the_log = [
-            f"`{name}` {setting(own)} and {setting(other)}"
-            for name, (own, other) in self.changed.items()
-            if name.startswith(_OF_THE_LOG)
-        ]
-        if of_the_log:
+
+def _surest_first(change: DriveChange) -> tuple[float, float, str]:
+    mean = change.difference.mean
+    size = 0.0 if math.isnan(mean) else abs(mean)
+    return 2.0 if change.q is None else change.q, -size, change.drive
+
+
+def _frames(rows: pd.DataFrame, end: str = "") -> int:
+    """Return on how many frames there is any mask."""
+    return len(rows[[*KEY, f"frame{end}"]].drop_duplicates())
+
+
+def _warnings(
+    labels: tuple[str, str],
+    apart: Sequence[str],
+    sums: Mapping[str, int],
+    changed: Mapping[str, tuple[Any, Any]],
+) -> Iterator[str]:
+    """Yield what was left out, and what makes the two less comparable than they look."""
+    base, new = labels
+    if apart:
+        yield left_out(apart, new, f"no evaluated frame in common with {base}")
+    for label, other, lost in ((base, new, "lost by new"), (new, base, "lost by base")):
+        if frames := sums[lost]:
             yield (
-                f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
-                " part of the change may be theirs"
+                f"{frames} frames that {label} evaluated are left out against {other}, which "
+                "lacks them or trained on them"
             )
-        if self.relabelled:
-            guess = "" if of_the_log else " (other labels or topics?)"
-            yield (
-                f"the truth differs on {self.relabelled} frames between {base} and {new}{guess}: "
-                "part of the change may be the truth's"
-            )
-
-
-def _frames(masks: Sequence[FrameCounts]) -> int:
-    """Return on how many frames there is any of some masks."""
-    return len({frame for mask in masks for frame in mask.frames.tolist()})
+    of_the_log = [
+        f"`{name}` {setting(before)} and {setting(after)}"
+        for name, (before, after) in changed.items()
+        if name.startswith(_OF_THE_LOG)
+    ]
+    if of_the_log:
+        yield (
+            f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
+            " part of the change may be theirs"
+        )
+    if relabelled := sums["relabelled"]:
+        guess = "" if of_the_log else " (other labels or topics?)"
+        yield (
+            f"the truth differs on {relabelled} frames between {base} and {new}{guess}: "
+            "part of the change may be the truth's"
+        )
 
 
 def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:

@@ -26,6 +26,9 @@ ALL: Final[Mapping[str, Metric]] = by_name(
 )
 METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}
 """The columns of the tables, in their order."""
+TESTED: Final = "ERR"
+"""The rate whose differences are findings. Those of the final masks against one base are a family,
+and corrected for their number; other rates and stages say where a finding comes from."""
 OVERLAP: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}
 """Metrics beyond the paper's, which are computed of sums alone."""
 

@@ -6,42 +6,37 @@ import math
 from array import array
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from itertools import pairwise, zip_longest
-from operator import itemgetter
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from roadeval.data import (
     ERRORS,
-    FINAL_STAGE,
     OUTCOMES,
     Contour,
+    Counts,
     FrameResult,
     Layer,
     Mask,
     Packed,
     Role,
-    Tally,
     Truth,
     TruthBits,
     everywhere,
     ones,
 )
 from roadeval.data.arrays import IGNORED, Bits, Floats, Sums
-from roadeval.data.result import Cells
 from roadeval.evaluation import metrics
 from roadeval.evaluation.region import disk, grow, square
-from roadeval.evaluation.stats import CameraRates
+from roadeval.evaluation.tables import rates_of
 from roadeval.kernels import KERNELS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Name = tuple[str, str]
 """A mask's variant and stage."""
-FourCounts = Sums
-"""``(n, 4)``: TP, TN, FP, FN of each frame."""
-Total = dict[str, Any]
-"""See `sum_up`."""
 
 
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
@@ -73,180 +68,40 @@ def flat(masks: Bits | Sequence[Bits]) -> Bits:
     return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
 
 
-class FrameCounts(NamedTuple):
-    """The counts of one stage of one variant, frame by frame."""
+class CountedRows:
+    """Counts of masks, added frame by frame: 24 bytes a mask and frame, until they are a table."""
 
-    variant: str
-    stage: str
-    frames: Sums
-    """``(n,)`` int64: frame numbers, rising. A mask that the log itself carries may be missing on
-    some."""
-    stamps: Sums
-    """``(n,)`` int64, nanoseconds."""
-    counts: FourCounts
+    def __init__(self, *names: str) -> None:
+        self._names: Final = names
+        """Which names a row has, such as variant and stage."""
+        self._rows: Final = array("I")
+        """Place of the frame, place of its names, and the four counts, again and again."""
+        self._places: Final[dict[tuple[str, ...], int]] = {}
 
-    @property
-    def name(self) -> Name:
-        """Its variant and stage."""
-        return self.variant, self.stage
+    def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], Counts]]) -> None:
+        """Add the counts of the evaluated frame at a place, by their names."""
+        for names, four in counts:
+            row = self._places.setdefault(names, len(self._places))
+            self._rows.extend((place, row, *four))
 
-    @property
-    def rates(self) -> Floats:
-        """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
-        return metrics.table(self.counts)
+    def table(self, when: pd.DataFrame, orders: Mapping[str, Sequence[str]]) -> pd.DataFrame:
+        """Return the rows with their rates, as they came.
 
-    def take(self, places: Cells) -> FrameCounts:
-        """Return it on the frames at some places."""
-        arrays = (each[places] for each in (self.frames, self.stamps, self.counts))
-        return FrameCounts(self.variant, self.stage, *arrays)
-
-    def paired(self, base: FrameCounts) -> CameraRates:
-        """Return the rates of this mask and of the base on the frames that both have."""
-        _, mine, theirs = np.intersect1d(self.frames, base.frames, return_indices=True)
-        return CameraRates(self.stamps[mine], self.rates[mine], base.rates[theirs])
-
-
-Camera = Sequence[FrameCounts]
-"""The masks of a camera of a drive."""
-
-
-class GrowingCounts:
-    """The counts of masks, added frame by frame: 20 bytes each."""
-
-    def __init__(self) -> None:
-        self._rows: Final[defaultdict[Name, array[int]]] = defaultdict(partial(array, "I"))
-
-    def add(self, frame: int, tallies: Iterable[Tally]) -> None:
-        """Add the evaluated frame of a number; they come in order."""
-        for each in tallies:
-            self._rows[each.variant, each.stage].extend((frame, *each.counts))
-
-    def so_far(self, when: Sums) -> dict[Name, FrameCounts]:
-        """Return what was added, mask by mask as they first came.
-
-        ``when`` are ``(n, 2)`` int64: number and stamp of each frame, rising.
+        ``when`` has what is known of each frame at its place; ``orders`` are by column the order of
+        names that are not in that of their first row.
         """
-        found = {}
-        for name, rows in self._rows.items():
-            own = np.array(rows, np.int64).reshape(-1, 5)
-            places = np.searchsorted(when[:, 0], own[:, 0])
-            frames, stamps = when[places].T
-            found[name] = FrameCounts(*name, frames, stamps, own[:, 1:])
-        return found
+        import pandas as pd
 
-
-class RegionSums:
-    """Totals of each mask and region, without keeping the frames."""
-
-    def __init__(self) -> None:
-        size = 1 + len(OUTCOMES) + 2 * len(metrics.METRICS)
-        self._sums = defaultdict[tuple[str, str, str], Floats](lambda: np.zeros(size))
-        """Frames, counts, sums of rates, and on how many frames each rate is defined."""
-
-    def add(self, tallies: Sequence[Tally]) -> None:
-        """Add a frame; a region without a labelled pixel does not count."""
-        found = {
-            (t.variant, t.stage, name): own for t in tallies for name, own in t.regions.items()
-        }
-        counts = np.array([*found.values()], np.int64).reshape(-1, 4)
-        rates = metrics.table(counts)
-        known = ~np.isnan(rates)
-        columns = counts.any(axis=1), counts, np.where(known, rates, 0.0), known
-        for name, row in zip(found, np.column_stack(columns), strict=True):
-            self._sums[name] += row
-
-    def totals(self) -> dict[tuple[str, str, str], Total]:
-        """Sum up by variant, stage and region: see `sum_up`."""
-        first = 1 + len(OUTCOMES)
-        return {
-            name: _total(int(row[0]), row[1:first].astype(np.int64), *row[first:].reshape(2, -1))
-            for name, row in self._sums.items()
-        }
-
-
-def sum_up(counts: FourCounts) -> Total:
-    """Sum up a drive: frames, counts, mean rates (the paper's), pooled rates, undefined ones.
-
-    A rate that is undefined on a frame is left out of its mean, and counted in ``undefined``. IoU
-    and its like, which are no columns of tables, are among both kinds of rates.
-    """
-    rates, overlap = metrics.table(counts), metrics.table(counts, metrics.OVERLAP)
-    known = ~np.isnan(rates)
-    sums = np.where(known, rates, 0.0).sum(axis=0)
-    total = _total(len(counts), counts.sum(axis=0), sums, known.sum(axis=0))
-    undefined = dict(zip(metrics.OVERLAP, np.isnan(overlap).sum(axis=0).tolist(), strict=True))
-    return {
-        **total,
-        **means(overlap, metrics.OVERLAP),
-        **metrics.pooled(counts.sum(axis=0), metrics.OVERLAP),
-        "undefined": total["undefined"] | undefined,
-    }
-
-
-def over_cameras(totals: Sequence[Total]) -> Total:
-    """Return the total of cameras together: means of the cameras' means, and pooled pixels."""
-    counts = np.sum([[each[name] for name in OUTCOMES] for each in totals], axis=0)
-    frames = sum(each["frames"] for each in totals)
-    found = _total(frames, counts, *np.zeros((2, len(metrics.METRICS))))
-    names = (*metrics.METRICS, *metrics.OVERLAP)
-    rates = np.array([[each[name] for name in names] for each in totals])
-    undefined = {name: sum(each["undefined"][name] for each in totals) for name in names}
-    overlap = metrics.pooled(counts, metrics.OVERLAP)
-    return {**found, **means(rates, names), **overlap, "undefined": undefined}
-
-
-def means(rates: Floats, names: Iterable[str] = metrics.METRICS) -> dict[str, float]:
-    """Average the named rates over frames, ``(n, m)``; NaN where a rate is defined on none."""
-    known = ~np.isnan(rates)
-    return _means(np.where(known, rates, 0.0).sum(axis=0), known.sum(axis=0), names)
-
-
-def _means(
-    sums: Floats, defined: Cells, names: Iterable[str] = metrics.METRICS
-) -> dict[str, float]:
-    average = np.divide(sums, defined, out=np.full(len(sums), np.nan), where=defined > 0)
-    return dict(zip(names, average.tolist(), strict=True))
-
-
-def _total(frames: int, counts: FourCounts, sums: Floats, defined: Cells) -> Total:
-    undefined = (frames - defined.astype(np.int64)).tolist()
-    return {
-        "frames": frames,
-        **dict(zip((*OUTCOMES, "N"), (*counts.tolist(), counts.sum().item()), strict=True)),
-        **_means(sums, defined),
-        **metrics.pooled(counts),
-        "undefined": dict(zip(metrics.METRICS, undefined, strict=True)),
-    }
-
-
-def windows(masks: Sequence[FrameCounts], size: int) -> list[dict[str, Any]]:
-    """Cut a drive into windows of ``size`` consecutive evaluated frames.
-
-    Returned are the rows of ``windows.csv``, by window and then mask. Frames are evaluated where
-    any of the masks is; of windows with fewer than ``size`` the last is one. Rates are the means of
-    the frames', an undefined one left out (the paper's average), those of ``pooled_*`` are of the
-    summed counts.
-    """
-    numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *(mask.frames for mask in masks)]))
-    rows = []
-    for mask in masks:
-        window_of, rates = np.searchsorted(numbers, mask.frames) // size, mask.rates
-        for window in np.unique(window_of).tolist():
-            here = slice(*np.searchsorted(window_of, [window, window + 1]))
-            frames = numbers[window * size : (window + 1) * size].tolist()
-            rows.append(
-                {
-                    "window": window,
-                    "first_frame": frames[0],
-                    "last_frame": frames[-1],
-                    "frames": here.stop - here.start,
-                    "variant": mask.variant,
-                    "stage": mask.stage,
-                    **means(rates[here]),
-                    **metrics.pooled(mask.counts[here].sum(axis=0)),
-                }
-            )
-    return sorted(rows, key=itemgetter("window"))
+        rows = np.array(self._rows, np.int64).reshape(-1, 6)
+        table = when.iloc[rows[:, 0]].reset_index(drop=True)
+        columns = [*zip(*self._places, strict=True)] or [()] * len(self._names)
+        for name, words in zip(self._names, columns, strict=True):
+            order = orders.get(name) or [*dict.fromkeys(words)]
+            codes = np.array([order.index(word) for word in words], np.int64)[rows[:, 1]]
+            table[name] = pd.Categorical.from_codes(codes, pd.Index([*order]))
+        table[[*OUTCOMES]] = rows[:, 2:]
+        table["N"] = rows[:, 2:].sum(axis=1)
+        return table.join(rates_of(table, metrics.METRICS))
 
 
 def episodes(stamps: Sums, errors: Floats, limit: float) -> dict[str, Any]:
@@ -440,15 +295,3 @@ def edge_of(labels: TruthBits) -> Bits:
     Neither the image's border nor an ignored pixel makes an edge.
     """
     return labels.road & grow(labels.other, square(1), labels)
-
-
-def final_stages(masks: Iterable[Name]) -> dict[str, str]:
-    """Return each variant's final stage: ``post``, or the last that it has.
-
-    ``masks`` are in the order in which the stages ran.
-    """
-    finals: dict[str, str] = {}
-    for variant, stage in masks:
-        if finals.get(variant) != FINAL_STAGE:
-            finals[variant] = stage
-    return finals

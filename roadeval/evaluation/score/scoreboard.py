@@ -8,13 +8,12 @@ or does not.
 
 from __future__ import annotations
 
-import math
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import add
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -33,30 +32,21 @@ from roadeval.data import (
     VariantResult,
     as_tree,
 )
-from roadeval.evaluation.metrics import COMPARED, METRICS
-from roadeval.evaluation.score.counts import (
-    Camera,
-    EdgesAndFlicker,
-    GrowingCounts,
-    Name,
-    RegionSums,
-    Total,
-    episodes,
-    final_stages,
-    sum_up,
-    windows,
-)
+from roadeval.evaluation import tables
+from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
+from roadeval.evaluation.score.counts import CountedRows, EdgesAndFlicker, Name, episodes
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.metres import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
 from roadeval.evaluation.stats import CameraRates, Difference, holm, within_drive
+from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, paired
 from roadeval.geometry.ground import Ground
 
-TESTED: Final = "ERR"
-"""The rate whose differences are findings. Those of the final masks against one base are a family,
-and corrected for their number; other rates and stages say where a finding comes from."""
+if TYPE_CHECKING:
+    import pandas as pd
+
 BASES: Final = (UNFILTERED, BASELINE)
 
 
@@ -74,38 +64,41 @@ class Effect:
     rates: Mapping[str, Difference]
 
 
-def within(cameras: Sequence[CameraRates], rate: str, settings: EvaluationSettings) -> Difference:
-    """Return the difference of a rate within a drive, given all rates of two masks by camera."""
-    place, better = [*METRICS].index(rate), METRICS[rate].higher_is_better
-    own = [CameraRates(e.stamps, e.rates[:, place], e.base[:, place]) for e in cameras]
-    return within_drive(own, settings, higher_is_better=better)
+def within(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
+    """Return the difference of a rate within a drive; pairs are as of `tables.paired`."""
+    places, names = pairs["camera"].factorize()
+    columns = [pairs[name].to_numpy() for name in ("stamp_ns", rate, f"{rate}_base")]
+    cameras = [
+        CameraRates(*(column[places == camera] for column in columns))
+        for camera in range(len(names))
+    ]
+    return within_drive(cameras, settings, higher_is_better=METRICS[rate].higher_is_better)
 
 
-def drive_effects(cameras: Sequence[Camera], settings: EvaluationSettings) -> list[Effect]:
+def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Effect]:
     """Compute the differences of a drive: of final masks, and of the filter stage by stage."""
-    masks = [{mask.name: mask for mask in each} for each in cameras]
-    by_name = dict.fromkeys(name for own in masks for name in own)
-    finals = final_stages(by_name)
+    masks = masks_of(frames)
+    finals = final_stages(masks)
     tuned = {name.removesuffix(TUNED): name for name in finals if name.endswith(TUNED)}
-    found = []
+    effects = []
     for base in (base for base in (*BASES, *tuned) if base in finals):
         family = []
-        for variant, stage in by_name:
+        for variant, stage in masks:
             if variant in (base, BASELINE) or variant != tuned.get(base, variant):
                 continue
             final = stage == finals[variant]
             other = base, finals[base] if final else stage
             of_filter = (base, variant) == (UNFILTERED, FILTERED)
-            if final or (of_filter and other in by_name):
-                pairs = [
-                    own[variant, stage].paired(own[other])
-                    for own in masks
-                    if {(variant, stage), other} <= own.keys()
-                ]
+            if final or (of_filter and other in masks):
+                pairs = paired(
+                    only(frames, variant=base, stage=other[1]),
+                    only(frames, variant=variant, stage=stage),
+                    [*KEY, "frame", "stamp_ns"],
+                )
                 rates = {rate: within(pairs, rate, settings) for rate in COMPARED}
                 family.append(Effect(base, variant, stage, final, rates))
-        found += corrected(family)
-    return found
+        effects += corrected(family)
+    return effects
 
 
 def corrected(effects: Sequence[Effect]) -> list[Effect]:
@@ -129,44 +122,39 @@ CLAIMS: Final[Mapping[str, tuple[str, Name, Name]]] = {
 Section 5 claims so of the filter, section 4.3 of the SVM, section 4.4 of the post-processing."""
 
 
-def evidence(windows: Iterable[Mapping[str, Any]], size: int) -> dict[str, dict[str, int]]:
+def evidence(windows: pd.DataFrame, size: int) -> dict[str, dict[str, int]]:
     """Count the windows that bear out each claim whose masks the drive has; equal rates do not.
 
     By claim: how many full ``windows``, of ``size`` frames in both masks, have both rates, and in
-    how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames. Given are
-    rows as of `roadeval.evaluation.score.windows`.
+    how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames.
     """
-    masks: defaultdict[Name, dict[int, Mapping[str, Any]]] = defaultdict(dict)
-    for row in windows:
-        masks[row["variant"], row["stage"]][row["window"]] = row
-    found = {}
+    counted = {}
+    masks = set(masks_of(windows))
     for name, (rate, better, worse) in CLAIMS.items():
-        if better in masks and worse in masks:
-            counted = dict.fromkeys(("held", "windows", "short_held", "short"), 0)
-            for number in masks[better].keys() & masks[worse].keys():
-                mine, other = masks[better][number], masks[worse][number]
-                full = min(mine["frames"], other["frames"]) == size
-                difference = mine[rate] - other[rate]
-                counted["windows" if full else "short"] += not math.isnan(difference)
-                counted["held" if full else "short_held"] += difference < 0
-            found[name] = counted
-    return found
-
-
-Totals = dict[str, dict[str, Total]]
-"""By variant and stage."""
+        if not {better, worse} <= masks:
+            continue
+        base, new = (only(windows, variant=mask[0], stage=mask[1]) for mask in (worse, better))
+        pairs = paired(base, new, [*KEY, "window"])
+        difference = pairs[rate] - pairs[f"{rate}_base"]
+        full = pairs[["frames", "frames_base"]].min(axis=1) == size
+        held, known = difference < 0, difference.notna()
+        counts = {"held": full & held, "windows": full & known}
+        counts |= {"short_held": ~full & held, "short": ~full & known}
+        counted[name] = {key: int(chosen.sum()) for key, chosen in counts.items()}
+    return counted
 
 
 class Scoreboard:
     """Scores frames against their truth and sums up the drive.
 
-    ``variants`` are the names of all, in the order of the tables; ``prior`` is the ``blind``
-    baseline, or None where no frame with truth was trained on; ``ground`` is what is before the
-    camera, where that is known.
+    ``key`` are the drive and the camera; ``variants`` the names of all, in the order of the tables;
+    ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on;
+    ``ground`` is what is before the camera, where that is known.
     """
 
     def __init__(
         self,
+        key: tuple[str, str],
         settings: EvaluationSettings,
         variants: Sequence[str],
         prior: BlindPrior | None,
@@ -174,6 +162,7 @@ class Scoreboard:
     ) -> None:
         if BASELINE in variants:
             raise ValueError(f"no variant may be called {BASELINE!r}")
+        self._key = key
         self._settings = settings
         self._order = (*variants, BASELINE)
         self._prior = prior
@@ -184,9 +173,8 @@ class Scoreboard:
         """Number and stamp of each evaluated frame."""
         self._roles: Counter[str] = Counter()
         self._health = defaultdict[str, Counter[str]](Counter)
-        self._counts = GrowingCounts()
-        self._oracles = defaultdict[str, GrowingCounts](GrowingCounts)
-        self._regions = RegionSums()
+        self._counts = CountedRows("variant", "stage")
+        self._oracles = CountedRows("variant", "oracle", "stage")
         self.heat = defaultdict[str, HeatMap](HeatMap)
         """Where each variant's final mask errs."""
         self.changes = defaultdict[Transition, Change](Change)
@@ -225,12 +213,12 @@ class Scoreboard:
             return doubts
         for name, health in result.health.items():
             self._health[name][health] += 1
-        number = result.frame.number
-        self._when.extend((number, result.frame.stamp_ns))
-        self._counts.add(number, result.tallies)
+        place = len(self._when) // 2
+        self._when.extend((result.frame.number, result.frame.stamp_ns))
+        self._counts.add(place, (((t.variant, t.stage), t.counts) for t in result.tallies))
         for oracle, tallies in result.oracles.items():
-            self._oracles[oracle].add(number, tallies)
-        self._regions.add(result.tallies)
+            names = (((t.variant, oracle, t.stage), t.counts) for t in tallies)
+            self._oracles.add(place, names)
         for name, layer in result.errors.items():
             self.heat[name].add(layer.array.astype(np.uint8, copy=False))
         for step, change in result.changes.items():
@@ -249,25 +237,21 @@ class Scoreboard:
         """Count the frames added so far by role."""
         return {str(role): count for role, count in self._roles.items()}
 
-    def totals(self) -> Totals:
-        """Sum up by variant and stage: see `roadeval.evaluation.score.sum_up`."""
-        return totals(self.masks())
-
-    def regions(self) -> dict[tuple[str, str, str], Total]:
-        """Sum up by variant, stage and region, as in `totals`."""
-        return self._regions.totals()
-
     def metres(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of ``metres``; none where the camera is not known."""
         return self._metres.totals(self._above)
 
-    def windows(self) -> list[dict[str, Any]]:
-        """Cut the drive into windows."""
-        return windows(self.masks(), self._settings.window)
+    def frames(self) -> pd.DataFrame:
+        """Return the rows of ``frames`` so far, without log times."""
+        return self._counts.table(self._frames_added(), {"variant": self._order})
 
-    def effects(self) -> list[Effect]:
-        """Return the paired differences of the drive."""
-        return drive_effects([self.masks()], self._settings)
+    def _frames_added(self) -> pd.DataFrame:
+        import pandas as pd
+
+        when = np.array(self._when, np.int64).reshape(-1, 2)
+        drive, camera = (pd.Categorical([word] * len(when)) for word in self._key)
+        key = {"drive": drive, "camera": camera}
+        return pd.DataFrame({**key, "frame": when[:, 0], "stamp_ns": when[:, 1]})
 
     def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the evaluated frames' ERR at the threshold that the training frames choose.
@@ -277,38 +261,47 @@ class Scoreboard:
         """
         return self.curves.at_best_of(self._training)
 
-    def summary(self) -> dict[str, Any]:
-        """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
+    def summary(self) -> DriveSums:
+        """Sum up the drive."""
+        settings, frames = self._settings, self.frames()
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
-        curves, beyond, masks = self.curves.totals(), self._edges.totals(), self.masks()
-        for mask in {each.variant: each for each in masks}.values():  # the final ones
-            errors = mask.rates[:, [*METRICS].index(TESTED)]
-            beyond[mask.variant]["episodes"] = episodes(mask.stamps, errors, DEGRADED_ERR)
-        oracles = as_tree(
-            ((variant, oracle), own)
-            for oracle, counts in self._oracles.items()
-            for variant, own in totals(self._so_far(counts)).items()
-        )
-        return {
-            "totals": totals(masks),
+        curves, beyond = self.curves.totals(), self._edges.totals()
+        for (variant,), rows in tables.grouped(tables.finals(frames), ["variant"]):
+            stamps, errors = (rows[name].to_numpy() for name in ("stamp_ns", TESTED))
+            beyond[variant]["episodes"] = episodes(stamps, errors, DEGRADED_ERR)
+        oracles = self._oracles.table(self._frames_added(), {})
+        replaced: dict[str, dict[str, Any]] = {}
+        for (oracle,), rows in tables.grouped(oracles, ["oracle"]):
+            for variant, own in tables.as_trees(tables.totals(rows)).items():
+                replaced.setdefault(variant, {})[oracle] = own
+        windows = tables.windows(frames, settings.window)
+        parts = {
+            "totals": tables.as_trees(tables.totals(frames)),
             "beyond": beyond,
             **({"curves": curves} if curves else {}),
-            "oracles": oracles,
-            "windows": -(-len(self._when) // (2 * self._settings.window)),
-            "claims": evidence(self.windows(), self._settings.window),
+            "oracles": replaced,
+            "windows": -(-len(self._when) // (2 * settings.window)),
+            "claims": evidence(windows, settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
         }
-
-    def masks(self) -> Camera:
-        """Return the counts of every mask, by variant in the tables' order, then as stages ran."""
-        return sorted(self._so_far(self._counts), key=lambda mask: self._order.index(mask.variant))
-
-    def _so_far(self, counts: GrowingCounts) -> Camera:
-        when = np.array(self._when, np.int64).reshape(-1, 2)
-        return [*counts.so_far(when).values()]
+        return DriveSums(frames, windows, drive_effects(frames, settings), parts)
 
 
-def totals(masks: Camera) -> Totals:
-    """Sum up masks by variant and stage, as in ``summary.json``: see `sum_up`."""
-    return as_tree((mask.name, sum_up(mask.counts)) for mask in masks)
+@dataclass(frozen=True, eq=False)
+class DriveSums:
+    """What a camera's frames come to."""
+
+    frames: pd.DataFrame
+    windows: pd.DataFrame
+    effects: Sequence[Effect]
+    parts: Mapping[str, Any]
+    """The parts of ``summary.json`` that the evaluation knows."""
+
+    @property
+    def times(self) -> dict[str, int]:
+        """Header stamps of the first and the last evaluated frame; none without any."""
+        stamps = self.frames["stamp_ns"]
+        return (
+            {"start_ns": int(stamps.iloc[0]), "end_ns": int(stamps.iloc[-1])} if len(stamps) else {}
+        )

@@ -13,14 +13,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, Rows, VariantResult, ones
+from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, VariantResult, ones
 from roadeval.data.arrays import Floats, Sums, Values
-from roadeval.evaluation.score.rows import near, separate
 from roadeval.evaluation.stats import draw_order
+from roadeval.evaluation.tables import near_ns, separate
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SIGNS: Final[Mapping[str, str]] = {
     "entropy": "how unsure road is, mean over every 16th pixel, from 0 to 1 bit",
@@ -106,14 +109,15 @@ class Unlabelled:
         """Note that the next frame does not follow the one before."""
         self._before = {}
 
-    def rows(self) -> Rows:
-        """Return the rows of ``unlabelled.csv`` of the first variant."""
+    def rows(self) -> pd.DataFrame:
+        """Return the rows of ``unlabelled.csv`` of the first variant, without the key."""
+        import pandas as pd
+
         when = np.array(self._stamps, np.int64).reshape(-1, 2)
-        signs = np.array(self._signs).reshape(-1, len(SIGNS))
-        mask = next(iter(self._stages.items()), ("", ""))
-        variant, stage = (np.full(len(when), name) for name in mask)
-        columns = {"frame": when[:, 0], "stamp_ns": when[:, 1], "variant": variant, "stage": stage}
-        return Rows({**columns, **dict(zip(SIGNS, signs.T, strict=True))})
+        table = pd.DataFrame(when, columns=["frame", "stamp_ns"])
+        table["variant"], table["stage"] = next(iter(self._stages.items()), ("", ""))
+        table[[*SIGNS]] = np.array(self._signs).reshape(-1, len(SIGNS))
+        return table
 
     def differing(self) -> dict[tuple[str, str], float]:
         """Return the mean share of pixels on which two variants differ, by pair, once each."""
@@ -124,10 +128,9 @@ class Unlabelled:
         }
 
 
-def sign_of(rows: Rows, variant: str) -> str | None:
-    """Return by which of `SIGNS` a variant's frames are ranked; None where it has none."""
-    own = rows.of_variant(variant)
-    return next((sign for sign in SIGNS if np.isfinite(own[sign]).any()), None)
+def sign_of(rows: pd.DataFrame) -> str | None:
+    """Return by which of `SIGNS` a variant's rows are ranked; None where it has none."""
+    return next((sign for sign in SIGNS if rows[sign].notna().any()), None)
 
 
 def chosen(
@@ -164,7 +167,7 @@ def chosen(
     wanted = max(count - len({*random.tolist()} - {*taken}), 0)
     ranked = known[np.argsort(-scores[known], kind="stable")]
     ranked = ranked[~np.isin(ranked, without)]
-    apart = near(stamps)
+    apart = near_ns(stamps)
     while True:
         found = separate(stamps, ranked, wanted, apart, stamps[without].tolist())
         if len(found) == min(wanted, len(ranked)) or not apart:

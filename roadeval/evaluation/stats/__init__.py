@@ -4,7 +4,6 @@ from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.stats.difference import (
     CameraRates,
     Difference,
-    DriveMean,
     benjamini_hochberg,
     group_means,
     holm,

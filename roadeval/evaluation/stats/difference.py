@@ -20,9 +20,9 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -31,6 +31,9 @@ from roadeval.data.arrays import Floats, Sums
 from roadeval.data.words import counted
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LEAST_GROUPS: Final = 6
 """Groups of drives that an interval needs."""
@@ -210,64 +213,51 @@ def at_moments(cameras: Sequence[CameraRates]) -> Floats:
     return total + sums
 
 
-@dataclass(frozen=True)
-class DriveMean:
-    """The mean difference of a rate on one drive, new minus base."""
-
-    drive: str
-    group: str
-    """A name shared with other drives, as of a day or a route; its own identity without one."""
-    mean: float
-    """NaN if no frame has a difference: the drive is left out."""
-
-
-def group_means(drives: Iterable[DriveMean]) -> Floats:
+def group_means(drives: pd.DataFrame) -> Floats:
     """Return the mean of each group's drives, ``(g,)``, for any order of the drives."""
-    ordered = sorted((d.group, d.drive, d.mean) for d in drives if not math.isnan(d.mean))
-    if not ordered:
-        return np.zeros(0)
-    groups, _, means = zip(*ordered, strict=True)
-    _, starts, sizes = np.unique(groups, return_index=True, return_counts=True)
-    averages: Floats = np.add.reduceat(np.array(means), starts) / sizes
-    return averages
+    ordered = drives[drives["mean"].notna()].sort_values(["group", "drive"])
+    means: Floats = ordered.groupby("group")["mean"].mean().to_numpy(float)
+    return means
 
 
 def over_drives(
-    drives: Sequence[DriveMean], confidence: float, *, higher_is_better: bool = False
+    drives: pd.DataFrame, confidence: float, *, higher_is_better: bool = False
 ) -> Difference:
     """Average the differences of drives, in any order, with an interval.
 
-    A group's drives are averaged first, and every group counts alike.
+    Columns are ``drive``; ``group``, a name shared with other drives, as of a day or a route, or
+    its own without one: a group's drives are averaged first, and every group counts alike; and
+    ``mean``, the mean difference on the drive, NaN if no frame has one.
 
     Examples
     --------
-    >>> drives = [DriveMean(name, name, mean)
-    ...           for name, mean in zip("abcdef", [0.01, 0.02, 0.02, 0.03, 0.05, -0.01])]
+    >>> import pandas as pd
+    >>> means = [0.01, 0.02, 0.02, 0.03, 0.05, -0.01]
+    >>> drives = pd.DataFrame({"drive": [*"abcdef"], "group": [*"abcdef"], "mean": means})
     >>> difference = over_drives(drives, 0.95)
     >>> round(difference.mean, 3), difference.low, difference.high, difference.p, difference.worse
     (0.02, -0.01, 0.05, 0.09375, 5)
     """
-    means, groups = np.array([drive.mean for drive in drives], float), group_means(drives)
+    means, groups = drives["mean"].to_numpy(float), group_means(drives)
     return interval(means, confidence, "drives", averaged=groups, higher_is_better=higher_is_better)
 
 
 def strata(
-    drives: Sequence[DriveMean], tags: Mapping[str, Sequence[str | None]], confidence: float
+    drives: pd.DataFrame, tags: Sequence[str], confidence: float
 ) -> Iterator[tuple[str, str, Difference]]:
     """Yield each tag, its values, and the difference on the drives that have the value.
 
-    ``tags`` are by name each drive's value, in the order of ``drives``; None where it has none,
-    which leaves the drive out of this division. A tag that does not divide the drives makes no
-    parts. Drives without a mean are left out. p-values are corrected together.
+    ``drives`` are as of `over_drives`, with a column a tag; a drive without a value is left out of
+    this division. A tag that does not divide the drives makes no parts. p-values are corrected
+    together.
     """
-    parts: dict[tuple[str, str], list[DriveMean]] = {}
-    for tag, values in tags.items():
-        pairs = zip(values, drives, strict=True)
-        tagged = [(value, drive) for value, drive in pairs if not math.isnan(drive.mean)]
-        names = sorted({value for value, _ in tagged if value is not None})
-        if len(names) > 1 or any(value is None for value, _ in tagged):
-            for name in names:
-                parts[tag, name] = [drive for value, drive in tagged if value == name]
+    known = drives[drives["mean"].notna()]
+    parts = {
+        (tag, str(value)): rows
+        for tag in tags
+        if len(known[tag].unique()) > 1
+        for value, rows in known.groupby(tag)
+    }
     family = holm([over_drives(part, confidence) for part in parts.values()])
     yield from ((*part, difference) for part, difference in zip(parts, family, strict=True))
 

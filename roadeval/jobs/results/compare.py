@@ -7,34 +7,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from roadeval.data import BASELINE, Rows
-from roadeval.data.result import joined
+from roadeval.data import BASELINE
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import comparison, score
-from roadeval.evaluation.comparison import (
-    Comparison,
-    Condition,
-    Judgement,
-    Side,
-    judge,
-    one_drive,
-)
-from roadeval.evaluation.score import TESTED
+from roadeval.evaluation.comparison.compare import Comparison, variants_as_sides
+from roadeval.evaluation.comparison.compare import compare as compare_sides
+from roadeval.evaluation.comparison.conditions import Condition, Judgement, judge
+from roadeval.evaluation.comparison.pairing import Side, one_drive
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.tables import finals, joined, only, values_of, windows
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.pdf.typeset import pdf, write_file
 from roadeval.results.comparison import as_dict, judged, junit_xml
 from roadeval.results.facts import json_text, plain
-from roadeval.results.rows import window_table
 from roadeval.results.schema import FAILED
 from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from roadeval.report.blocks import Document
 
 
@@ -91,13 +85,13 @@ def compare(
     across = len(paths) == 1
     opened = [Result(path) for path in paths]
     if across:
-        whole = Side(opened[0].name, opened[0].parts)
-        sides = comparison.variants_as_sides(whole, opened[0].variants, variants)
+        whole = Side(opened[0].name, opened[0].compared, opened[0].table)
+        sides = variants_as_sides(whole, opened[0].variants, variants)
         opened *= len(sides)
     else:
         sides = _sides(opened, _labels(paths), variants)
     settings = opened[0].facts.evaluation
-    found = comparison.compare(sides, settings, across_variants=across)
+    found = compare_sides(sides, settings, across_variants=across)
     labelled = [*zip(sides, opened, strict=True)]
     cut = dict.fromkeys(
         each.name if across else side.label for side, each in labelled if not each.complete
@@ -115,12 +109,14 @@ def compare(
 
 def _failed_drives(result: Result) -> str:
     """Return a sentence on the drives of a fleet that failed; empty without any."""
-    rows = result.fleet.drives if result.fleet else {}
-    failed = [row["name"] for row in rows.values() if row["status"] == FAILED]
+    if result.fleet is None:
+        return ""
+    drives = result.fleet.drives
+    failed = only(drives, status=FAILED)["name"].tolist()
     if not failed:
         return ""
     named = first_of(failed, NAMED)
-    return f"{result.name}: {len(failed)} of {len(rows)} drives failed, no number counts {named}"
+    return f"{result.name}: {len(failed)} of {len(drives)} drives failed, no number counts {named}"
 
 
 def _sides(
@@ -138,7 +134,7 @@ def _sides(
             wanted, known = ", ".join(names), ", ".join(each.variants)
             raise RoadevalError(f"{label}: no variant {wanted}; there are {known}")
         named = f"{label} ({renamed})" if renamed and not sides else label
-        sides.append(Side(named, each.parts, names if pairs else None))
+        sides.append(Side(named, each.compared, each.table, names if pairs else None))
     return sides
 
 
@@ -221,32 +217,35 @@ class ComparedMask:
     variant: str
 
 
-def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], Rows] | None:
+def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], pd.DataFrame] | None:
     """Return the final masks that all results have, and their rows in the order of the frames.
 
     Each mask's rows have its name as variant; of a variant they are those of the frames on which
     all results have its mask. Where the variants of one result are compared, each is a result.
     None without any.
     """
-    finals = {side.label: score.finals(side.rows(side.parts[0], "frames")) for side in sides}
-    alone = all(rows.distinct("variant") == [label] for label, rows in finals.items())
+    masks_of = {side.label: finals(_frames(side)) for side in sides}
+    alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
     masks, parts = [], []
-    for variant in dict.fromkeys(v for rows in finals.values() for v in rows.distinct("variant")):
-        own = [side for side in sides if variant in finals[side.label].distinct("variant")]
-        if not alone and (variant == BASELINE or len(own) < len(sides)):
+    for variant in dict.fromkeys(v for rows in masks_of.values() for v in rows["variant"]):
+        there = {s: only(masks_of[s.label], variant=variant) for s in sides}
+        there = {side: rows for side, rows in there.items() if len(rows)}
+        if not alone and (variant == BASELINE or len(there) < len(sides)):
             continue
-        found = [finals[side.label].of_variant(variant) for side in own]
-        common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
-        for side, rows in zip(own, found, strict=True) if common else ():
+        common = set.intersection(*(set(rows["frame"]) for rows in there.values()))
+        for side, rows in there.items() if common else ():
             name = side.label if alone else f"{side.label}: {variant}"
-            kept = rows.take(np.isin(rows["frame"], common))
             masks.append(ComparedMask(name, side.label, variant))
-            columns = (np.full(len(kept), text) for text in (name, "final"))
-            parts.append(kept.replace(**dict(zip(("variant", "stage"), columns, strict=True))))
+            in_all = rows[rows["frame"].isin(common)]
+            parts.append(in_all.assign(variant=name, stage="final"))
     if not parts:
         return None
-    rows = joined(parts)
-    return masks, rows.take(np.argsort(rows["frame"], kind="stable"))
+    return masks, joined(parts).sort_values("frame", kind="stable")
+
+
+def _frames(side: Side) -> pd.DataFrame:
+    """Return the rows of ``frames`` of the one drive that is compared."""
+    return side.table("frames", [side.drives[0].key])
 
 
 def _looks_of(masks: Sequence[ComparedMask]) -> dict[str, Look]:
@@ -259,10 +258,9 @@ def over_drive(compared: Compared) -> list[Chart]:
     if (found := compared_masks(compared.sides)) is None:
         return []
     masks, rows = found
-    base = compared.sides[0]
-    blind = score.finals(base.rows(base.parts[0], "frames").of_variant(BASELINE))
-    rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
+    blind = finals(only(_frames(compared.sides[0]), variant=BASELINE))
+    rows = joined([rows, blind[blind["frame"].isin(rows["frame"])].assign(stage="final")])
     size = compared.comparison.settings.window
-    size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
-    windows = window_table(score.camera_masks(rows), size)
-    return over_windows(windows, [TESTED], _looks_of(masks) | looks([BASELINE]))
+    size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
+    rows = rows.assign(drive="", camera="")  # the results may call them differently
+    return over_windows(windows(rows, size), [TESTED], _looks_of(masks) | looks([BASELINE]))

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-import numpy.typing as npt
-
-from roadeval.data import (
-    BASELINE,
-    ERRORS,
-    FILTERED,
-    IGNORE,
-    TRUTH,
-    UNFILTERED,
-    Health,
-    LayerKind,
-    Rows,
-)
-from roadeval.evaluation import score
-from roadeval.evaluation.metrics import SHORT
+from roadeval.data import BASELINE, ERRORS, FILTERED, IGNORE, TRUTH, UNFILTERED, Health, LayerKind
+from roadeval.evaluation import tables
+from roadeval.evaluation.metrics import SHORT, TESTED
+from roadeval.evaluation.score.frame import judge
+from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.settings import NOTEWORTHY
+from roadeval.evaluation.tables import finals, only, scene_ns, values_of
 from roadeval.geometry.plan import Plan
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import DriveResult
@@ -36,8 +26,9 @@ from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
 from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
-    from roadeval.recording.recording import Recording
+    import pandas as pd
 
+    from roadeval.recording.recording import Recording
 
 WORST: Final = 4
 MOVED: Final = 2
@@ -62,31 +53,17 @@ def evenly(numbers: Sequence[int], count: int) -> list[int]:
 
 
 def rates_by_frame(
-    table: Rows, names: Sequence[str]
+    table: pd.DataFrame, names: Sequence[str]
 ) -> Iterator[tuple[int, int, dict[str, dict[str, float]]]]:
     """Yield each frame's number and stamp, and the rates of its rows by variant.
 
     The table has ``frame``, ``stamp_ns``, ``variant`` and the rates; one row a frame and variant.
     """
-    found: dict[tuple[int, int], dict[str, dict[str, float]]] = {}
+    frames: dict[tuple[int, int], dict[str, dict[str, float]]] = {}
     columns = [table[name].tolist() for name in ("frame", "stamp_ns", "variant", *names)]
     for frame, stamp, variant, *values in zip(*columns, strict=True):
-        found.setdefault((frame, stamp), {})[variant] = dict(zip(names, values, strict=True))
-    yield from ((*key, rates) for key, rates in found.items())
-
-
-def outcomes(
-    recording: Recording, frame: int, masks: Iterable[tuple[str, npt.NDArray[Any] | None]]
-) -> Iterator[LayerImage]:
-    """Yield the camera, the truth, and each mask's errors, given by its name."""
-    image = recording.image(frame)
-    yield LayerImage("camera", image)
-    yield LayerImage("truth", image, TRUTH, recording.truth(frame))
-    for name, errors in masks:
-        if errors is None:
-            yield LayerImage(f"{name}: no mask", faded(image))
-        else:
-            yield LayerImage(f"{name}: errors", image, ERRORS, errors)
+        frames.setdefault((frame, stamp), {})[variant] = dict(zip(names, values, strict=True))
+    yield from ((*key, rates) for key, rates in frames.items())
 
 
 class FramePicker:
@@ -102,11 +79,13 @@ class FramePicker:
         self._result = result
         self._outcomes, self._layered = slice(outcomes), slice(layered)
         self._recording = result.recording
-        self._finals = score.finals(result.rows)
-        self._all = result.rows.distinct("variant")
+        self._finals = finals(result.rows)
+        self._all = values_of(result.rows, "variant")
         self._variants = [name for name in self._all if name != BASELINE]
-        self._scored = frozenset(result.rows["frame"].tolist())
-        self._causes = {name: score.causes(result.rows, name) for name in self._variants}
+        self._scored = frozenset(result.rows["frame"])
+        self._parts: dict[Any, Any] = {}
+        for first in self._variants[:1]:
+            self._parts = tables.causes(result.rows, first).to_dict("index")
 
     def examples(self, numbers: Sequence[int]) -> Iterator[ExampleFrame]:
         """Yield frames for figure 2."""
@@ -114,11 +93,12 @@ class FramePicker:
         for frame in numbers if recording else ():
             assert recording is not None
             masks = {
-                v.name: self._result.layer(v.name, v.stages[-1], frame) for v in recording.variants
+                variant.name: mask
+                for variant in recording.variants
+                if (mask := self._result.layer(variant.name, variant.stages[-1], frame)) is not None
             }
-            there = {name: mask for name, mask in masks.items() if mask is not None}
             truth = recording.truth(frame) if frame in self._scored else None
-            yield ExampleFrame(frame, recording.image(frame), truth, there)
+            yield ExampleFrame(frame, recording.image(frame), truth, masks)
 
     def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
         """Yield a picture of each frame: the first variant's errors, or without truth its mask."""
@@ -140,28 +120,19 @@ class FramePicker:
             unlabelled = self._result.facts.unlabelled
             look_at = unlabelled.look_at if unlabelled else []
             there = [frame for frame in look_at if frame in self._result.pictured]
-            return [self._pictured(frame) for frame in there[:WORST]]
-        table = self._result.rows
-        rows = score.worst(table, self._variants[0], WORST, score.scene_ns(table["stamp_ns"]))
-        mean = np.nanmean(self._finals.of_variant(self._variants[0])["ERR"]) if len(rows) else 0
-        rows = rows.take(rows["ERR"] >= mean)
-        return [
-            self._notable(*row)
-            for row in zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True)
-        ]
+            return [*map(self._pictured, there[:WORST])]
+        own = only(self._finals, variant=self._variants[0])
+        rows = tables.worst(own, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
+        rows = rows[rows[TESTED] >= own[TESTED].mean()]
+        return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
         """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
-        pairs = score.pairs(self._result.rows, FILTERED, UNFILTERED)
-        places = score.most_changed(
-            *(pairs["stamp_ns"], pairs["ERR"], MOVED),
-            harmed=harmed,
-            apart_ns=score.scene_ns(pairs["stamp_ns"]),
-            besides=[frame.stamp_ns for frame in shown],
-        )
-        rows = pairs.take(places)
-        columns = (rows[name].tolist() for name in ("frame", "stamp_ns", "ERR"))
-        return [self._notable(*row) for row in zip(*columns, strict=True)]
+        pairs = tables.changes(self._result.rows, FILTERED, UNFILTERED)
+        apart, besides = scene_ns(pairs["stamp_ns"]), [frame.stamp_ns for frame in shown]
+        rows = tables.most_changed(pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides)
+        columns = rows[["frame", "stamp_ns", "change"]]
+        return [self._notable(*row) for row in columns.itertuples(index=False)]
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
         """Return a frame with its pictures, those of layers of at most so many pixels across."""
@@ -183,41 +154,40 @@ class FramePicker:
                 yield LayerImage(title, plan.picture(each.image), each.spec, seen)
 
     def _pictured(self, frame: int) -> NotableFrame:
-        """Return a frame whose pictures are there, with all of them; without truth, too."""
-        recording = self._recording
-        assert recording is not None
-        if self._variants and frame in self._scored:
-            return self._notable(frame, recording.stamps[frame])
-        return NotableFrame(
-            frame,
-            recording.stamps[frame],
-            variant="",
-            rates={},
-            notes=recording.notes(frame),
-            images=[LayerImage("camera", recording.image(frame))],
-            layers=list(self._layers(recording, frame)),
-        )
+        assert self._recording is not None
+        return self._notable(frame, self._recording.stamps[frame])
 
     def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
-        own = self._finals.take(self._finals["frame"] == frame)
-        ((_, _, rates),) = rates_by_frame(own, [*SHORT])
-        first, recording = self._variants[0], self._recording
-        seen = recording if recording is not None and frame in self._result.pictured else None
-        errors = (
-            (each.name, self._result.layer(each.name, ERRORS.name, frame))
-            for each in (seen.variants[self._outcomes] if seen else ())
-        )
+        """Return a frame, with its pictures where they are there; without truth, too."""
+        result, seen = self._result, self._recording
+        if frame not in result.pictured:
+            seen = None
+        layers = [*self._layers(seen, frame)] if seen and change is None else []
+        if not self._variants or frame not in self._scored:
+            assert seen is not None
+            images, notes = [LayerImage("camera", seen.image(frame))], seen.notes(frame)
+            return NotableFrame(frame, stamp_ns, "", {}, notes=notes, images=images, layers=layers)
+        first, own = self._variants[0], only(self._finals, frame=frame).set_index("variant")
         return NotableFrame(
-            frame=frame,
-            stamp_ns=stamp_ns,
-            variant=first,
-            rates=rates,
-            parts=self._causes[first].of(frame),
+            *(frame, stamp_ns, first, dict[Any, Any](own[[*SHORT]].to_dict("index"))),
+            parts=self._parts.get(frame, {}),
             change=change,
-            notes=self._result.notes(frame, first),
-            images=[*outcomes(seen, frame, errors)] if seen else [],
-            layers=[*self._layers(seen, frame)] if seen and change is None else [],
+            notes=result.notes(frame, first),
+            images=[*self._outcomes_of(seen, frame)] if seen else [],
+            layers=layers,
         )
+
+    def _outcomes_of(self, recording: Recording, frame: int) -> Iterator[LayerImage]:
+        """Yield the camera, the truth, and the errors of each variant's final mask."""
+        image = recording.image(frame)
+        yield LayerImage("camera", image)
+        yield LayerImage("truth", image, TRUTH, recording.truth(frame))
+        for name in (variant.name for variant in recording.variants[self._outcomes]):
+            errors = self._result.layer(name, ERRORS.name, frame)
+            if errors is None:
+                yield LayerImage(f"{name}: no mask", faded(image))
+            else:
+                yield LayerImage(f"{name}: errors", image, ERRORS, errors)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
@@ -231,14 +201,10 @@ class FramePicker:
                 for spec in variant.layers
                 if spec.kind is not LayerKind.MASK or spec.name in variant.stages
             ]
-            arrays = {spec: self._result.layer(variant.name, spec.name, frame) for spec in specs}
-            known = [(spec, array) for spec, array in arrays.items() if array is not None]
-            yield [
-                LayerImage(
-                    spec.name if place else f"{variant.name}: {spec.name}", image, spec, array
-                )
-                for place, (spec, array) in enumerate(known)
-            ]
+            arrays = ((spec, self._result.layer(variant.name, spec.name, frame)) for spec in specs)
+            row = [LayerImage(s.name, image, s, array) for s, array in arrays if array is not None]
+            row[:1] = [replace(each, title=f"{variant.name}: {each.title}") for each in row[:1]]
+            yield row
 
 
 def browsed(result: DriveResult) -> FrameBrowser:
@@ -246,13 +212,13 @@ def browsed(result: DriveResult) -> FrameBrowser:
     frames, names = result.rows, [*SHORT]
     if not len(frames):
         frames = result.table("unlabelled")
-        names = [sign for sign in score.SIGNS if np.isfinite(frames[sign]).any()]
+        names = [sign for sign in SIGNS if frames[sign].notna().any()]
     there = result.recording.variants if result.recording else ()
     return FrameBrowser(
         rows=[*facts_of(result)],
-        variants=frames.distinct("variant"),
+        variants=values_of(frames, "variant"),
         titles=names,
-        charts=over_frames(frames, names) if len(frames) else [],
+        charts=over_frames(frames, names),
         command=result.inspect("{}") if result.recording else "",
         masks=[f"{each.name}: {each.stages[-1]}" for each in there],
     )
@@ -262,7 +228,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames = result.rows
     if not len(frames):
-        doubts = [*rates_by_frame(result.table("unlabelled"), [*score.SIGNS])]
+        doubts = [*rates_by_frame(result.table("unlabelled"), [*SIGNS])]
         seen = {frame for frame, _, _ in doubts}
         stamps = result.recording.stamps if result.recording else {}
         doubts += [(each, stamps[each], {}) for each in result.pictured if each not in seen]
@@ -271,7 +237,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
             for frame, stamp, rates in sorted(doubts, key=itemgetter(0))
         )
         return
-    for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):
+    for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
         words, conditions = [*notes(others, blind)], [*_conditions(others, blind)]
@@ -285,14 +251,14 @@ def _conditions(
     first = next(iter(rates), None)
     if first is None:
         return
-    health = score.judge(rates[first], blind)
+    health = judge(rates[first], blind)
     if health is not Health.OK:
         yield f"{first} {health}"
     if FILTERED in rates and UNFILTERED in rates:
-        change = rates[FILTERED]["ERR"] - rates[UNFILTERED]["ERR"]
+        change = rates[FILTERED][TESTED] - rates[UNFILTERED][TESTED]
         if abs(change) >= NOTEWORTHY:
             yield "the filter harms" if change > 0 else "the filter helps"
-    if blind is not None and rates[first]["ERR"] > blind["ERR"]:
+    if blind is not None and rates[first][TESTED] > blind[TESTED]:
         yield f"{first} worse than {BASELINE}"
 
 
@@ -304,47 +270,35 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     if result.recording is None:
         return []
     chosen = _chosen(result, PICTURED)
-    picker = FramePicker(result, None, None)
-
-    def each() -> Iterator[Strip]:
-        for done, frame in enumerate(chosen, 1):
-            yield picker.strip(frame)
-            on_progress(Progress(done, len(chosen), "reading"))
-
-    return sorted(fitting(each(), room), key=lambda each: each.frame)
-
-
-def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
-    """Yield the first strips that have room together."""
-    for made in strips:
-        room -= bytes_of(made)
+    picker, strips = FramePicker(result, None, None), []
+    for done, frame in enumerate(chosen, 1):
+        made = picker.strip(frame)
+        # On a page pictures are text, with words around each.
+        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
         if room < 0:
-            return
-        yield made
-
-
-def bytes_of(made: Strip) -> int:
-    """Return how many bytes of a page a strip takes: pictures as text, with words around each."""
-    return sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+            break
+        strips.append(made)
+        on_progress(Progress(done, len(chosen), "reading"))
+    return sorted(strips, key=lambda strip: strip.frame)
 
 
 def _chosen(result: DriveResult, count: int) -> list[int]:
     """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
     rows = result.rows
-    scored_frames = set(rows["frame"].tolist())
+    scored_frames = {*rows["frame"]}
     there = [number for number in result.pictured if number in scored_frames]
     pictured = there or [*result.pictured]
-    variants = [name for name in rows.distinct("variant") if name != BASELINE]
+    variants = [name for name in values_of(rows, "variant") if name != BASELINE]
     count = min(count, len(pictured))
     spread = evenly(pictured, count)
     if not variants:
         unlabelled = result.facts.unlabelled
         asked = [each for each in (unlabelled.look_at if unlabelled else ()) if each in pictured]
         return list(dict.fromkeys([*asked, *spread]))[:count]
-    own = rows.take(np.isin(rows["frame"], pictured))
-    worst = score.worst(own, variants[0], count)["frame"].tolist()
-    ranked = score.worst(own, variants[0], len(pictured), 0)["frame"].tolist()
-    best = ranked[::-1]
+    own = finals(only(rows, variant=variants[0]))
+    own = own[own["frame"].isin(pictured)]
+    worst = tables.worst(own, count)["frame"].tolist()
+    best = tables.worst(own, len(own), apart_ns=0)["frame"].tolist()[::-1]
     turns: list[int] = []
     for place in range(count):
         turns += worst[2 * place : 2 * place + 2]

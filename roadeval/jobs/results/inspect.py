@@ -8,16 +8,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import score
-from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation import tables
+from roadeval.evaluation.metrics import SHORT, TESTED
+from roadeval.evaluation.score.unlabelled import SIGNS, sign_of
+from roadeval.evaluation.tables import finals, only, values_of
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
+from roadeval.results.rows import records
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -37,10 +38,10 @@ class WorstFrame:
     stage: str
     rates: Mapping[str, float | None]
     """Of a frame without truth its doubt, see `roadeval.results.schema.TABLES`."""
-    by: str = "ERR"
+    by: str = TESTED
     """By which of these it is ranked."""
     parts: Mapping[str, float] = field(default_factory=dict)
-    """The parts of ERR by stage, see `roadeval.evaluation.score.causes`; none in a fleet."""
+    """The parts of ERR by stage, see `roadeval.evaluation.tables.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()
     """What the recording says about it."""
     picture: str | None = None
@@ -62,9 +63,9 @@ def worst_frames(
     every frame, or there is no such variant.
     """
     if fleet := result.fleet:
-        if not fleet.worst:
+        if fleet.worst.empty:
             raise _nothing_scored(fleet.path)
-        return [_of_fleet(fleet, row) for row in fleet.worst[:count]]
+        return [_of_fleet(fleet, row) for row in records(fleet.worst[:count])]
     cameras = result.rig or [each for each in [result.drive] if each]
     found = [frame for each in cameras for frame in _ranked(each, count or LISTED, variant)]
     found = sorted(found, key=lambda each: -(each.rates[each.by] or 0.0))[: count or LISTED]
@@ -83,7 +84,7 @@ def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
     recording = recording_path(fleet.path, row["drive"])
     return WorstFrame(
         **{name: row[name] for name in names},
-        rates={name: row[name] for name in ("ERR", "FPR", "FNR")},
+        rates={name: row[name] for name in (TESTED, "FPR", "FNR")},
         picture=str(fleet.path / row["picture"]) if row["picture"] else None,
         recording=recording if recording.exists() else None,
     )
@@ -96,31 +97,33 @@ def _ranked(
     rows, names, rates = drive.rows, _scored(drive), tuple(SHORT)
     if not names:
         rows = drive.table("unlabelled")
-        names, rates = rows.distinct("variant"), tuple(score.SIGNS)
+        names, rates = values_of(rows, "variant"), tuple(SIGNS)
     if not names:
         raise _nothing_scored(drive.path)
     chosen = variant or names[0]
     if chosen not in names:
         raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
-    by = "ERR" if "ERR" in rates else score.sign_of(rows, chosen)
+    own = finals(only(rows, variant=chosen))
+    by = TESTED if TESTED in rates else sign_of(own)
     if by is None:
         return []
-    looked_at = rows if among is None else rows.take(np.isin(rows["frame"], [*among]))
-    apart = None if by == "ERR" else score.scene_ns(rows["stamp_ns"])
-    ranked = score.worst(looked_at, chosen, count, apart, by)
-    causes = score.causes(rows, chosen) if by == "ERR" else None
-    frames, stamps = ranked["frame"].tolist(), ranked["stamp_ns"].tolist()
+    apart = None if by == TESTED else tables.scene_ns(rows["stamp_ns"])
+    looked_at = own if among is None else own[own["frame"].isin([*among])]
+    ranked = tables.worst(looked_at, count, by, apart).to_dict("records")
+    parts: dict[Any, Any] = {}
+    if by == TESTED:
+        parts = tables.causes(rows, chosen).to_dict("index")
     return [
         WorstFrame(
-            *(place + 1, drive.name, frame, stamp, chosen, str(ranked["stage"][place])),
-            rates={rate: float(ranked[rate][place]) for rate in rates},
+            *(rank, drive.name, row["frame"], row["stamp_ns"], chosen, row["stage"]),
+            rates={rate: row[rate] for rate in rates},
             by=by,
-            parts=causes.of(frame) if causes else {},
-            notes=drive.notes(frame, chosen),
+            parts=parts.get(row["frame"], {}),
+            notes=drive.notes(row["frame"], chosen),
             recording=drive.path if drive.recording else None,
             camera=drive.camera,
         )
-        for place, (frame, stamp) in enumerate(zip(frames, stamps, strict=True))
+        for rank, row in enumerate(ranked, 1)
     ]
 
 
@@ -141,7 +144,7 @@ def recording_of(fleet: FleetFolder, drive: str) -> Path:
     """
     if (path := fleet.recording(drive)).exists():
         return path
-    source = visible(without_secrets(str(fleet.drives[drive]["source"])))
+    source = visible(without_secrets(str(fleet.drives.loc[drive, "source"])))
     words = ["roadeval", "replay", source, "--config", str(fleet.results(drive) / RUN)]
     words += ["--record", "worst:10", "--save", str(path), "--reports", str(Path("reports", drive))]
     raise RoadevalError(f"{drive}: no recording was kept; make it with: {shlex.join(words)}")
@@ -153,7 +156,7 @@ def _nothing_scored(path: Path) -> RoadevalError:
 
 def _scored(drive: DriveResult) -> list[str]:
     """Name the variants that were scored, without the baseline."""
-    return [name for name in drive.rows.distinct("variant") if name != BASELINE]
+    return [name for name in values_of(drive.rows, "variant") if name != BASELINE]
 
 
 def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame:
@@ -183,7 +186,7 @@ def worst(drive: DriveResult, variant: str | None = None) -> WorstFrame | None:
 
 def without_pictures(drive: DriveResult, frame: int) -> str:
     """Return a sentence on a frame that was scored and whose pictures were not kept, else ""."""
-    if drive.recording is None or frame in drive.pictured or frame not in drive.rows["frame"]:
+    if drive.recording is None or frame in {*drive.pictured} or frame not in {*drive.rows["frame"]}:
         return ""
     return f"the recording has no pictures of frame {frame}, so the views of them are empty"
 
@@ -201,7 +204,7 @@ def view(drive: DriveResult, frame: int | None, picture: Path | None = None) -> 
         raise RoadevalError(
             f"{drive.path}: a results folder holds no pictures; give the recording (.rrd)"
         )
-    counted = set(drive.rows["frame"].tolist())
+    counted = {*drive.rows["frame"]}
     numbers = sorted({*drive.pictured, *counted})
     if frame is not None and frame not in numbers:
         held = f"frames {numbers[0]} to {numbers[-1]}" if numbers else "none"

@@ -5,19 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.config.run import RunConfig, run_toml
-from roadeval.data import Rows
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import score
+from roadeval.evaluation.score.unlabelled import chosen, sign_of
+from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.result import DriveResult, Result
@@ -29,6 +28,9 @@ from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
 from roadeval.runtime.files import AnyPath, put, writing
 from roadeval.version import VERSION
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PNG: Final = "png"
 """The format of masks as images, 255 where there is road."""
@@ -104,7 +106,13 @@ def pick(
                 made, run = Path(place, f"{number}.rrd"), run_toml(config, each.name, VERSION)
                 own_reports = Path(place, "reports")
                 replay(each, masks, save=made, reports=own_reports, on_progress=on_progress)
-            drives.append((each, _drive(made), run))
+            drive = Result(made).drive
+            if drive is None or drive.recording is None:
+                raise RoadevalError(
+                    f"{made}: frames are picked from a recording of one camera; give the log, and "
+                    "of several cameras one with --image-topic"
+                )
+            drives.append((each, drive, run))
         if not drives:
             raise RoadevalError(f"{given[0]}: no recording was kept; replay it with --keep all")
         many = len(drives) > 1
@@ -130,7 +138,7 @@ def _parts(source: Path) -> list[Path]:
             raise RoadevalError(f"{source}: its recording is not where it was; name that")
         return [recording]
     drives = FleetFolder(source).drives
-    return [path for name in drives if (path := recording_path(source, name)).exists()]
+    return [path for name in drives.index if (path := recording_path(source, name)).exists()]
 
 
 def _shares(sizes: Sequence[int], count: int) -> list[int]:
@@ -161,40 +169,30 @@ class _Wanted:
     """The configuration as TOML, of a log that was replayed here; None of a recording."""
 
 
-def _drive(source: Path) -> DriveResult:
-    """Open a recording of one camera."""
-    drive = Result(source).drive
-    if drive is None or drive.recording is None:
-        raise RoadevalError(
-            f"{source}: frames are picked from a recording of one camera; give the log, and of "
-            "several cameras one with --image-topic"
-        )
-    return drive
-
-
 def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     """Pick frames of a recording and write them."""
     rows = drive.table("unlabelled")
-    names = rows.distinct("variant")
+    names = values_of(rows, "variant")
     if not names:
         raise RoadevalError(f"{wanted.source}: every frame has truth, or none was replayed")
     if (name := wanted.variant or names[0]) not in names:
         raise RoadevalError(f"{wanted.source}: no variant {name}; there are {', '.join(names)}")
-    known, own = _known(drive, rows, name, wanted), rows.of_variant(name)
+    own = only(rows, variant=name)
+    known = _known(drive, own, name, wanted)
     scores = known.every_score()
-    if (sign := score.sign_of(rows, name)) is not None:  # how much they are in doubt by now
-        now = dict(zip(map(float, own["stamp_ns"]), own[sign].tolist(), strict=True))
+    if (sign := sign_of(own)) is not None:  # how much they are in doubt by now
+        now = dict(zip(map(float, own["stamp_ns"]), own[sign], strict=True))
         scores = np.array([now.get(float(stamp), np.nan) for stamp in known.stamps])
     taken = [known.places[stamp] for stamp in known.by_stamp]
-    choose = partial(score.chosen, drawn=known.drawn, taken=taken)
-    found = choose(np.array(known.stamps, np.int64), scores, wanted.count, known.seed)
-    random, ranked = (places.tolist() for places in found)
+    stamps = np.array(known.stamps, np.int64)
+    places = chosen(stamps, scores, wanted.count, known.seed, drawn=known.drawn, taken=taken)
+    random, ranked = (each.tolist() for each in places)
     frames = [known.frames[place] for place in {*random, *ranked} - {*taken}]
     if lacking := sorted({*frames} - {*drive.pictured}):
         raise RoadevalError(
             f"{wanted.source}: no pictures of frame {lacking[0]}; replay with --record masks"
         )
-    stage, masks = str(own["stage"][0]), {}
+    (stage, *_), masks = own["stage"], {}
     for frame in frames:
         mask = drive.layer(name, stage, frame)
         assert mask is not None
@@ -207,7 +205,7 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     return Outcome(wanted.folder, picks, len(new), log.path if log else drive.name, repeats)
 
 
-def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Picks:
+def _known(drive: DriveResult, own: pd.DataFrame, variant: str, wanted: _Wanted) -> Picks:
     """Return the picks that a folder holds, or ones without a frame."""
     folder, facts = wanted.folder, drive.facts
     found = Picks.read(folder)
@@ -220,7 +218,7 @@ def _known(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Pic
         labels = {file for file in left if folder / LABELS in file.parents}
         if labels or left - begun - proposed:
             raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
-        return _nothing_yet(drive, rows, variant, wanted)
+        return _nothing_yet(drive, own, variant, wanted)
     if (found.log, found.camera) != (facts.log_digest, facts.drive.camera):
         raise RoadevalError(f"{folder}: its frames are of another log; name a folder of its own")
     return found
@@ -257,10 +255,9 @@ def _write(
         put(folder / PICK, picks.text().encode())
 
 
-def _nothing_yet(drive: DriveResult, rows: Rows, variant: str, wanted: _Wanted) -> Picks:
+def _nothing_yet(drive: DriveResult, own: pd.DataFrame, variant: str, wanted: _Wanted) -> Picks:
     """Return picks without a frame: those of a result that can be picked, and their doubt."""
-    own, sign = rows.of_variant(variant), score.sign_of(rows, variant)
-    stamps = own["stamp_ns"].tolist()
+    stamps, sign = own["stamp_ns"].tolist(), sign_of(own)
     if len({*stamps}) < len(stamps):
         raise RoadevalError(
             f"{wanted.source}: several frames have one stamp, so no label finds its own"
@@ -289,10 +286,10 @@ def _with(
     A frame that was ranked before, and is drawn now, becomes a random one.
     """
     drawn, wave = known.drawn + len(random), max((e.wave for e in known.picked), default=0) + 1
-    probability, chosen = drawn / len(known.stamps), {known.stamps[place] for place in random}
+    probability, stamps = drawn / len(known.stamps), {known.stamps[place] for place in random}
     old = [
         replace(each, why=Why.RANDOM, probability=probability)
-        if each.why is Why.RANDOM or each.stamp_ns in chosen
+        if each.why is Why.RANDOM or each.stamp_ns in stamps
         else each
         for each in known.picked
     ]

@@ -91,7 +91,7 @@ THUMBNAILS: Final = 4
 
 def collect(result: DriveResult) -> Findings:
     """Collect everything that the report of a drive shows."""
-    evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
+    evaluated = {*result.rows["frame"]} or {*result.pictured}
     pictured = [number for number in result.pictured if number in evaluated]
     picker, drawn = FramePicker(result), result.facts.examples
     if not set(drawn) <= set(result.pictured):

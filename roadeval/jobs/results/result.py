@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import Rows
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import score
-from roadeval.evaluation.comparison import Part
-from roadeval.evaluation.score import drive_effects
+from roadeval.evaluation import tables
+from roadeval.evaluation.comparison.pairing import ComparedDrive
+from roadeval.evaluation.score.scoreboard import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.tables import joined
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
     SUMMARY,
@@ -27,15 +26,21 @@ from roadeval.results.facts import (
     FleetFacts,
     FrameAccount,
     TrainingFacts,
-    as_parts,
     is_fleet,
 )
-from roadeval.results.fleet import FleetFolder, frames_path
+from roadeval.results.fleet import FleetFolder
 from roadeval.results.folder import RUN, ResultsFolder
-from roadeval.results.rows import Key, as_arrays, cells, drive_row, effect_rows, score_rows
-from roadeval.results.schema import TABLES
+from roadeval.results.rows import (
+    Key,
+    beyond_masks,
+    drive_row,
+    effect_rows,
+    records,
+    scores,
+    table_of,
+)
 from roadeval.results.sentences import verdict
-from roadeval.results.tables import AGAIN, ResultsError, parquet_rows
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -65,7 +70,7 @@ class DriveResult:
 
             self.recording = Recording(self.path, camera)
         self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path, camera)
-        self._read: Final[dict[str, Rows]] = {}
+        self._read: Final[dict[str, pd.DataFrame]] = {}
 
     @property
     def complete(self) -> bool:
@@ -127,8 +132,8 @@ class DriveResult:
         if not self.complete:
             assert self.recording is not None
             layout, settings = self.recording.layout, EvaluationSettings()
-            masks = score.camera_masks(self.rows)
-            effects, totals = drive_effects([masks], settings), score.totals(masks)
+            effects = drive_effects(self.rows, settings)
+            totals = tables.as_trees(tables.totals(self.rows))
             return Facts(
                 verdict(totals, effects),
                 DriveFacts(
@@ -138,39 +143,50 @@ class DriveResult:
                 ),
                 FrameAccount(
                     trained_on=int(layout.properties.get("training_frames", 0)),
-                    evaluated=len(self.rows.distinct("frame")),
+                    evaluated=self.rows["frame"].nunique(),
                 ),
                 totals,
                 training=TrainingFacts(str(layout.properties.get("trained_on"))),
-                **as_parts(effects),
+                effects=effects,
             )
         assert self._tables.facts is not None
         return self._tables.facts
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> pd.DataFrame:
         """The rows of ``frames``."""
         return self.table("frames")
 
-    def table(self, name: str) -> Rows:
+    @property
+    def key(self) -> Key:
+        """What every row of its tables begins with."""
+        return Key(visible(self.name), visible(self.facts.drive.camera))
+
+    def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table, as ``oracles``; none where the run counted none.
 
         A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
         are left out, and so are sums over all frames.
         """
         if name not in self._read:
-            rows = self._tables.rows(name)
-            if not self.complete and len(rows) and name != "unlabelled":
-                frames = rows.columns.get("frame")
-                rows = rows.take(slice(0) if frames is None else np.isin(frames, self._both))
-            self._read[name] = rows
+            self._read[name] = self._table(name)
         return self._read[name]
 
-    @property
-    def frames(self) -> pd.DataFrame:
-        """The rows of ``frames`` for pandas."""
-        table = self._tables.table("frames")
-        return table if self.complete else table[table["frame"].isin(self._both)]
+    def _table(self, name: str) -> pd.DataFrame:
+        match name:
+            case "drives":
+                row = drive_row(self.facts, self.name, str(self.path))
+                return table_of(name, [{**self.key._asdict(), **row}])
+            case "effects":
+                return table_of(name, effect_rows(self.facts, self.key))
+            case "scores":
+                return scores(self.rows, self.table("regions"), beyond_masks(self.facts, self.key))
+            case "worst":
+                return table_of(name, ())
+        rows = self._tables.table(name)
+        if self.complete or not len(rows) or name == "unlabelled":
+            return rows
+        return rows[rows["frame"].isin(self._both)] if "frame" in rows else rows[:0]
 
     @cached_property
     def pictured(self) -> tuple[int, ...]:
@@ -215,7 +231,7 @@ class DriveResult:
     @cached_property
     def _both(self) -> list[int]:
         """The frames in both tables, of frames and of regions."""
-        frames, regions = (self._tables.rows(name)["frame"] for name in ("frames", "regions"))
+        frames, regions = (self._tables.table(name)["frame"] for name in ("frames", "regions"))
         both: list[int] = np.intersect1d(frames, regions).tolist()
         return both
 
@@ -257,17 +273,17 @@ class Result:
     """
 
     def __init__(self, *paths: str | Path) -> None:
-        self.paths: Final = tuple(map(Path, paths))
+        self.paths = tuple(map(Path, paths))
         self._opened: list[Opened] = [each for path in self.paths for each in _open(path)]
 
     @cached_property
     def cameras(self) -> dict[str, Result]:
         """The result of each camera of a rig that was opened alone, by its name; else none."""
-        found = {}
-        for each in self.rig:
-            own = found[each.camera] = copy(self)
-            own.__dict__ = {"paths": self.paths, "_opened": [each]}  # and nothing that was cached
-        return found
+        cameras = {}
+        for drive in self.rig:
+            result = cameras[drive.camera] = Result()
+            result.paths, result._opened = self.paths, [drive]
+        return cameras
 
     @property
     def rig(self) -> list[DriveResult]:
@@ -331,118 +347,89 @@ class Result:
     def variants(self) -> list[str]:
         """The variants that were scored, in order."""
         found = (
-            each.facts.finals if isinstance(each, FleetFolder) else each.rows.distinct("variant")
+            each.facts.finals if isinstance(each, FleetFolder) else each.rows["variant"].unique()
             for each in self._opened
         )
         return [*dict.fromkeys(chain(*found))]
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:
-        """The drives."""
+    def compared(self) -> tuple[ComparedDrive, ...]:
+        """The drives, as a comparison knows them."""
         return tuple(
-            part
+            drive
             for each in self._opened
-            for part in (_members(each) if isinstance(each, FleetFolder) else [_alone(each)])
+            for drive in (_members(each) if isinstance(each, FleetFolder) else [_alone(each)])
         )
 
     @cached_property
     def drives(self) -> pd.DataFrame:
         """A row per drive and camera, scored or not."""
-        return self._table("drives")
+        return self.table("drives")
 
     @cached_property
     def scores(self) -> pd.DataFrame:
         """A row per drive, camera, variant, stage and region."""
-        return self._table("scores")
+        return self.table("scores")
 
     @cached_property
     def effects(self) -> pd.DataFrame:
         """A row per drive, camera, difference between two masks, and rate."""
-        return self._table("effects")
+        return self.table("effects")
 
     @cached_property
     def worst(self) -> pd.DataFrame:
         """A row per frame among the worst of a fleet; empty for single drives."""
-        return self._table("worst")
+        return self.table("worst")
 
     @cached_property
     def frames(self) -> pd.DataFrame:
         """A row per evaluated frame, variant and stage of every drive."""
-        return _together(
-            table
-            for each in self._opened
-            for table in ([each.frames] if isinstance(each, DriveResult) else each.all_frames())
-        )
+        return self.table("frames")
 
-    def _table(self, name: str) -> pd.DataFrame:
-        return _together(
-            each.table(name).to_pandas() if isinstance(each, FleetFolder) else _own(each, name)
-            for each in self._opened
-        )
+    @cached_property
+    def windows(self) -> pd.DataFrame:
+        """A row per window of evaluated frames, variant and stage of every drive."""
+        return tables.windows(self.frames, self.facts.evaluation.window)
 
+    def table(self, name: str, drives: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
+        """Return a table of all drives, or of some, by drive and camera.
 
-def _together(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.concat([*tables], ignore_index=True)
-
-
-def _own(result: DriveResult, name: str) -> pd.DataFrame:
-    """Return a table of drives for a single drive, by the function that makes a fleet's."""
-    import pandas as pd
-
-    facts, rows = result.facts, []
-    if name == "drives":
-        rows = [drive_row(facts, result.name, str(result.path))]
-    elif name == "scores":
-        rows = [*score_rows(facts, score.region_totals(result.table("regions")))]
-    elif name == "effects":
-        rows = [*effect_rows(facts)]
-    key = Key(result.name, facts.drive.camera)
-    return pd.DataFrame(cells(name, key, rows), columns=TABLES[name].names)
+        Of a fleet's ``regions`` it has the rows of final masks alone.
+        """
+        parts = []
+        for each in self._opened:
+            if isinstance(each, FleetFolder):
+                names = None if drives is None else {drive for drive, _ in drives}
+                parts.append(each.table(name, names))
+            elif drives is None or each.key in drives:
+                parts.append(each.table(name))
+        return joined(parts)
 
 
-def _alone(result: DriveResult) -> Part:
-    facts = result.facts
-    return Part(
-        *(result.name, result.title, facts.log_digest, len(result.rows) > 0),
-        *(asked(facts.run) | contents(facts), result.table),
-        camera=facts.drive.camera,
-    )
+def _alone(result: DriveResult) -> ComparedDrive:
+    facts, frames = result.facts, result.rows["frame"].nunique()
+    settings = asked(facts.run) | contents(facts)
+    return ComparedDrive(*result.key, result.title, facts.log_digest, frames, settings)
 
 
-def _members(fleet: FleetFolder) -> Iterator[Part]:
-    settings = asked(fleet.facts.run)
-    scored = next((drive for drive, row in fleet.drives.items() if row["evaluated"]), None)
+def _members(fleet: FleetFolder) -> Iterator[ComparedDrive]:
+    settings, drives = asked(fleet.facts.run), records(fleet.drives)
+    scored = next((row["drive"] for row in drives if row["evaluated"]), None)
     if scored is not None:
         with suppress(RoadevalError):  # the folders of its drives may be gone
-            found = contents(ResultsFolder(fleet.results(scored)).facts)
+            files = contents(ResultsFolder(fleet.results(scored)).facts)
             # Masks and truth of one drive say nothing of the others'.
-            settings |= {name: each for name, each in found.items() if name.startswith(OF_ALL)}
-    for member in fleet.facts.drives:
-        row = fleet.drives[member.drive]
-        yield Part(
-            drive=member.drive,
-            name=fleet.names[member.drive],
-            digest=row["log_digest"] or None,
-            scored=bool(row["evaluated"]),
-            asked=settings,
-            rows=partial(_rows_of_member, fleet, member.drive),
-            group=member.group,
+            settings |= {name: each for name, each in files.items() if name.startswith(OF_ALL)}
+    for row in drives:
+        yield ComparedDrive(
+            drive=row["drive"],
             camera=row["camera"] or "",
+            name=fleet.names[row["drive"]],
+            digest=row["log_digest"] or None,
+            frames=row["evaluated"] or 0,
+            asked=settings,
+            group=row["group"],
         )
-
-
-def _rows_of_member(fleet: FleetFolder, drive: str, table: str) -> Rows:
-    """Return the rows of a fleet's drive: of its frames, else of its results folder."""
-    if table != "frames":
-        folder = fleet.results(drive)
-        return ResultsFolder(folder).rows(table) if folder.exists() else as_arrays(table, ())
-    try:
-        return parquet_rows(fleet.frames(drive), table)
-    except FileNotFoundError:
-        path = frames_path(fleet.path, drive)
-        raise ResultsError(f"{path}: is not there; {AGAIN}") from None
 
 
 def asked(run: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,11 +1,11 @@
-"""Many drives in one run: each replayed in a worker, its record kept, all records made tables."""
+"""Many drives in one run: each replayed in a worker, then the tables of all of them."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, as_completed
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -33,11 +33,11 @@ from roadeval.jobs.run.fleet_work import (
     failed,
     replay_drive,
     train_fold,
-    valid_record,
+    valid,
 )
 from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
-from roadeval.results.fleet import FleetWriter, recording_path
+from roadeval.results.fleet import FleetWriter
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
 from roadeval.version import VERSION
@@ -76,7 +76,7 @@ def replay_fleet(
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
-    The folder is the state: a drive whose record is there, made of the same log, settings, model
+    The folder is the state: a drive whose results are there, made of the same log, settings, model
     and version, is not replayed again, unless it failed. A `RoadevalError` if there is no drive, or
     the folder or the engine cannot be used.
 
@@ -134,19 +134,16 @@ class FleetRun:
     workers: int = 1
     done: dict[str, Done] = field(default_factory=dict)
     """What is known of each drive that is done, by its ID."""
-    pruned: set[str] = field(default_factory=set)
     stack: ExitStack = field(default_factory=ExitStack)
     """Ends the processes that were started for the run."""
 
     def replay_all(self) -> None:
-        """Replay every drive that is not done, and those whose recordings are to be kept."""
+        """Replay every drive that is not done."""
         self.show("looking")
         with self.stack:
             folds = self.config.fleet.folds
             tasks = [*self._by_model()] if folds is None else self._by_fold(folds)
             self._replay(self._waiting(tasks))
-            self._replay(self._unrecorded(tasks))
-        self._prune()
 
     def show(self, stage: str) -> None:
         """Report the progress to the caller."""
@@ -176,40 +173,12 @@ class FleetRun:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
         waiting = []
         for task in tasks:
-            record = valid_record(task) if task.entry.path is not None else None
-            if record is None:
+            made = valid(task) if task.entry.path is not None else None
+            if made is None:
                 waiting.append(task)
             else:
-                self.done[record.drive] = done(record, repeated=True)
+                self.done[made.drive] = done(self.folder, made, repeated=True)
         return waiting
-
-    def _kept(self) -> list[str]:
-        """Return the drives so far whose recordings are kept: those with the highest ERR."""
-        keep = self.config.fleet.keep
-        most = {"all": len(self.done), "none": 0}.get(keep)
-        scored = [each for each in self.done.values() if each.err is not None]
-        worst = sorted(scored, key=lambda each: (-(each.err or 0), each.drive))
-        most = int(keep.removeprefix("worst:")) if most is None else most
-        return [each.drive for each in worst[:most]]
-
-    def _unrecorded(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
-        """Return the tasks of drives whose recordings an earlier command has not kept."""
-        kept = {*self._kept()} if self.config.output.record != "none" else {}
-        return [
-            replace(task, required=True)
-            for task in tasks
-            if task.entry.id in kept and not recording_path(self.folder, task.entry.id).exists()
-        ]
-
-    def _prune(self) -> None:
-        """Remove recordings that are not kept, as drives are done: they take the most room."""
-        if not self.config.fleet.keep.startswith("worst:"):
-            return
-        # Once dropped a drive stays so, for more are done and none fewer.
-        for drive in self.done.keys() - set(self._kept()) - self.pruned:
-            self.pruned.add(drive)
-            with suppress(OSError):
-                recording_path(self.folder, drive).unlink(missing_ok=True)
 
     def _engine(self) -> Executor:
         """Return who does the tasks."""
@@ -273,7 +242,6 @@ class FleetRun:
                     self._fail(task, self._reason(error, "it was replayed"))
                 else:
                     self.done[found.drive] = found
-                self._prune()
                 self.show("replaying")
         finally:
             for future in waiting:
@@ -297,7 +265,7 @@ class FleetRun:
         return " ".join(f"{type(error).__name__}: {error}".split())
 
     def _fail(self, task: DriveTask, reason: str) -> None:
-        record = failed(task, reason)
+        made = failed(task, reason)
         with ending_the_run(self.folder):
-            record.write(self.folder)
-        self.done[record.drive] = done(record)
+            made.write(self.folder)
+        self.done[made.drive] = done(self.folder, made)

@@ -1,4 +1,4 @@
-"""The work of a fleet's workers: a drive replayed to its record, a model trained for a fold."""
+"""The work of a fleet's workers: a drive replayed, a model trained for a fold."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ import numpy as np
 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import FleetSettings, OutputSettings
-from roadeval.data import BASELINE, ERRORS, Frame, FrameResult, Role, Tally
+from roadeval.data import BASELINE, ERRORS, Frame, FrameResult
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.score import final_stages
+from roadeval.evaluation.metrics import TESTED
 from roadeval.fleet.drives import DriveEntry, FleetError
 from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import asked, software
@@ -31,23 +31,22 @@ from roadeval.jobs.run.train import draw
 from roadeval.logs.truth.labels import label_files
 from roadeval.recording.layout import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
-from roadeval.results.facts import json_text
+from roadeval.results.facts import SUMMARY, Facts, json_text
 from roadeval.results.fleet import (
-    FRAMES,
+    CACHED,
     PICTURES,
     RECORDINGS,
     RESULTS,
-    Record,
-    frames_path,
-    is_final,
-    read_record,
-    record_path,
+    Made,
+    cache,
+    cached_path,
+    made_path,
+    read_made,
     recording_path,
     results_path,
 )
-from roadeval.results.rows import Key, cells, drive_row, frame_rows
+from roadeval.results.rows import drive_row
 from roadeval.results.schema import FAILED
-from roadeval.results.tables import TableFile
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, own_names, put, sha256_of
@@ -77,13 +76,16 @@ class DriveTask:
     """SHA-256 of the model file; empty where the drive trains its own."""
     fold: int | None = None
     """Whose model that is; None without folds."""
-    required: bool = False
-    """Whether a drive without a recording is not done."""
 
     @property
     def asked(self) -> str:
         """Digest of settings, software and model."""
         return asked(self.config, self.model, self.fold)
+
+    @property
+    def record(self) -> str:
+        """Whose pictures are recorded; a drive without its recording is not done."""
+        return self.config.output.record if self.config.fleet.keep == "all" else "none"
 
 
 @dataclass(frozen=True)
@@ -95,8 +97,6 @@ class Done:
     reason: str
     asked: str
     """What its record was made for."""
-    err: float | None
-    """The ERR by which the worst drives are kept; None where nothing was scored."""
     repeated: bool = False
     """Whether the drive was done before."""
 
@@ -112,51 +112,39 @@ def replay_drive(task: DriveTask) -> Done:
     model = task.config.training.model
     if task.model and sha256_of(Path(model or "")) != task.model:
         raise FleetError(f"{model}: has changed since the command began; give it again")
-    own = [record_path(task.folder, task.entry.id), frames_path(task.folder, task.entry.id)]
-    with ending_the_run(task.folder), alone(*own):
-        record, repeated = valid_record(task), True
-        if record is None:
-            record, repeated = _made(task), False
-            record.write(task.folder)
-        return done(record, repeated=repeated)
+    with ending_the_run(task.folder), alone(made_path(task.folder, task.entry.id)):
+        made, repeated = valid(task), True
+        if made is None:
+            made, repeated = _made(task), False
+            made.write(task.folder)
+        return done(task.folder, made, repeated=repeated)
 
 
-def valid_record(task: DriveTask) -> Record | None:
-    """Return the record of a drive that needs not be replayed: it is whole, and nothing changed."""
-    record = read_record(task.folder, task.entry.id)
-    if record is None or record.failed or record.asked != task.asked:
+def valid(task: DriveTask) -> Made | None:
+    """Return how a drive was made that needs not be replayed: it is whole, nothing has changed."""
+    made = read_made(task.folder, task.entry.id)
+    if made is None or made.problem or made.asked != task.asked:
         return None
-    if not record.is_whole(task.folder):
-        return None
-    if task.required and not recording_path(task.folder, record.drive).exists():
+    if task.record != "none" and not recording_path(task.folder, made.drive).exists():
         return None
     now = seen(task.entry, task.config)
-    return record if now is not None and record.stamp == now else None
+    return made if now is not None and made.stamp == now else None
 
 
-def done(record: Record, *, repeated: bool = False) -> Done:
-    """Return what a record says to the fleet's command."""
-    # The mean ERR of the first variant's final mask.
-    err = next((row["ERR"] for row in record.table("scores") if is_final(row)), None)
-    status, reason = record.value("status"), record.value("reason") or ""
-    return Done(record.drive, status, reason, record.asked, err, repeated)
+def done(folder: Path, made: Made, *, repeated: bool = False) -> Done:
+    """Return what the fleet's command is told of a drive."""
+    if made.problem:
+        return Done(made.drive, FAILED, made.problem, made.asked, repeated)
+    row = drive_row(Facts.read(results_path(folder, made.drive) / SUMMARY), "", "")
+    return Done(made.drive, row["status"], row["reason"] or "", made.asked, repeated)
 
 
-def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
-    """Return the record of a drive that could not be used; what replays have left of it goes."""
-    _remove(task, RESULTS, FRAMES, PICTURES, RECORDINGS)
-    row = {
-        "name": task.entry.name,
-        "source": task.entry.shown,
-        "status": FAILED,
-        "exit_code": exit_code,
-        "reason": reason,
-        "fold": task.fold,
-        "model": task.model or None,
-    }
-    drives = cells("drives", Key(task.entry.id, ""), [row])
-    rows = {"drives": drives, "scores": [], "effects": [], "worst": []}
-    return Record(task.entry.id, task.asked, seen(task.entry, task.config), rows)
+def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
+    """Return that a drive could not be used, and why; what replays have left of it goes."""
+    _remove(task, RESULTS, PICTURES, RECORDINGS, *CACHED)
+    stamp = seen(task.entry, task.config)
+    how = task.fold, task.model or None
+    return Made(task.entry.id, task.asked, stamp, *how, problem=reason, exit_code=exit_code)
 
 
 def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
@@ -193,11 +181,11 @@ def _check(asking: Mapping[str, str], config: RunConfig) -> None:
             )
 
 
-def _made(task: DriveTask) -> Record:
-    """Return a drive's record; whatever is wrong with the drive stands in it."""
-    before = seen(task.entry, task.config)
+def _made(task: DriveTask) -> Made:
+    """Replay a drive; whatever is wrong with it is in what is returned."""
+    stamp, started = seen(task.entry, task.config), time.perf_counter()
     try:
-        return _replayed(task, before)
+        _replay(task)
     except Exception as error:
         if _disk_failure(error):
             raise
@@ -205,39 +193,28 @@ def _made(task: DriveTask) -> Record:
         said = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
         reason = said if known else f"{type(error).__name__}: {said} (a defect of roadeval)"
         return failed(task, reason, 1 if known else 70)
+    seconds = time.perf_counter() - started
+    return Made(task.entry.id, task.asked, stamp, task.fold, task.model or None, seconds=seconds)
 
 
-def _replayed(task: DriveTask, before: Mapping[str, Any] | None) -> Record:
-    started = time.perf_counter()
+def _replay(task: DriveTask) -> None:
     drive, folder = task.entry.id, task.folder
-    record = task.config.output.record if task.config.fleet.keep != "none" else "none"
     output = OutputSettings(
-        save=str(recording_path(folder, drive)) if record != "none" else None,
+        save=str(recording_path(folder, drive)) if task.record != "none" else None,
         reports=str(results_path(folder, drive)),
-        record=record,
+        record=task.record,
         figures=False,
     )
-    own_config = replace(
+    config = replace(
         task.config, output=output, run=replace(task.config.run, jobs=1), fleet=FleetSettings()
     )
-    with TableFile(frames_path(folder, drive), "frames") as table:
-        gatherer = FrameGatherer(folder, drive, table)
-        outcome = replay(task.entry.source, own_config, on_frame=gatherer.add)
-        _remove(task, PICTURES, *([RECORDINGS] if record == "none" else []))
-        times, worst = gatherer.finish()
-    if not outcome.facts.frames.evaluated:
-        _remove(task, FRAMES)
-    row = {
-        **drive_row(outcome.facts, task.entry.name, task.entry.shown),
-        **times,
-        "fold": task.fold,
-        "model": task.model or None,
-        "seconds": time.perf_counter() - started,
-    }
-    own = {"drives": [row], **outcome.rows, "worst": worst}
-    key = Key(drive, outcome.facts.drive.camera)
-    rows = {table: cells(table, key, each) for table, each in own.items()}
-    return Record(drive, task.asked, before, rows)
+    pictures = WorstPictures()
+    outcome = replay(task.entry.source, config, on_frame=pictures.offer)
+    _remove(task, PICTURES, *CACHED, *([RECORDINGS] if task.record == "none" else []))
+    for frame, picture in pictures.kept.items():
+        put(folder / PICTURES / drive / f"{frame}.jpg", picture)
+    if outcome.facts.frames.evaluated:
+        cache(folder, drive)
 
 
 def _remove(task: DriveTask, *folders: str) -> None:
@@ -246,7 +223,7 @@ def _remove(task: DriveTask, *folders: str) -> None:
     recording = recording_path(folder, drive)
     paths = {
         RESULTS: results_path(folder, drive),
-        FRAMES: frames_path(folder, drive).parent,
+        **{name: cached_path(folder, name, drive).parent for name in CACHED},
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
     }
@@ -404,68 +381,33 @@ WIDTH: Final = 320
 """Pixels across their pictures."""
 
 
-class FrameGatherer:
-    """Takes a drive's frames in order: their rows into a table, and keeps the worst of them."""
+class WorstPictures:
+    """Keeps pictures of the worst frames of a drive, by the first variant's final mask."""
 
-    def __init__(self, folder: Path, drive: str, table: TableFile) -> None:
-        self._folder: Final = folder
-        self._drive: Final = drive
-        self._table: Final = table
-        self._stamps: list[int] = []
-        """Of the first and the last evaluated frame."""
-        self._worst: list[tuple[dict[str, Any], bytes]] = []
-        """Rows of the table ``worst`` without their ranks, and the pictures."""
+    def __init__(self) -> None:
+        self._worst: list[tuple[float, int, int, bytes]] = []
+        """ERR, number, stamp and picture of each, the worst first."""
 
-    def add(self, result: FrameResult) -> None:
-        """Add a frame; one that was not evaluated is ignored."""
-        if result.role is not Role.EVALUATED:
+    @property
+    def kept(self) -> dict[int, bytes]:
+        """The pictures by the frames' numbers."""
+        return {number: picture for _, number, _, picture in self._worst}
+
+    def offer(self, result: FrameResult) -> None:
+        """Keep a frame as long as it is one of the worst; one without a rate is ignored."""
+        frame = result.frame
+        variant = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
+        errors = [t.rates[TESTED] for t in result.tallies if t.variant == variant]
+        if variant is None or math.isnan(error := errors[-1]):
             return
-        self._stamps = [*self._stamps[:1], result.frame.stamp_ns]
-        key = self._drive, result.frame.camera
-        stages = final_stages((tally.variant, tally.stage) for tally in result.tallies)
-        self._table.add(
-            (*key, *row, stages[tally.variant] == tally.stage)
-            for tally, row in zip(result.tallies, frame_rows(result)["frames"], strict=True)
-        )
-        first = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
-        if first is not None:
-            *_, final = (tally for tally in result.tallies if tally.variant == first)
-            self._offer(result, final)
-
-    def _offer(self, result: FrameResult, tally: Tally) -> None:
-        """Keep a frame as long as it is one of the worst."""
-        frame, err = result.frame, tally.rates["ERR"]
-        near = [w for w in self._worst if abs(w[0]["stamp_ns"] - frame.stamp_ns) < APART_NS]
-        rest = [w for w in self._worst if w not in near]
+        near = [kept for kept in self._worst if abs(kept[2] - frame.stamp_ns) < APART_NS]
+        rest = [kept for kept in self._worst if kept not in near]
         rivals = [*near, *(rest[-1:] if len(rest) == WORST else [])]
-        if math.isnan(err) or any(row["ERR"] >= err for row, _ in rivals):
+        if any(rival >= error for rival, *_ in rivals):
             return
         # Painted when they are small: most are soon replaced by a worse frame's.
-        image, errors = shrink(frame.image, WIDTH), result.errors[tally.variant].array
-        small = shrink(errors.astype(np.uint8, copy=False), WIDTH, labels=True)
+        image, errors_of = shrink(frame.image, WIDTH), result.errors[variant].array
+        small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
-        row = {
-            "frame": frame.number,
-            "stamp_ns": frame.stamp_ns,
-            "variant": tally.variant,
-            "stage": tally.stage,
-            **{name: tally.rates[name] for name in ("ERR", "FPR", "FNR")},
-            "picture": Path(PICTURES, self._drive, f"{frame.number}.jpg").as_posix(),
-        }
-        ranked = sorted([*rest, (row, picture)], key=lambda w: (-w[0]["ERR"], w[0]["frame"]))
-        self._worst = ranked[:WORST]
-
-    def finish(self) -> tuple[dict[str, int], list[dict[str, Any]]]:
-        """Finish the table, write the worst frames' pictures; return when frames are, and which.
-
-        The cells of a drive's row on its first and last evaluated frame, and the rows of ``worst``,
-        whose ranks are given over all drives later. An OSError if a file cannot be written.
-        """
-        times = {}
-        if self._stamps:
-            self._table.finish()
-            times = {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
-        for row, picture in self._worst:
-            put(self._folder / row["picture"], picture)
-        rows = [{"rank": rank, **row} for rank, (row, _) in enumerate(self._worst, 1)]
-        return times, rows
+        ranked = [*rest, (error, frame.number, frame.stamp_ns, picture)]
+        self._worst = sorted(ranked, key=lambda kept: (-kept[0], kept[1]))[:WORST]

@@ -23,7 +23,9 @@ from roadeval.data import Calibration, FrameResult, Role, VariantLayout
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.score import BlindPrior, FitCheck, Scoreboard
+from roadeval.evaluation.score.fit import FitCheck
+from roadeval.evaluation.score.frame import BlindPrior
+from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.logs.errors import FrameError
@@ -235,7 +237,8 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     )
     prior = None if model.prior is None else BlindPrior(model.prior)
     names = [layout.name for layout in layouts]
-    board = Scoreboard(config.evaluation, names, prior, selection.ground_as_read)
+    key = Key(log.name, camera or selection.image.name)
+    board = Scoreboard(key, config.evaluation, names, prior, selection.ground_as_read)
     return Run(
         log,
         config,

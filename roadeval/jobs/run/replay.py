@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
+from roadeval.evaluation.score.scoreboard import DriveSums
+from roadeval.evaluation.tables import joined
 from roadeval.fleet.remote import readable
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -22,7 +24,7 @@ from roadeval.recording.recorder import NullRecorder, Recorder, recorder_for
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
-from roadeval.results.rows import Row, as_arrays, csv_lines, effect_rows, score_rows, sum_rows
+from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
@@ -43,8 +45,6 @@ class Outcome:
     files: tuple[Path, ...]
     tracebacks: tuple[str, ...] = ()
     """Where in their code stages failed that are among the losses."""
-    rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
-    """Those of the tables ``scores`` and ``effects``."""
     metres: tuple[Mapping[str, Any], ...] = ()
     """The rows of ``metres``; empty of a rig, and of a camera that is not known."""
 
@@ -133,15 +133,14 @@ def _written(
             with results.explained():
                 names = short_names([*cameras])
                 for camera, own in zip(cameras, ended, strict=True):
-                    windows = as_arrays("windows", own.windows)
-                    write_figures(results.folder, log.name, windows, drawn[camera], names[camera])
+                    windows, shown = own.sums.windows, drawn[camera]
+                    write_figures(results.folder, log.name, windows, shown, names[camera])
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
     return Outcome(
         *(to.recording, to.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
         tuple(files),
         tracebacks=tracebacks,
-        rows={name: [row for own in ended for row in own.rows[name]] for name in ended[0].rows},
         metres=ended[0].metres if len(ended) == 1 else (),
     )
 
@@ -151,29 +150,20 @@ class _Ended:
     """What a camera's run has found."""
 
     facts: Facts
+    sums: DriveSums
     texts: Mapping[str, str]
     """Of its results, as the recording keeps them."""
-    windows: Sequence[Row]
-    rows: Mapping[str, list[dict[str, Any]]]
-    """Those of ``scores`` and ``effects``."""
     metres: tuple[Mapping[str, Any], ...]
 
 
 def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _Ended:
     """Sum up a camera's run, and add the sums to the tables."""
-    rows = sum_rows(run.board)
-    sums = csv_lines(run.key, rows)
-    results.append(sums)
-    shown = [each.frame for each in examples]
-    facts = summary.of(run, shown, {} if run.camera else results.tables)
-    scores = list(score_rows(facts, run.board.regions()))
-    return _Ended(
-        facts,
-        _texts(run, facts, sums),
-        rows["windows"],
-        {"scores": scores, "effects": list(effect_rows(facts))},
-        tuple(run.board.metres()),
-    )
+    sums = run.board.summary()
+    lines = csv_lines(run.key, sum_rows(run.board, sums.windows))
+    results.append(lines)
+    shown = [example.frame for example in examples]
+    facts = summary.of(run, sums, shown, {} if run.camera else results.tables)
+    return _Ended(facts, sums, _texts(run, facts, lines), tuple(run.board.metres()))
 
 
 def _finished(
@@ -188,7 +178,8 @@ def _finished(
         recorder.finish(ended[0].texts)
         return ended[0].facts
     found = {run.camera: own.facts for run, own in zip(runs, ended, strict=True)}
-    facts = summary.of_cameras([run.board for run in runs], found, results.tables)
+    frames = joined([own.sums.frames for own in ended])
+    facts = summary.of_cameras(frames, found, results.tables)
     # The seconds differ from run to run, see `_texts`.
     steady = {name: replace(each, seconds={}) for name, each in found.items()}
     kept = replace(facts, run=deciding(config).as_dict(), cameras=steady)

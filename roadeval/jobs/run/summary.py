@@ -8,28 +8,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib.metadata import version
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from roadeval.config.variants import AS_IT_IS
 from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
+from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import METRICS, SHORT
-from roadeval.evaluation.score import (
-    LAST_LAG,
-    TRUTH,
-    Finding,
-    FitCheck,
-    Misfit,
-    Scoreboard,
-    Unlabelled,
-    drive_effects,
-    final_stages,
-    over_cameras,
-    scene_ns,
-    sign_of,
-    worst,
-)
+from roadeval.evaluation.score.fit import LAST_LAG, TRUTH, Finding, FitCheck, Misfit
+from roadeval.evaluation.score.scoreboard import DriveSums, drive_effects
+from roadeval.evaluation.score.unlabelled import Unlabelled, sign_of
 from roadeval.evaluation.stats import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.logs.errors import FrameError
@@ -45,13 +34,16 @@ from roadeval.results.facts import (
     Facts,
     FrameAccount,
     LogFacts,
+    Totals,
     TrainingFacts,
     UnlabelledFacts,
-    as_parts,
 )
 from roadeval.results.sentences import misfit, verdict
 from roadeval.results.tables import TableFacts
 from roadeval.version import VERSION
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FEW: Final = 12
 """Frames of a log that are looked at, with their neighbours, where nothing is replayed."""
@@ -62,12 +54,15 @@ RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
-def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
-    """Return the facts of a run at its end, with the frames of figure 2 and the tables' sums."""
-    found, effects = run.board.summary(), run.board.effects()
+def of(run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFacts]) -> Facts:
+    """Return the facts of a run at its end, with the frames of figure 2.
+
+    ``stated`` are rows and checksums of the tables.
+    """
+    found, effects = sums.parts, sums.effects
     settings = run.config.training
     given = settings.model is not None and not settings.adapt
-    unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run)
+    unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run, sums.frames)
     thresholds = dict(_thresholds(run))
     varying = ["The images' sizes vary."] if run.frames.accounting.odd_sizes else []
     misfits = [*_misfits(run)]
@@ -78,7 +73,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
     )
     return Facts(
         **found,
-        **as_parts(effects),
+        effects=[*effects],
         verdict=" ".join([*misfits, said, *varying]),
         misfits=misfits,
         unlabelled=unlabelled,
@@ -89,6 +84,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             run.key.camera,
             *(run.selection.size or (0, 0)),
             rate_hz=run.selection.image.rate_hz,
+            **sums.times,
             topics=[*run.selection.reasons, *run.config.ignored()],
             calibration=run.calibration,
             ground=run.selection.ground_as_read,
@@ -103,7 +99,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
             None if given else "picked" if run.schedule.picks else settings.placement,
             settings.adapt,
         ),
-        warnings=list(warnings(run)),
+        warnings=list(warnings(run, found["totals"])),
         losses=list(losses(run)),
         run=run.config.as_dict(),
         settings={each.name: each.pipeline.as_dict() for each in run.variants},
@@ -111,7 +107,7 @@ def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
         versions=versions(),
         log=LogFacts(run.log.source, run.log.digest),
         masks=_masks(run),
-        tables=tables,
+        tables=stated,
     )
 
 
@@ -121,38 +117,34 @@ def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
     if not len(rows):
         return None
     first = str(rows["variant"][0])
-    sign, look_at = sign_of(rows, first), []
+    sign, look_at = sign_of(rows), []
     if sign is not None:
-        apart = scene_ns(rows["stamp_ns"])
-        look_at = worst(rows, first, LOOKED_AT, apart, by=sign)["frame"].tolist()
+        apart = tables.scene_ns(rows["stamp_ns"])
+        look_at = tables.worst(rows, LOOKED_AT, sign, apart)["frame"].tolist()
     differing = as_tree(frames.differing().items())
     return UnlabelledFacts(len(rows), first, sign, look_at, differing)
 
 
-def _estimate(run: Run) -> EstimateFacts | None:
+def _estimate(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
     """Estimate the final masks' rates on the whole drive, from frames that were drawn at random."""
     picks = run.schedule.picks
     if picks is None:
         return None
-    masks, every = run.board.masks(), picks.every_score()
-    finals = final_stages(mask.name for mask in masks)
+    every, confidence = picks.every_score(), run.config.evaluation.confidence
     rates: dict[str, dict[str, Estimate]] = {}
     problem = _not_random(run, picks)
-    for mask in masks:
-        if problem or finals[mask.variant] != mask.stage:
-            continue
-        for number, rate in enumerate(METRICS):
-            values = mask.rates[:, number]
-            known = np.isfinite(values)
-            if rate in SHORT and known.any():
-                stamps = mask.stamps[known].tolist()
-                scores = every[[picks.places[float(stamp)] for stamp in stamps]]
-                found = estimate(values[known], scores, every, run.config.evaluation.confidence)
-                rates.setdefault(mask.variant, {})[rate] = found
+    finals = tables.finals(frames.iloc[:0] if problem else frames)
+    for (variant,), rows in tables.grouped(finals, ["variant"]):
+        for rate in (rate for rate in METRICS if rate in SHORT):
+            known = rows[rows[rate].notna()]
+            if len(known):
+                scores = every[[picks.places[float(stamp)] for stamp in known["stamp_ns"]]]
+                values = known[rate].to_numpy()
+                rates.setdefault(variant, {})[rate] = estimate(values, scores, every, confidence)
     apart: dict[str, dict[str, float | None]] = {
         str(frame): dict(own) for frame, own in run.board.apart.items()
     }
-    labels = len({frame for mask in masks for frame in mask.frames.tolist()})
+    labels = frames["frame"].nunique()
     chance = picks.drawn / len(every)
     return EstimateFacts(len(every), picks.drawn, labels, chance, rates, apart, problem)
 
@@ -239,18 +231,13 @@ def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def of_cameras(
-    boards: Sequence[Scoreboard], found: Mapping[str, Facts], tables: dict[str, TableFacts]
+    frames: pd.DataFrame, found: Mapping[str, Facts], stated: dict[str, TableFacts]
 ) -> Facts:
     """Return the facts of a rig: of its cameras together, each of which counts the same."""
     first, *_ = found.values()
-    by_mask: defaultdict[tuple[str, str], list[Any]] = defaultdict(list)
-    for own in found.values():
-        for variant, stages in own.totals.items():
-            for stage, total in stages.items():
-                by_mask[variant, stage].append(total)
-    totals = as_tree((mask, over_cameras(sums)) for mask, sums in by_mask.items())
-    settings = first.evaluation
-    effects = drive_effects([board.masks() for board in boards], settings)
+    by_camera = tables.totals(frames, ["camera", *tables.MASK])
+    totals = tables.as_trees(tables.over_cameras(by_camera))
+    effects = drive_effects(frames, first.evaluation)
     misfits = [f"{name}: {text}" for name, own in found.items() for text in own.misfits]
     claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
     accounts = [asdict(each.frames) for each in found.values()]
@@ -260,7 +247,7 @@ def of_cameras(
     counted = {name: sum(each[name] or 0 for each in accounts) for name in accounts[0]}
     return replace(
         first,
-        **as_parts(effects),
+        effects=effects,
         verdict=" ".join([*misfits, verdict(totals, effects, claims)]),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
@@ -278,7 +265,7 @@ def of_cameras(
         seconds={},
         examples=[],
         training=TrainingFacts(first.training.source, model=first.training.model),
-        tables=tables,
+        tables=stated,
         cameras={**found},
     )
 
@@ -305,7 +292,7 @@ def versions() -> dict[str, str]:
     return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
 
-def warnings(run: Run) -> tuple[str, ...]:
+def warnings(run: Run, totals: Totals) -> tuple[str, ...]:
     """List what a user should know before believing the results."""
     missing = run.selection.no_truth
     unlabelled = f"there is no road truth to score against, only masks to look at: {missing}"
@@ -336,10 +323,10 @@ def warnings(run: Run) -> tuple[str, ...]:
         *tuple(warned),
         *_taken(run),
         *_tuned(run),
-        *_missing(run),
+        *_missing(run, totals),
         *_near_training(run),
         *_of_picks(run),
-        *_constant(run),
+        *_constant(totals),
         *run.model.warnings,
     )
 
@@ -437,10 +424,9 @@ def losses(run: Run) -> tuple[str, ...]:
     return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
 
 
-def _missing(run: Run) -> Iterator[str]:
+def _missing(run: Run, totals: Totals) -> Iterator[str]:
     """Yield a warning where masks of other systems are missing, or belong to no frame."""
     seen = run.frames.accounting
-    totals = run.board.totals()
     for name, masks in run.selection.labels.items():
         if name in run.selection.masks and (missing := seen.read - seen.masks[name]):
             without = f"{name}: {missing} of the {seen.read} frames read have no mask of it"
@@ -487,9 +473,9 @@ def _near_training(run: Run) -> Iterator[str]:
         )
 
 
-def _constant(run: Run) -> Iterator[str]:
+def _constant(totals: Totals) -> Iterator[str]:
     """Warn of variants whose final mask is road nowhere, or everywhere."""
-    for variant, stages in run.board.totals().items():
+    for variant, stages in totals.items():
         *_, total = stages.values()
         for share, where in ((0, "nowhere"), (1, "everywhere")):
             if variant != BASELINE and total["pooled_TPR"] == total["pooled_FPR"] == share:

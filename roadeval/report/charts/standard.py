@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, Rows
-from roadeval.data.result import Cells
+from roadeval.data import BASELINE
+from roadeval.data.arrays import Floats
 from roadeval.data.words import DASH, in_percent
-from roadeval.evaluation import score
-from roadeval.evaluation.metrics import METRICS, SHORT
-from roadeval.evaluation.score import Thresholds, merged
+from roadeval.evaluation.metrics import METRICS, SHORT, TESTED
+from roadeval.evaluation.score.thresholds import LEVELS, Thresholds
+from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.tables import MASK, finals, grouped, merged, only, values_of
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import (
     BETTER,
@@ -32,7 +33,9 @@ from roadeval.report.chart import (
 from roadeval.runtime.discovery import found_in
 
 if TYPE_CHECKING:
-    from roadeval.evaluation.comparison import Change
+    import pandas as pd
+
+    from roadeval.evaluation.comparison.compare import Change
     from roadeval.results.facts import Totals
 
 
@@ -41,7 +44,7 @@ class OverDrive:
     """A figure of a drive's report."""
 
     caption: str
-    charts: Callable[[Rows], Sequence[Chart]]
+    charts: Callable[[pd.DataFrame], Sequence[Chart]]
     """Return its charts of the rows of ``windows.csv``, any number of variants; or none."""
 
 
@@ -50,7 +53,7 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
     from roadeval.report import charts
 
     return (
-        OverDrive("The paper's figure 3a: error rate.", lambda rows: over_windows(rows, ["ERR"])),
+        OverDrive("The paper's figure 3a: error rate.", lambda rows: over_windows(rows, [TESTED])),
         OverDrive(
             "The paper's figure 3b: false positive and false negative error rates.",
             lambda rows: over_windows(rows, ["FPR", "FNR"]),
@@ -60,51 +63,41 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
     )
 
 
-def _further_rates(windows: Rows) -> list[Chart]:
+def _further_rates(windows: pd.DataFrame) -> list[Chart]:
     """Return a chart of each rate of short tables that the paper's figures lack."""
-    further = [name for name in SHORT if name not in ("ERR", "FPR", "FNR")]
+    further = [name for name in SHORT if name not in (TESTED, "FPR", "FNR")]
     # In results that were made before a metric was added it is undefined everywhere.
-    known = [name for name in further if len(windows) and not np.isnan(windows[name]).all()]
-    return over_windows(windows, known)
+    return over_windows(windows, [name for name in further if windows[name].notna().any()])
 
 
 def over_windows(
-    windows: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+    windows: pd.DataFrame, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
 ) -> list[Chart]:
     """Return a chart a rate: each variant's final mask, window by window."""
-    if not len(windows):
-        return []
-    final = score.finals(windows)
-    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
+    middles = (windows["first_frame"] + windows["last_frame"]) / 2
+    return over_frames(windows.assign(frame=middles), rates, drawn)
 
 
 def over_frames(
-    frames: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+    frames: pd.DataFrame, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
 ) -> list[Chart]:
     """Return a chart a rate: each variant's final mask, frame by frame."""
-    final = score.finals(frames)
-    return _along(final, final["frame"], rates, drawn)
-
-
-def _along(
-    final: Rows, x: Cells, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
-) -> list[Chart]:
-    """Return a chart a rate of rows that lie at ``x`` along the drive."""
-    order = np.argsort(x, kind="stable")
-    rows = final.take(order).replace(x=x[order])
-    names = final.distinct("variant")
-    drawn = drawn or looks(names)
+    if not len(frames):
+        return []
+    rows = finals(frames)
+    drawn = drawn or looks(values_of(rows, "variant"))
+    rows = rows.sort_values("frame", kind="stable")
+    parts = {name: only(rows, variant=name) for name in drawn}
     return [
         Chart(
-            f"{rate}: {score.SIGNS[rate] if rate in score.SIGNS else METRICS[rate].in_words}",
+            f"{rate}: {SIGNS[rate] if rate in SIGNS else METRICS[rate].in_words}",
             ChartKind.LINES,
             [
-                thinned(series(name, look, own["x"], 100 * own[rate]))
-                for name, look in drawn.items()
-                if name in names
-                for own in [rows.of_variant(name)]
+                thinned(series(name, drawn[name], own["frame"], 100 * own[rate]))
+                for name, own in parts.items()
+                if len(own)
             ],
-            from_zero=rate in score.SIGNS or not METRICS[rate].higher_is_better,
+            from_zero=rate in SIGNS or not METRICS[rate].higher_is_better,
         )
         for rate in rates
     ]
@@ -113,14 +106,18 @@ def _along(
 def stages(totals: Totals) -> list[Chart]:
     """Return a chart a rate: each stage's mask, a line a variant."""
     names = merged(own for variant, own in totals.items() if variant != BASELINE)
+
+    def line(variant: str, look: Look, rate: str) -> Series:
+        own = {stage: in_percent(total.get(rate)) for stage, total in totals[variant].items()}
+        if variant == BASELINE:  # it has no stages: a level
+            own = dict.fromkeys(names, *own.values())
+        return series(variant, look, map(names.index, own), [*own.values()])
+
     return [
         Chart(
             f"{rate}: {metric.in_words}",
             ChartKind.LINES,
-            [
-                _of_stages(variant, look, totals[variant], names, rate)
-                for variant, look in looks([*totals]).items()
-            ],
+            [line(variant, look, rate) for variant, look in looks([*totals]).items()],
             names=names,
             from_zero=not metric.higher_is_better,
         )
@@ -128,46 +125,29 @@ def stages(totals: Totals) -> list[Chart]:
     ]
 
 
-def _of_stages(
-    variant: str, look: Look, own: Mapping[str, Mapping[str, Any]], names: Sequence[str], rate: str
-) -> Series:
-    """Return a variant's rate by stage; of the baseline, which has no stages, a level."""
-    if variant == BASELINE:
-        (total,) = own.values()
-        return series(variant, look, range(len(names)), [in_percent(total.get(rate))] * len(names))
-    values = [in_percent(total.get(rate)) for total in own.values()]
-    return series(variant, look, [names.index(stage) for stage in own], values)
+_OF_REGIONS: Final = ("ERR within the region", "Share of the wrong pixels")
 
 
-_OF_REGIONS: Final = {"ERR": "ERR within the region", "errors": "Share of the wrong pixels"}
-
-
-def regions(
-    found: Mapping[tuple[str, str], Mapping[str, float]],
-    variants: Sequence[str],
-    titles: Mapping[str, str],
-) -> list[Chart]:
+def regions(rates: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, str]) -> list[Chart]:
     """Return the error rate in each region, and its share of the errors beside that of pixels.
 
-    ``found`` is as `roadeval.evaluation.score.by_region` returns it. Drawn are the ``variants`` and
-    the regions of ``titles``, from top to bottom.
+    ``rates`` are as of `roadeval.evaluation.tables.by_region`. Drawn are the ``variants`` and the
+    regions of ``titles``, from top to bottom.
     """
-
-    def column(name: str, variant: str) -> list[float]:
-        return [in_percent(found.get((region, variant), {}).get(name)) for region in titles]
-
+    names, rates = rates.index.get_level_values("variant"), 100 * rates.droplevel("variant")
+    percents = {variant: rates[names == variant].reindex([*titles]) for variant in variants}
     return [
         Chart(
             title,
             ChartKind.MARKS,
             [
-                series(variant, look, range(len(titles)), column(name, variant))
+                series(variant, look, range(len(titles)), percents[variant][rate])
                 for variant, look in looks(variants).items()
             ],
             names=[*titles.values()],
-            share=column("pixels", variants[0]) if name == "errors" else (),
+            share=percents[variants[0]]["pixels"].tolist() if rate == "errors" else (),
         )
-        for name, title in _OF_REGIONS.items()
+        for rate, title in zip((TESTED, "errors"), _OF_REGIONS, strict=True)
     ]
 
 
@@ -219,15 +199,16 @@ Interval = tuple[float | None, float | None, float | None]
 """A mean and the ends of its interval, as fractions."""
 
 
-def difference(
-    frames: Cells, changes: Cells, treated: str, control: str, mean: Difference
-) -> Chart:
-    """Return the paired difference of ERR, frame by frame, and its mean with the interval."""
+def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference) -> Chart:
+    """Return the paired difference of ERR, frame by frame, and its mean with the interval.
+
+    ``pairs`` are as of `roadeval.evaluation.tables.changes`.
+    """
     look = looks([treated, control])[treated]
     return Chart(
         f"ERR of {treated} minus {control}",
         ChartKind.LINES,
-        [thinned(series("each frame", look, frames, 100 * changes))],
+        [thinned(series("each frame", look, pairs["frame"], 100 * pairs["change"]))],
         unit="pp",
         level=Level(
             "mean" if mean.low is None else "mean and its interval",
@@ -255,45 +236,35 @@ def changes(finals: Sequence[Change]) -> list[Chart]:
     ]
 
 
-@dataclass(frozen=True)
-class ForestRow:
-    """A drive's difference as a fraction; lower is better."""
-
-    name: str
-    group: str | None
-    mean: float
-    low: float | None
-    high: float | None
-    """Ends of its interval, or None."""
-
-
-def forest(rows: Sequence[ForestRow], over: Difference, label: str) -> Figure:
+def forest(drives: pd.DataFrame, over: Difference, label: str) -> Figure:
     """Return every drive's difference with its interval, the worst first, and that over drives.
 
-    Of many drives only the worst and the best.
+    ``drives`` has a row a drive: its ``name`` and ``group``, and the ``mean``, ``low`` and ``high``
+    of its difference as fractions; lower is better. Of many only the worst and the best are drawn.
     """
-    ranked = sorted(rows, key=lambda row: (-row.mean, row.name))
+    ranked = drives.sort_values(["mean", "name"], ascending=[False, True])
     told = ["A row a drive, with its own interval, the worst above."]
-    if len(rows) > DRAWN:
-        rows = ranked = ranked[: DRAWN // 2] + ranked[-DRAWN // 2 :]
-        told.append(f"Of all drives the {DRAWN // 2} worst and the {DRAWN // 2} best.")
-    names = [row.name if row.group is None else f"{row.name} ({row.group})" for row in ranked]
-    drives = [
-        _intervals(word, look, own, [(r.mean, r.low, r.high) for r in (ranked[p] for p in own)])
+    if len(ranked) > DRAWN:
+        half = DRAWN // 2
+        ranked = ranked.iloc[[*range(half), *range(-half, 0)]]
+        told.append(f"Of all drives the {half} worst and the {half} best.")
+    groups = ranked["group"].astype(object).fillna("")
+    rows = zip(ranked["name"], groups, strict=True)
+    names = [f"{name} ({group})" if group else name for name, group in rows]
+    is_worse, ends = (ranked["mean"] > 0).to_numpy(), ranked[["mean", "low", "high"]].to_numpy()
+    shown = [
+        _intervals(word, look, np.flatnonzero(own).tolist(), ends[own])
         for word, look, own in (
-            ("worse", Look(WORSE), [p for p, row in enumerate(ranked) if row.mean > 0]),
-            ("better", Look(BETTER), [p for p, row in enumerate(ranked) if row.mean <= 0]),
+            ("worse", Look(WORSE), is_worse),
+            ("better", Look(BETTER), ~is_worse),
         )
     ]
-    drives.append(
-        _intervals(
-            MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [(over.mean, over.low, over.high)]
-        )
-    )
-    chart = Chart(label, ChartKind.MARKS, drives, [*names, MEAN], "pp", sums=1)
-    if any(row.group for row in rows):
+    mean = [(over.mean, over.low, over.high)]
+    shown.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], mean))
+    chart = Chart(label, ChartKind.MARKS, shown, [*names, MEAN], "pp", sums=1)
+    if (groups != "").any():
         told.append("In brackets the group that it belongs to.")
-    if missing := sum(row.low is None for row in rows):
+    if missing := ranked["low"].isna().sum():
         told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
     if over.low is None:
         told.append("The mean has no interval: too few drives or groups of drives.")
@@ -301,14 +272,10 @@ def forest(rows: Sequence[ForestRow], over: Difference, label: str) -> Figure:
 
 
 def _intervals(
-    name: str,
-    look: Look,
-    places: Sequence[int],
-    found: Sequence[Interval],
+    name: str, look: Look, places: Sequence[int], means: Sequence[Interval] | Floats
 ) -> Series:
     """Return means and the ends of their intervals, all as fractions, as a series."""
-    columns = ([in_percent(each) for each in column] for column in zip(*found, strict=True))
-    mean, low, high = columns if found else ([], (), ())
+    mean, low, high = (100 * np.array([*means], float).reshape(-1, 3)).T.tolist()
     return Series(name, look, [*places], mean, low, high)
 
 
@@ -324,46 +291,44 @@ BINS: Final = 16
 """Parts of the range of probabilities in a chart of reliability."""
 
 
-def reliability(levels: Rows, totals: Totals) -> Chart:
+def reliability(levels: pd.DataFrame, totals: Totals) -> Chart:
     """Return the share of road among the pixels that are called so probable, a line a variant.
 
     Arguments are as of `precision_over_recall`.
     """
     drawn = looks([*totals])
     lines = [series("as it says", Look(FAINT, "dotted"), [0, 100], [0, 100])]
-    for (name, _), places in levels.groups("variant", "stage"):
-        rows = levels.take(places)
+    for (name, _), rows in grouped(levels, MASK):
         pixels = rows["other"] + rows["road"]
-        part = rows["level"] * BINS // score.LEVELS
-        stated = rows["level"] / (score.LEVELS - 1) * pixels
-        sums = (np.bincount(part, each, BINS) for each in (pixels, stated, rows["road"]))
-        count, said, road = (own[np.unique(part)] for own in sums)
+        stated = rows["level"] / (LEVELS - 1) * pixels
+        sums = rows.assign(pixels=pixels, stated=stated).groupby(rows["level"] * BINS // LEVELS)
+        count, said, road = (sums[column].sum() for column in ("pixels", "stated", "road"))
         lines.append(series(name, drawn[name], 100 * said / count, 100 * road / count))
     ends = (0.0, MOST)
     title, across = "share that is road", "probability of road"
     return Chart(title, ChartKind.LINES, lines, across=across, x_range=ends, y_range=ends)
 
 
-def precision_over_recall(levels: Rows, totals: Totals) -> Chart:
+def precision_over_recall(levels: pd.DataFrame, totals: Totals) -> Chart:
     """Return a curve for each variant that says how probable road is, and a mark for each mask.
 
     ``levels`` are as in ``probabilities.csv``, ``totals`` as in ``summary.json``. Axes begin where
     the masks lie.
     """
     drawn, curves = looks([*totals]), []
-    for (name, _), places in levels.groups("variant", "stage"):
-        rows = levels.take(places)
-        found = Thresholds.of(np.stack([rows["other"], rows["road"]]))
-        if found.road:
-            curves.append(series(name, drawn[name], 100 * found.recall, 100 * found.precision))
+    for (name, _), rows in grouped(levels, MASK):
+        curve = Thresholds.of(rows[["other", "road"]].to_numpy().T)
+        if curve.road:
+            curves.append(series(name, drawn[name], 100 * curve.recall, 100 * curve.precision))
     masks = {}
     for name, stages in totals.items():
         *_, total = stages.values()
-        at = in_percent(total["pooled_TPR"]), in_percent(score.overlap(total)["precision"])
+        at = in_percent(total["pooled_TPR"]), in_percent(total.get("pooled_precision"))
         if all(map(math.isfinite, at)):
             masks[name] = at
     marks = [series(f"{name}: the mask", drawn[name], [x], [y]) for name, (x, y) in masks.items()]
     least = [min([LEAST_AXIS, *values]) for values in zip(*masks.values(), strict=True)]
     across, up = ((each // STEP * STEP, MOST) for each in least or [LEAST_AXIS] * 2)
-    drawings, lines = [*curves, *marks], ChartKind.LINES
-    return Chart("precision", lines, drawings, across="recall", x_range=across, y_range=up)
+    lines = [*curves, *marks]
+    title, kind = "precision", ChartKind.LINES
+    return Chart(title, kind, lines, across="recall", x_range=across, y_range=up)

@@ -3,31 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
+from roadeval.data.arrays import Floats
 from roadeval.data.words import DASH, defined, number, percent, points
+from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
-from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.score import Effect, merged
-from roadeval.report.blocks import (
-    Block,
-    Cell,
-    Details,
-    Figure,
-    Heading,
-    ImageGrid,
-    Table,
-    Text,
-)
+from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.evaluation.tables import merged, only, perfect_stages
+from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import difference, figures_over_drive
+from roadeval.report.charts.standard import figures_over_drive
 from roadeval.report.findings import Findings
 from roadeval.report.images import ExampleFrame, LayerImage, heat_map, jpeg, pictures_of
-from roadeval.report.tables import differences_table, stages_table, thresholds_table, variant_cell
+from roadeval.report.tables import (
+    OTHERS,
+    differences_table,
+    stages_table,
+    thresholds_table,
+    variant_cell,
+)
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import CLAIMED, correction
 
@@ -61,11 +61,11 @@ def _examples(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
 
 def _claims(findings: Findings) -> Iterator[Block]:
     """Tabulate in how many windows the paper's claims are borne out."""
-    found = findings.facts.claims
+    claims = findings.facts.claims
     rows = [
-        [words, f"{found[name]['held']} of {found[name]['windows']}"]
+        [words, f"{claims[name]['held']} of {claims[name]['windows']}"]
         for name, words in CLAIMED.items()
-        if name in found
+        if name in claims
     ]
     if rows:
         yield Table(
@@ -83,23 +83,23 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         yield Heading("What the filter and the variants change")
         yield differences_table(findings.facts)
         yield Text(_method(effects), "note")
-    pairs = findings.filtered
-    for each in effects if len(pairs) else ():
-        if (each.variant, each.base) != (FILTERED, UNFILTERED):
-            continue
-        if not defined((change := each.rates["ERR"]).mean):
-            yield Text("ERR is undefined on every frame, so what the filter does to it is unknown.")
-            continue
-        if findings.pixels:
-            yield Text(pixels_changed(*findings.pixels, int(pairs["wrong"].sum())))
-        drawn = difference(pairs["frame"], pairs["ERR"], FILTERED, UNFILTERED, change)
+    pairs = tables.changes(findings.table("frames"), FILTERED, UNFILTERED)
+    of_filter = (each for each in effects if (each.variant, each.base) == (FILTERED, UNFILTERED))
+    change = next((each.rates[TESTED] for each in of_filter if len(pairs)), None)
+    if change and not defined(change.mean):
+        yield Text("ERR is undefined on every frame, so what the filter does to it is unknown.")
+    elif change:
+        steps = only(findings.table("changes"), from_variant=UNFILTERED, to_variant=FILTERED)
+        for row in steps[steps["N"] > 0].to_dict("records"):  # none of a killed run
+            yield Text(pixels_changed(row, int(pairs["wrong"].sum())))
+        drawn = charts.difference(pairs, FILTERED, UNFILTERED, change)
         caption = f"ERR of {FILTERED} minus {UNFILTERED}, frame by frame; below 0 the filter helps."
         yield Figure([drawn], caption)
     yield from _over_time(findings)
 
 
 def _method(effects: Sequence[Effect]) -> str:
-    changes = [each.rates["ERR"] for each in effects]
+    changes = [each.rates[TESTED] for each in effects]
     told = [
         f"Final masks. {BASELINE}: a guess that never looks at the image, the training frames' "
         "mean truth thresholded at one half."
@@ -115,16 +115,16 @@ def _method(effects: Sequence[Effect]) -> str:
     return " ".join(filter(None, [*told, correction(changes)]))
 
 
-def pixels_changed(right: int, wrong: int, labelled: int, net: int) -> str:
+def pixels_changed(step: Mapping[Any, Any], net: int) -> str:
     """Return which share of the pixels the filter made right and wrong, and what remains.
 
-    ``net`` is the change of wrong pixels, frame by frame.
+    ``step`` is its row of ``changes``, ``net`` the change of wrong pixels, frame by frame.
     """
+    right, wrong = (percent(step[name] / step["N"]) for name in ("repaired", "spoiled"))
     change = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
     return (
-        f"Of the labelled pixels of all evaluated frames, {percent(right / labelled)} % are "
-        f"newly right with the filter and {percent(wrong / labelled)} % newly wrong; over all "
-        f"frames that leaves {change}."
+        f"Of the labelled pixels of all evaluated frames, {right} % are newly right with the "
+        f"filter and {wrong} % newly wrong; over all frames that leaves {change}."
     )
 
 
@@ -134,28 +134,28 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     known = {name: own | own["episodes"] for name, own in beyond if "episodes" in own}
     if not known:
         return
+    lines: list[list[Cell | str]] = []
+    for name, own in known.items():
+        flicker = own["flicker"]
+        lines.append(
+            [
+                variant_cell(name, [*findings.finals]),
+                Cell(percent(flicker), bold=True),
+                percent(own["truth_flicker"]),
+                points(flicker - own["truth_flicker"]) if defined(flicker) else DASH,
+                *(number(own[count]) for count in ("pairs", "episodes")),
+                *(f"{own[time]:.1f}" for time in ("seconds", "longest")),
+                percent(own["share"]),
+                number(own["recovered"]),
+                f"{own['recovery']:.1f}" if own["recovered"] else DASH,
+            ]
+        )
     table = Table(
         [
             *("final mask", "flicker, %", "the truth's, %", "beyond it, pp", "pairs"),
             *("n", "seconds", "longest", "share, %", "recovered", "median recovery"),
         ],
-        [
-            [
-                variant_cell(name, [*findings.finals]),
-                Cell(percent(each["flicker"]), bold=True),
-                percent(each["truth_flicker"]),
-                points(each["flicker"] - each["truth_flicker"])
-                if defined(each["flicker"])
-                else DASH,
-                number(each["pairs"]),
-                number(each["episodes"]),
-                *(f"{each[time]:.1f}" for time in ("seconds", "longest")),
-                percent(each["share"]),
-                number(each["recovered"]),
-                f"{each['recovery']:.1f}" if each["recovered"] else DASH,
-            ]
-            for name, each in known.items()
-        ],
+        lines,
         groups=[("", 1), ("from frame to frame", 4), ("error episodes, seconds", 6)],
         small=True,
     )
@@ -172,12 +172,12 @@ def _over_time(findings: Findings) -> Iterator[Block]:
 
 def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     """Yield in which parts of the image the errors are, of a drive or of many together."""
-    if not findings.regions:
+    if findings.regions.empty:
         return
     yield Heading("Where the errors are")
-    found = dict.fromkeys(region for region, _ in findings.regions)
     # What counts cells of ground has no share of the pixels.
-    names = titles([name for name in found if name != ABOVE], findings.height)
+    found = findings.regions.index.unique("region").drop(ABOVE, errors="ignore")
+    names = titles([*found], findings.height)
     yield Figure(
         charts.regions(findings.regions, [*findings.finals], names),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
@@ -234,45 +234,39 @@ def _parts_table(findings: Findings) -> Table:
     """Tabulate the mean ERR of each final mask as a sum over its stages."""
     columns = merged(findings.error_parts.values())
     return Table(
-        ["final mask", *columns, "ERR"],
+        ["final mask", *columns, TESTED],
         [
             [
                 variant_cell(variant, [*findings.totals]),
-                *(_part(parts, part) for part in columns),
-                Cell(percent(findings.total(variant)["ERR"]), bold=True),
+                *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
+                Cell(percent(findings.total(variant)[TESTED]), bold=True),
             ]
             for variant, parts in findings.error_parts.items()
         ],
     )
 
 
-def _part(parts: Mapping[str, float], part: str) -> str:
-    if part not in parts:
-        return DASH
-    first = part == next(iter(parts))
-    return percent(parts[part]) if first else points(parts[part])
-
-
 def _oracles(findings: Findings) -> Iterator[Block]:
     """Yield what remains when a stage is replaced by the truth, where the run counted that."""
-    if not findings.oracles:
+    rows = [*perfect_stages(findings.table("oracles"), findings.table("frames"))]
+    if not rows:
         return
     table = Table(
         [
             *("variant", "if there were a", "ERR as it is", "ERR then", "change, pp"),
-            *(*(f"{name} then" for name in SHORT if name != "ERR"), "frames"),
+            *(*(f"{name} then" for name in OTHERS), "frames"),
         ],
         [
             [
                 variant_cell(row["variant"], [*findings.totals]),
                 f"perfect {row['oracle']}",
                 percent(row["as_is"]),
-                Cell(percent(row["ERR"]), bold=True),
-                points(row["ERR"] - row["as_is"]),
-                *(percent(row[name]) for name in SHORT if name != "ERR"),
+                Cell(percent(row[TESTED]), bold=True),
+                points(row[TESTED] - row["as_is"]),
+                *(percent(row[name]) for name in OTHERS),
                 number(row["frames"]),
             ]
-            for row in findings.oracles
+            for row in rows
         ],
         text_columns=(0, 1),
         small=True,
@@ -282,32 +276,29 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         "pixels count as non-road, or lit: a bound on what mending the stage could bring.",
         "note",
     )
-    yield Details("If a stage were perfect", [table, meaning, *_compensation(findings)])
+    yield Details("If a stage were perfect", [table, meaning, *_compensation(findings, rows)])
 
 
-def _compensation(findings: Findings) -> Iterator[Text]:
+def _compensation(findings: Findings, oracles: Sequence[Mapping[str, Any]]) -> Iterator[Text]:
     """Return whether a filter that finds all shadow, and nothing else, would help."""
     if not {FILTERED, UNFILTERED} <= findings.totals.keys():
         return
     without = findings.total(UNFILTERED)
-    for row in findings.oracles:
+    for row in oracles:
         is_filter = row["oracle"] not in findings.totals[FILTERED]
         if row["variant"] == FILTERED and is_filter and row["frames"] == without["frames"]:
-            harms = row["ERR"] > without["ERR"]
+            meaning = "what it makes of true shadow helps."
+            if row[TESTED] > without[TESTED]:
+                meaning = "it is not only what it takes for shadow, but what it makes of shadow "
+                meaning += "that does harm."
             yield Text(
-                f"With a perfect shadow mask the filter would err {percent(row['ERR'])} %, and "
-                f"{percent(without['ERR'])} % is the error without any filter: "
-                + (
-                    "it is not only what it takes for shadow, but what it makes of shadow that "
-                    "does harm."
-                    if harms
-                    else "what it makes of true shadow helps."
-                ),
+                f"With a perfect shadow mask the filter would err {percent(row[TESTED])} %, and "
+                f"{percent(without[TESTED])} % is the error without any filter: {meaning}",
                 "note",
             )
 
 
-def _heat_maps(maps: Mapping[str, npt.NDArray[np.float64]]) -> ImageGrid:
+def _heat_maps(maps: Mapping[str, Floats]) -> ImageGrid:
     """Return where each variant has false positives and negatives; equal shades are equal shares.
 
     ``maps`` are those of `roadeval.report.findings.Findings.heatmaps`.
@@ -331,7 +322,7 @@ def _heat_maps(maps: Mapping[str, npt.NDArray[np.float64]]) -> ImageGrid:
 
 def thresholds(findings: Findings) -> Iterator[Block]:
     """Yield the curves and what is quoted of them; nothing without a probability."""
-    quoted, levels = findings.facts.curves, findings.levels
+    quoted, levels = findings.facts.curves, findings.table("probabilities")
     if not quoted or not len(levels):
         return
     yield Heading("Over thresholds")

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, first_of, number, percent, points
-from roadeval.evaluation.score import BASES, TESTED, Effect
-from roadeval.report.blocks import (
-    Block,
-    Cell,
-    Details,
-    Heading,
-    ImageFile,
-    ImageGrid,
-    Table,
-    Text,
-)
-from roadeval.report.charts.standard import ForestRow, forest
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.score.scoreboard import BASES, Effect
+from roadeval.evaluation.tables import only, values_of
+from roadeval.report.blocks import Block, Cell, Details, Heading, ImageFile, ImageGrid, Table, Text
+from roadeval.report.charts.standard import forest
 from roadeval.results.facts import StratumFacts
 from roadeval.results.fleet import FleetFolder
+from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, is_significant, marked_interval
 from roadeval.runtime.text import elided
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NAMED: Final = 12
 """Drives in the table of the worst, and in that of losses; reasons that are listed."""
@@ -35,14 +31,13 @@ OF_ONE_REASON: Final = 4
 TAGS: Final = 48
 """Letters of a drive's tags, at most."""
 _WORDS: Final = ("drive", "state", "group", "tags")
-_SHOWN: Final = ("ERR", "FPR", "FNR")
-Row = Mapping[str, Any]
+_SHOWN: Final = (TESTED, "FPR", "FNR")
 
 
 def plots(findings: FleetFolder) -> Iterator[Block]:
     """Yield the plots of the filter and of the best variant against blind, and the worst drives."""
     chosen = list(plotted(findings))
-    if not findings.first_scores:
+    if findings.first_scores.empty:
         return
     yield Heading("Drive by drive")
     for place, (effect, title) in enumerate(chosen):
@@ -66,31 +61,24 @@ def plotted(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
 
 
 def _plot(findings: FleetFolder, effect: Effect) -> Iterator[Block]:
-    rows = [
-        ForestRow(
-            findings.names[row["drive"]],
-            findings.drives[row["drive"]]["group"],
-            row["mean"],
-            row["low"],
-            row["high"],
-        )
-        for row in findings.effects.get((effect.base, effect.variant), ())
-    ]
-    if rows:
+    rows = only(findings.effects, base=effect.base, variant=effect.variant)
+    if len(rows):
+        groups = findings.drives["group"].reindex(rows["drive"]).to_numpy()
+        rows = rows.assign(name=[findings.names[drive] for drive in rows["drive"]], group=groups)
         label = f"ERR of {effect.variant} minus that of {effect.base}"
         yield forest(rows, effect.rates[TESTED], label)
 
 
-def _differences(findings: FleetFolder) -> dict[str, dict[str, float]]:
+def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
     """Return by base the differences by drive of the first variant, or the first that has any."""
-    found = {}
+    differences = {}
     for base in BASES:
-        variants = [variant for other, variant in findings.effects if other == base]
-        if variants:
+        rows = only(findings.effects, base=base)
+        if variants := values_of(rows, "variant"):
             first = next(iter(findings.finals))
-            rows = findings.effects[base, first if first in variants else variants[0]]
-            found[base] = {row["drive"]: row["mean"] for row in rows}
-    return {base: values for base, values in found.items() if values}
+            rows = only(rows, variant=first if first in variants else variants[0])
+            differences[base] = rows.set_index("drive")["mean"]
+    return differences
 
 
 def _tags(findings: FleetFolder) -> dict[str, str]:
@@ -121,57 +109,51 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
 
     Or the ``worst`` ones, those with the highest ERR, without state and group.
     """
-    scores, differences = findings.first_scores, _differences(findings)
-    tags = _tags(findings)
-    columns: dict[str, Callable[[str], Cell | str]] = {
-        "drive": lambda drive: findings.names[drive],
-        "state": lambda drive: str(findings.drives[drive]["status"]),
-        "group": lambda drive: str(findings.drives[drive]["group"] or ""),
-        "tags": lambda drive: tags.get(drive, ""),
-        "frames": lambda drive: number(findings.drives[drive]["evaluated"] or 0),
-        **{rate: partial(_rate, scores, rate) for rate in _SHOWN},
-        **{f"against {base}": partial(_point, own) for base, own in differences.items()},
-    }
-    shown = [*findings.drives]
+    scores, tags, rows = findings.first_scores, _tags(findings), findings.drives
     if worst is not None:
-        known = (row for row in scores.values() if row[TESTED] is not None)
-        ranked = sorted(known, key=lambda row: (-row[TESTED], row["drive"]))
-        shown = [row["drive"] for row in ranked[:worst]]
+        ranked = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
+        rows = rows.loc[ranked.index[:worst]]
+    scores = scores.reindex(rows.index)
+    columns: dict[str, Sequence[Cell | str]] = {
+        "drive": [findings.names[drive] for drive in rows.index],
+        "state": rows["status"].tolist(),
+        "group": rows["group"].astype(object).fillna("").tolist(),
+        "tags": [tags.get(drive, "") for drive in rows.index],
+        "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
+        **{r: [Cell(percent(rate), bold=r == TESTED) for rate in scores[r]] for r in _SHOWN},
+        **{
+            f"against {base}": [*map(points, own.reindex(rows.index))]
+            for base, own in _differences(findings).items()
+        },
+    }
+    if worst is not None:
         unused = ["state", "group", *([] if any(tags.values()) else ["tags"])]
-        columns = {title: cell for title, cell in columns.items() if title not in unused}
+        columns = {title: cells for title, cells in columns.items() if title not in unused}
     return Table(
         [*columns],
-        [[cell(drive) for cell in columns.values()] for drive in shown],
+        [*zip(*columns.values(), strict=True)],
         text_columns=[place for place, title in enumerate(columns) if title in _WORDS],
         small=True,
     )
 
 
-def _rate(scores: Mapping[str, Row], rate: str, drive: str) -> Cell:
-    return Cell(percent(scores.get(drive, {}).get(rate)), bold=rate == TESTED)
-
-
-def _point(values: Mapping[str, float], drive: str) -> str:
-    return points(values.get(drive))
-
-
 def missing(findings: FleetFolder) -> Iterator[Block]:
     """Yield the drives that failed by reason, those without truth, and those with losses."""
-    rows = findings.drives.values()
+    drives = findings.drives
     parts = {
-        "Drives that failed": [row for row in rows if row["status"] == FAILED],
-        "Drives without a score": [row for row in rows if row["status"] == UNSCORED],
-        "Logs of which a part was lost": [row for row in rows if row["losses"]],
+        "Drives that failed": only(drives, status=FAILED),
+        "Drives without a score": only(drives, status=UNSCORED),
+        "Logs of which a part was lost": drives[drives["losses"].notna()],
     }
-    if any(parts.values()):
+    if any(map(len, parts.values())):
         yield Heading("What is missing")
     for title, own in parts.items():
-        if own:
+        if len(own):
             yield Heading(f"{title}: {number(len(own))}", 2)
             yield from _reasons(findings, own)
 
 
-def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
+def _reasons(findings: FleetFolder, rows: pd.DataFrame) -> Iterator[Block]:
     """Yield a table of reasons, the most frequent first."""
     ranked = sorted(by_reason(findings, rows).items(), key=lambda each: -len(each[1]))
     yield Table(
@@ -188,18 +170,18 @@ def _reasons(findings: FleetFolder, rows: Sequence[Row]) -> Iterator[Block]:
         yield Text(f"{number(more)} more for other reasons: see drives.parquet.", "note")
 
 
-def by_reason(findings: FleetFolder, rows: Iterable[Row]) -> dict[str, list[str]]:
+def by_reason(findings: FleetFolder, rows: pd.DataFrame) -> dict[str, list[str]]:
     """Return the drives' names by what was lost first, or by why they failed or were not scored.
 
     Without the name of the drive's file, which begins most reasons.
     """
-    found: defaultdict[str, list[str]] = defaultdict(list)
-    for row in rows:
+    drives: defaultdict[str, list[str]] = defaultdict(list)
+    for drive, row in zip(rows.index, records(rows), strict=True):
         first, *_ = (row["losses"] or row["reason"] or "no reason known").splitlines()
         begin, _, rest = first.partition(": ")
         is_file = rest and begin.rpartition("/")[2].startswith(row["name"])
-        found[rest if is_file else first].append(findings.names[row["drive"]])
-    return found
+        drives[rest if is_file else first].append(findings.names[drive])
+    return drives
 
 
 def strata(findings: FleetFolder) -> Iterator[Block]:
@@ -209,12 +191,15 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
     for effect, title in plotted(findings):
         mask = (effect.base, effect.variant)
         own = [each for each in findings.facts.strata if (each.base, each.variant) == mask]
-        first = [place == 0 or own[place - 1].tag != row.tag for place, row in enumerate(own)]
+        begins = [place for place, part in enumerate(own) if part.tag != own[place - 1].tag]
         parts = Table(
             ["by", "value", "drives", "mean", "interval", "worse", "better"],
-            [_part_cells(row, first=begins) for row, begins in zip(own, first, strict=True)],
+            [
+                [part.tag if place in (0, *begins) else "", *_part_cells(part)]
+                for place, part in enumerate(own)
+            ],
             text_columns=(0, 1),
-            breaks=[place for place, begins in enumerate(first) if begins and place],
+            breaks=[place for place in begins if place],
             small=True,
         )
         count = max((each.difference.comparisons or 0 for each in own), default=0)
@@ -229,16 +214,14 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
             yield Details(title, [parts, told])
 
 
-def _part_cells(row: StratumFacts, *, first: bool) -> list[Cell | str]:
-    found = row.difference
+def _part_cells(part: StratumFacts) -> list[Cell | str]:
+    change = part.difference
     return [
-        row.tag if first else "",
-        row.value,
-        number(found.units),
-        Cell(points(found.mean), bold=is_significant(found)),
-        marked_interval(found),
-        number(found.worse or 0),
-        number(found.better or 0),
+        part.value,
+        number(change.units),
+        Cell(points(change.mean), bold=is_significant(change)),
+        marked_interval(change),
+        *(number(count or 0) for count in (change.worse, change.better)),
     ]
 
 
@@ -253,7 +236,7 @@ LONGEST = 20
 
 def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iterator[Block]:
     """Yield the worst frames, at most so many, and so many pictures beside each other."""
-    rows = findings.worst[:most]
+    rows = records(findings.worst[:most])
     if not rows:
         return
     yield Heading("The worst frames over all drives")
@@ -261,7 +244,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     for row in rows:
         title = f"{elided(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
         if content := findings.picture(row):
-            error = f"ERR {percent(row['ERR'], 1)} %"
+            error = f"ERR {percent(row[TESTED], 1)} %"
             pictures.append((f"{row['rank']}. {title}: {error}", ImageFile(content)))
     if pictures:
         yield ImageGrid(pictures[:SEEN], across)
@@ -278,7 +261,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     yield _commands_table(findings, rows)
 
 
-def _commands_table(findings: FleetFolder, rows: Sequence[Row]) -> Table:
+def _commands_table(findings: FleetFolder, rows: Sequence[dict[str, Any]]) -> Table:
     """Tabulate the worst frames with the command that opens each in the viewer."""
     return Table(
         ["", "drive", "frame", "ERR, %", "in the viewer"],
@@ -287,7 +270,7 @@ def _commands_table(findings: FleetFolder, rows: Sequence[Row]) -> Table:
                 str(row["rank"]),
                 findings.names[row["drive"]],
                 str(row["frame"]),
-                Cell(percent(row["ERR"]), bold=True),
+                Cell(percent(row[TESTED]), bold=True),
                 findings.inspect(row),
             ]
             for row in rows

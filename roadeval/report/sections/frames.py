@@ -8,10 +8,11 @@ from typing import Final
 
 from roadeval.data import BASELINE
 from roadeval.data.words import in_percent, listing, number, percent, points, timestamp
-from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.score import SIGNS
+from roadeval.evaluation.metrics import SHORT, TESTED
+from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.report.blocks import (
     Block,
+    Cell,
     Command,
     Heading,
     ImageGrid,
@@ -25,7 +26,7 @@ from roadeval.report.blocks import (
 from roadeval.report.chart import Chart
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
-from roadeval.report.tables import rate_cells, variant_cell
+from roadeval.report.tables import variant_cell
 from roadeval.results.sentences import step_by_step, without_filter
 
 LARGE: Final = 420
@@ -105,7 +106,13 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
 def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
     """Tabulate the rates of each variant's final mask; ``variants`` are all that were scored."""
     rows = [
-        [variant_cell(name, variants), *rate_cells(rates, bold=name == frame.variant)]
+        [
+            variant_cell(name, variants),
+            *(
+                Cell(percent(rates.get(rate)), bold=(name, rate) == (frame.variant, TESTED))
+                for rate in SHORT
+            ),
+        ]
         for name, rates in frame.rates.items()
     ]
     return Table(["final mask, %", *SHORT], rows, small=True)
@@ -148,7 +155,7 @@ class FrameBrowser(Block):
     """Frames with their pictures, in order."""
     masks: Sequence[str] = ()
     """Names of the pictures of final masks, which are compared where there is no truth."""
-    titles: Sequence[str] = tuple(SHORT)
+    titles: Sequence[str] = ()
     """The rates, or without truth the signs of doubt, of which each variant has a column."""
 
     @property
@@ -165,15 +172,10 @@ class FrameBrowser(Block):
         wanted = {strip.frame for strip in self.strips} | {row.frame for row in ranked[:ROWS]}
         return [row for row in self.rows if row.frame in wanted]
 
-    @property
-    def rates(self) -> list[str]:
-        """Titles of groups of columns, each of which has a column a variant."""
-        return [*self.titles] if self.variants else []
-
     def cells(self, row: NotableFrame) -> Iterator[str]:
         """Yield a frame's seconds from the first one, and a number for each column of rates."""
         yield f"{(row.stamp_ns - self.rows[0].stamp_ns) / 1e9:.2f}"
-        for rate in self.rates:
+        for rate in self.titles:
             for variant in self.variants:
                 yield percent(row.rates.get(variant, {}).get(rate))
 
@@ -192,7 +194,7 @@ class FrameBrowser(Block):
     @property
     def compared(self) -> tuple[str, str]:
         """The pictures that are laid over each other: errors of two variants, or their masks."""
-        scored = self.variants if "ERR" in self.titles else ()
+        scored = self.variants if TESTED in self.titles else ()
         errors = [f"{name}: errors" for name in scored if name != BASELINE]
         first, *others = errors or [*self.masks] or ["camera"]
         return first, next(iter(others), "camera")
@@ -204,7 +206,7 @@ class FrameBrowser(Block):
         if (shown := len(self.shown)) < len(self.rows):
             told.append(
                 f"The {number(shown)} of {of} frames with the highest {next(iter(self.titles))}; "
-                f"{'frames' if 'ERR' in self.titles else 'unlabelled'}.csv has them all."
+                f"{'frames' if TESTED in self.titles else 'unlabelled'}.csv has them all."
             )
         if self.variants:
             told.append("Percent.")

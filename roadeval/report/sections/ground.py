@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from roadeval.data import BASELINE, UNFILTERED, Rows
+from roadeval.data import BASELINE, UNFILTERED
 from roadeval.data.words import DASH, MINUS, defined, percent
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, RIGHT
+from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts import standard as charts
 from roadeval.report.findings import Findings
@@ -20,15 +21,14 @@ UNSURE: Final = "\N{ALMOST EQUAL TO}"
 """Before a number that a wrong camera could explain."""
 KITTI: Final = (("MaxF", "F1"), ("AP11", ""), ("precision",) * 2, ("recall",) * 2)
 """Measures of KITTI's benchmark, each with its counterpart of a mask without probabilities."""
-Row = Mapping[str, Any]
+Row = Mapping[Any, Any]
 
 
 def on_the_ground(findings: Findings) -> Iterator[Block]:
     """Yield errors by distance, edges of the road and free distance; nothing without a camera."""
-    if not len(findings.metres):
+    rows, names = findings.table("metres").to_dict("records"), [*findings.finals]
+    if not rows:
         return
-    rows = [*rows_of(findings.metres)]
-    names = [*findings.finals]
     yield Heading("On the ground, in metres")
     yield Figure(
         [charts.by_distance(findings.by_distance, names)],
@@ -39,12 +39,6 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     yield from edges_tables(rows, names)
     (known,) = (each for each in findings.facts.drive.topics if each.startswith(METRES))
     yield Text(f"The camera: {known.removeprefix(METRES)}. {_note(rows)}", "note")
-
-
-def rows_of(table: Rows) -> Iterator[Row]:
-    """Yield the rows of ``metres``."""
-    columns = [table[name].tolist() for name in table.columns]
-    yield from (dict(zip(table.columns, row, strict=True)) for row in zip(*columns, strict=True))
 
 
 def _note(rows: Sequence[Row]) -> str:
@@ -66,18 +60,18 @@ def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = F
     Below each variant's row stands the range of a camera that stands otherwise, where it is known.
     A ``brief`` table has ERR alone.
     """
-    errors = [row for row in rows if row["measure"] == "ERR"]
+    errors = [row for row in rows if row["measure"] == TESTED]
     places = list(dict.fromkeys(row["where"] for row in errors))
     found = {(row["variant"], row["measure"], row["where"]): row for row in rows}
-    variants = [name for name in names if (name, "ERR", places[0]) in found]
+    variants = [name for name in names if (name, TESTED, places[0]) in found]
     posed = _is_posed(rows)
     first = UNFILTERED if UNFILTERED in variants else variants[0]
     lines: list[list[Cell | str]] = []
     breaks, marked = [], False
     for variant in variants:
         breaks.append(len(lines))
-        own = [found[variant, "ERR", place] for place in places]
-        bases = [found[first, "ERR", place] for place in places]
+        own = [found[variant, TESTED, place] for place in places]
+        bases = [found[first, TESTED, place] for place in places]
         effects = [abs(row["value"] - base["value"]) for row, base in zip(own, bases, strict=True)]
         marks = [
             UNSURE if variant != first and posed and _sway(row) > effect else ""

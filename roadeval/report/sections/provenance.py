@@ -46,7 +46,7 @@ def of_drives(findings: FleetFolder) -> Iterator[Block]:
     yield Text(
         f"roadeval {findings.facts.version}. run.toml in {findings.path} has the whole "
         "configuration, drives.parquet each log's digest, and the model and the fold that scored "
-        "it. The same logs, configuration and version give the same numbers.",
+        "it. The same logs, configuration and version give the same numbers."
     )
 
 

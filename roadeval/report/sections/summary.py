@@ -7,6 +7,7 @@ from typing import Final
 
 from roadeval.data import BASELINE
 from roadeval.data.words import counted, defined, listing, number, percent
+from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -21,6 +22,7 @@ from roadeval.report.images import jpeg
 from roadeval.report.sections.drives import WORST_AT
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
+from roadeval.results.rows import records
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
 
@@ -52,35 +54,34 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [PARTIAL], "warning")
     yield Text(findings.facts.verdict.replace("`", ""), "verdict")
-    yield from _next(findings)
+    for frame in findings.worst[:1]:
+        title = f"First frame to look at: {frame.frame}"
+        if frame.rates:
+            wrong = percent(frame.rates[frame.variant][TESTED], 1)
+            title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
+        command = findings.inspect(frame.frame) if findings.inspect else ""
+        yield LinkList([(title, f"#frame-{frame.frame}")], command)
     if findings.totals:
         yield rates_table(findings.facts)
     yield Text(account(findings.facts.frames, findings.facts.windows), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
-        yield ImageGrid(pictures, 4, caption=_legend(findings))
+        legend = "Green: called road."
+        for first in [*findings.finals][:1]:
+            legend = (
+                f"Errors of {first} across the drive. Green: road found; orange: non-road called "
+                "road (FP); purple: road missed (FN); grey: ignored."
+            )
+        yield ImageGrid(pictures, 4, caption=legend)
     yield _beware(list(warnings(findings)))
-
-
-def _next(findings: Findings) -> Iterator[LinkList]:
-    """Yield what to look at first: the worst frame, and the command that opens it."""
-    if findings.worst:
-        frame = findings.worst[0]
-        title = f"First frame to look at: {frame.frame}"
-        if frame.rates:
-            wrong = percent(frame.rates[frame.variant]["ERR"], 1)
-            title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
-        command = findings.inspect(frame.frame) if findings.inspect else ""
-        yield LinkList([(title, f"#frame-{frame.frame}")], command)
 
 
 def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     facts = findings.facts
     yield Text(facts.verdict.replace("`", ""), "verdict")
-    if findings.worst:
-        frame = findings.worst[0]
+    for frame in records(findings.worst[:1]):
         where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
-        title = f"Worst frame: {where} (ERR {percent(frame['ERR'], 1)} %)"
+        title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"
         yield LinkList([(title, WORST_AT)], findings.inspect(frame))
     if facts.totals:
         yield rates_table(facts)
@@ -107,10 +108,14 @@ def warnings(findings: Findings) -> Iterator[str]:
             "Trained on frames of this drive (none of them is evaluated): the rates say how well "
             "it does on a road that it has seen."
         )
-    errors = {name: findings.total(name)["ERR"] for name in findings.finals}
+    errors = {name: findings.total(name)[TESTED] for name in findings.finals}
     if worse := _worse_than_baseline(errors):
         yield f"{worse}, which never looks at the image: nothing was gained from its pixels here."
-    yield from _undefined(findings)
+    for variant in findings.finals:
+        total = findings.total(variant)
+        if counts := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
+            of = number(total["frames"])
+            yield f"{variant}: of {of} frames, undefined and left out: {listing(counts)}."
     yield from (f"Lost: {loss}" for loss in facts.losses[:LOSSES])
     if len(facts.losses) > LOSSES:
         yield f"{len(facts.losses) - LOSSES} more frames were lost; summary.json names them."
@@ -127,15 +132,6 @@ def _worse_than_baseline(errors: Mapping[str, float | None]) -> str:
     return f"{listing(worse)} {verb} worse than {BASELINE} (ERR {percent(blind)} %)" * bool(worse)
 
 
-def _undefined(findings: Findings) -> Iterator[str]:
-    for variant in findings.finals:
-        total = findings.total(variant)
-        counts = [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]
-        if counts:
-            of = number(total["frames"])
-            yield f"{variant}: of {of} frames, undefined and left out: {listing(counts)}."
-
-
 def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
     """Yield what a reader must know before believing the numbers of many drives."""
     facts = findings.facts
@@ -144,13 +140,14 @@ def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
         yield f"{number(failed)} of {of} drives failed: no number counts them."
     if damaged := facts.counts.get(DAMAGED):
         yield f"{_were(damaged)} scored without what is lost of the log."
-    scored = [row for row in findings.drives.values() if row["evaluated"]]
-    if own := sum(1 for row in scored if row["trained_on"] and not row["model"]):
+    drives = findings.drives
+    learnt = (drives["evaluated"] > 0) & (drives["trained_on"] > 0) & drives["model"].isna()
+    if own := int(learnt.sum()):
         yield (
             f"{_were(own)} scored by a model trained on the drive's own frames (none of "
             "these is evaluated): the rates say how well it does on a road that it has seen."
         )
-    errors = {name: facts.totals[name][stage]["ERR"] for name, stage in facts.finals.items()}
+    errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
     if worse := _worse_than_baseline(errors):
         yield f"{worse}, which never looks at the image."
     yield from (f"{sentence}." for sentence in facts.warnings)
@@ -158,16 +155,6 @@ def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
 
 def _were(count: int) -> str:
     return f"{counted(count, 'drive')} {'was' if count == 1 else 'were'}"
-
-
-def _legend(findings: Findings) -> str:
-    first = next(iter(findings.finals), None)
-    if first is None:
-        return "Green: called road."
-    return (
-        f"Errors of {first} across the drive. Green: road found; orange: non-road called road "
-        "(FP); purple: road missed (FN); grey: ignored."
-    )
 
 
 def drives_account(counts: Mapping[str, int], frames: int) -> str:

@@ -4,6 +4,7 @@ import math
 from itertools import combinations, product
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
@@ -12,7 +13,6 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
     CameraRates,
     Difference,
-    DriveMean,
     benjamini_hochberg,
     holm,
     interval,
@@ -102,7 +102,7 @@ def test_intervals_hold_about_as_often_as_they_claim(rho, frames):
 def drives(means, groups=None):
     """Drives ``000``, ``001`` ... with these means."""
     names = [f"{place:03}" for place in range(len(means))]
-    return [DriveMean(*drive) for drive in zip(names, groups or names, means, strict=True)]
+    return pd.DataFrame({"drive": names, "group": groups or names, "mean": means})
 
 
 def normal(count, mean=0.01):
@@ -251,7 +251,7 @@ LIGHT = ["dusk", "day", "night"] * 8
 
 
 def parts(tags, fleet=FLEET):
-    return [*strata(fleet, tags, 0.95)]
+    return [*strata(fleet.assign(**tags), [*tags], 0.95)]
 
 
 def test_drives_are_divided_by_each_value_of_a_tag_that_they_have():
@@ -269,7 +269,7 @@ def test_what_does_not_divide_the_drives_makes_no_parts():
     assert parts({"light": ["day"] * 24}) == []
     assert parts({"light": [None] * 24}) == []
     assert [value for _, value, _ in parts({"light": ["day"] * 23 + [None]})] == ["day"]
-    assert parts({"light": []}, fleet=[]) == []
+    assert parts({"light": []}, fleet=drives([])) == []
 
 
 def test_p_values_are_corrected_for_all_parts_together_in_which_something_can_be_found():
@@ -278,7 +278,9 @@ def test_p_values_are_corrected_for_all_parts_together_in_which_something_can_be
     assert [difference.p_holm for difference in tested] == pytest.approx(expected.tolist())
     assert {difference.comparisons for difference in tested} == {5}
     weather = ["fog"] * 2 + ["rain"] * 10 + ["sun"] * 12
-    fog, rain, sun = (d for *_, d in parts({"weather": weather}, FLEET[:12] + drives([0.0] * 12)))
+    fog, rain, sun = (
+        d for *_, d in parts({"weather": weather}, pd.concat([FLEET[:12], drives([0.0] * 12)]))
+    )
     assert fog.p is fog.p_holm is sun.p_holm is sun.comparisons is None
     assert (rain.p_holm, rain.comparisons) == (rain.p, 1)
 

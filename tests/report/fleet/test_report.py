@@ -10,15 +10,15 @@ from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import Figure, ImageGrid, Table, Text
 from roadeval.report.sections import drive, drives, summary
 from roadeval.results.fleet import FleetFolder
+from roadeval.results.schema import FAILED
 from tests.report.making import opened, plain_rows, text, the
-from tests.results.fleet import making
 from tests.results.fleet.making import fleet_of
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Twelve drives: one failed, one is without truth, one has lost a part."""
-    return fleet_of(tmp_path_factory.mktemp("fleet") / "street", 12, frames=0, pictures=12)
+    return fleet_of(tmp_path_factory.mktemp("fleet") / "street", 12, pictures=12)
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +52,8 @@ def test_the_regions_of_all_drives_are_drawn(findings):
     (figure,) = (each for each in blocks(drive.regions, findings) if isinstance(each, Figure))
     final = Result(findings.path).scores.query("final and region != 'all'")
     sums = final.groupby(["variant", "region"])[["FP", "FN", "N"]].sum()
-    names = sorted({region for region, _ in findings.regions})
-    assert len(figure.charts[0].names) == len(names) > 0
-    for (region, variant), own in findings.regions.items():
+    assert len(figure.charts[0].names) == findings.regions.index.unique("region").size > 0
+    for (region, variant), own in findings.regions.iterrows():
         counted = sums.loc[(variant, region)]
         assert own["ERR"] == pytest.approx((counted.FP + counted.FN) / counted.N)
 
@@ -62,7 +61,7 @@ def test_the_regions_of_all_drives_are_drawn(findings):
 def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, findings, tmp_path):
     grid = the(ImageGrid, [b for b in blocks(drives.worst, findings) if isinstance(b, ImageGrid)])
     assert len(grid.pictures) == 12
-    first = findings.worst[0]
+    first = findings.worst.iloc[0]
     name = f"{findings.names[first['drive']]}, frame {first['frame']}"
     assert grid.pictures[0][0].startswith(f"1. {name}")
     copy = shutil.copytree(folder, tmp_path / "copy")
@@ -81,17 +80,9 @@ def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):
     assert write_report(folder).read_bytes() == first
 
 
-def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path, monkeypatch):
-    reason = {"evaluated": 0, "status": "failed", "exit_code": 1, "reason": "no"}
-    monkeypatch.setattr(
-        making,
-        "_broken",
-        lambda i, member: {
-            "drives": [reason | {"drive": member.drive}],
-            **{name: [] for name in ("scores", "effects", "worst")},
-        },
-    )
-    told = text(write_report(fleet_of(tmp_path / "f", 2, frames=0)).read_bytes())
+def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path):
+    fleet = fleet_of(tmp_path / "f", 2, status=lambda _: FAILED)
+    told = text(write_report(fleet).read_bytes())
     assert "Drives that failed: 2" in told
     assert "Nothing to score: no frame with truth was evaluated." in told
 

@@ -1,11 +1,13 @@
 """The parts of a drive's report: what each says where numbers lack or cannot be sure."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.report.blocks import Figure, Table, Text
 from roadeval.report.sections.drive import filter_effect, regions, thresholds
-from tests.evaluation.making import rows_of
+from roadeval.results.tables import read_table
 from tests.report.making import (
     VARIANTS,
     a_difference,
@@ -20,7 +22,8 @@ def texts(findings):
 
 
 def test_where_there_is_no_interval_the_reason_is_given():
-    found = some_findings(difference={"post": by_rate(err=a_difference(-0.02))})
+    rates = by_rate(err=a_difference(-0.02))
+    found = some_findings(effects=[Effect("unfiltered", "filtered", "post", True, rates)])
     assert any("No interval for ERR: 1,200 frames are too few" in text for text in texts(found))
 
 
@@ -40,8 +43,9 @@ COLUMNS = ["variant", "stage", "level", "road", "other"]
 
 
 def findings(**quoted):
+    tables = {"probabilities": pd.DataFrame(LEVELS, columns=COLUMNS)}
     return some_findings(
-        levels=rows_of(pd.DataFrame(LEVELS, columns=COLUMNS)),
+        table=lambda name: tables.get(name, read_table(name, "")),
         curves={"filtered": {"post": QUOTED | quoted}},
     )
 
@@ -82,15 +86,11 @@ def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
 
 def of_regions(*regions, variants=VARIANTS):
     """A table in which every number is another."""
-    return {
-        (region, variant): {
-            "pixels": (10 + place) / 100,
-            "ERR": (20 + 3 * place + own) / 1000,
-            "errors": (400 + 3 * place + own) / 1000,
-        }
-        for own, variant in enumerate(variants)
-        for place, region in enumerate(regions)
-    }
+    masks = pd.MultiIndex.from_product([regions, variants], names=["region", "variant"])
+    places = np.arange(len(masks)) / 1000
+    return pd.DataFrame(
+        {"pixels": 0.1 + places, "ERR": 0.2 + places, "errors": 0.4 + places}, masks
+    )
 
 
 def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near():

@@ -1,22 +1,26 @@
-"""Fleets made up: random but plausible rows, written by the real writer."""
+"""Fleets made up: random but plausible frames, written as the results of replays."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
-import pyarrow as pa
-from pyarrow import parquet
+import numpy.typing as npt
+import pandas as pd
 
-from roadeval.data import Counts
-from roadeval.evaluation import metrics
+from roadeval.data import OUTCOMES
+from roadeval.evaluation import metrics, tables
 from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.facts import Member
-from roadeval.results.fleet import FleetWriter, Record, frames_path
-from roadeval.results.rows import Key, cells
-from roadeval.results.schema import TABLES
-from roadeval.runtime.files import put
+from roadeval.evaluation.stats import Difference
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount, LogFacts, Member
+from roadeval.results.fleet import FleetWriter, Made, results_path
+from roadeval.results.folder import ResultsWriter
+from roadeval.results.rows import Key, csv_lines
+from roadeval.results.schema import DAMAGED, FAILED, SCORED, TABLES, UNSCORED
 
 STAGES = ("similarity", "svm", "post")
 MASKS = [(v, s) for v in ("filtered", "unfiltered") for s in STAGES] + [("blind", "post")]
@@ -25,6 +29,7 @@ LEVELS = {"similarity": 1.6, "svm": 1.3, "post": 1.0}
 REGIONS = ("shadow", "lit", "boundary")
 PIXELS = 10_000
 REASONS = ("{}: no image topic; the log has: no topics at all", "{}: is no MCAP file")
+CAMERA = "/camera/image"
 RUN = {
     "preset": "paper",
     "svm": {"kernel": "rbf"},
@@ -32,37 +37,53 @@ RUN = {
     "training": {"seed": 0},
     "fleet": {"folds": None},
 }
+Counts = dict[tuple[str, str], npt.NDArray[np.int64]]
+"""TP, TN, FP and FN of each mask, ``(n, 4)``."""
 
 
-def fleet_of(folder, count, seed=0, *, frames=20, change=0.0, pictures=0):
+def status_of(place: int) -> str:
+    """Which drives failed, have no truth, or lost a part."""
+    if place % 20 == 9:
+        return UNSCORED
+    return {7: FAILED, 8: DAMAGED}.get(place % 10, SCORED)
+
+
+def fleet_of(
+    folder: str | Path,
+    count: int,
+    seed: int = 0,
+    *,
+    frames: int = 20,
+    change: float = 0.0,
+    pictures: int = 0,
+    status: Callable[[int], str] = status_of,
+) -> Path:
     """Write a fleet of drives, and return its folder.
 
     The same seed gives the same drives. Filtered's ERR is higher by ``change`` on every third of
-    them; the first ``pictures`` have pictures. Without ``frames`` no table of frames is there, and
-    rows are as of 20.
+    them; the first ``pictures`` have pictures of their three worst frames.
     """
-    folder = Path(folder)
-    writer = FleetWriter(folder)
+    writer = FleetWriter(Path(folder))
     writer.begin()
-    members = [_member(i) for i in range(count)]
-    for i, member in enumerate(members):
-        rng = np.random.default_rng((seed, i))
-        rows = _broken(i, member)
-        if rows is None:
-            masks = _counts(i, rng, frames or 20, change)
-            rows = _scored(i, member.drive, masks)
-            if frames:
-                _write_frames(folder, member.drive, masks)
-            if i < pictures:
-                _write_pictures(folder, member.drive)
-        key = Key(member.drive, "/camera/image")
-        tables = {name: cells(name, key, own) for name, own in rows.items()}
-        Record(member.drive, "asked", None, tables).write(folder)
+    members = [_member(place) for place in range(count)]
+    for place, member in enumerate(members):
+        rng, problem = np.random.default_rng((seed, place)), ""
+        if status(place) == FAILED:
+            problem = REASONS[place // 10 % 2].format(f"{member.name}.mcap")
+        else:
+            masks = _counts(place, rng, frames, change) if status(place) != UNSCORED else {}
+            _write(writer.folder, place, member, masks, lost=status(place) == DAMAGED)
+            for number in _worst(masks) if place < pictures and masks else ():
+                path = writer.folder / "pictures" / member.drive / f"{number}.jpg"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(_picture())
+        how = {"problem": problem, "exit_code": int(bool(problem)), "seconds": 10.0 + place % 7}
+        Made(member.drive, "asked", None, **how).write(writer.folder)
     writer.finish(members, EvaluationSettings(), RUN, "")
-    return folder
+    return Path(folder)
 
 
-def _member(i):
+def _member(i: int) -> Member:
     name = f"drive_{i:04}"
     group = f"route_{i // 4}" if i % 4 < 2 else None
     tags = {"weather": ("sun", "rain", "fog")[i % 3]}
@@ -70,46 +91,7 @@ def _member(i):
     return Member(f"{name}-{i:08x}", name, f"/logs/{name}.mcap", group, tags)
 
 
-def _broken(i, member):
-    """Return the rows of a drive that failed or has no truth; None of the others."""
-    row = {"drive": member.drive, "evaluated": 0}
-    if i % 10 == 7:
-        reason = REASONS[i // 10 % 2].format(f"{member.name}.mcap")
-        own = row | {"status": "failed", "exit_code": 1, "reason": reason}
-    elif i % 20 == 9:
-        own = row | {
-            "status": "unscored",
-            "exit_code": 0,
-            "reason": "no truth",
-            "log_digest": f"{i:x}",
-        }
-    else:
-        return None
-    return {"drives": [own], "scores": [], "effects": [], "worst": []}
-
-
-def _scored(i, drive, masks):
-    lost, n = i % 10 == 8, len(masks["blind", "post"])
-    own = {
-        "drive": drive,
-        "status": "damaged" if lost else "scored",
-        "exit_code": 3 if lost else 0,
-        "losses": f"frame {i} cannot be decoded\n3 records are cut off" if lost else None,
-        "seconds": 10.0 + i % 7,
-        "log_digest": f"{i:064x}",
-        "evaluated": n,
-        "trained_on": 10,
-        "in_log": n + 10,
-    }
-    return {
-        "drives": [own],
-        "scores": list(_scores(drive, masks)),
-        "effects": list(_effects(drive, masks)),
-        "worst": list(_worst(drive, masks)),
-    }
-
-
-def _counts(i, rng, n, change):
+def _counts(i: int, rng: np.random.Generator, n: int, change: float) -> Counts:
     """Return each mask's counts, frame by frame."""
     level = 0.04 * math.exp(0.6 * rng.standard_normal())
     helps = -0.008 + 0.015 * rng.standard_normal() + 0.01 * (i % 3 - 1)
@@ -128,98 +110,73 @@ def _counts(i, rng, n, change):
     return made
 
 
-def _rates(counts):
-    means = dict(zip(METRICS, metrics.table(counts).mean(axis=0).tolist(), strict=True))
-    sums = dict(zip(("TP", "TN", "FP", "FN"), counts.sum(axis=0).tolist(), strict=True))
-    pooled = metrics.of(Counts(*sums.values()))
-    about = {"frames": len(counts), "N": sum(sums.values()), **sums, **means}
-    return about | {f"pooled_{name}": value for name, value in pooled.items()}
+def _write(folder: Path, i: int, member: Member, masks: Counts, *, lost: bool) -> None:
+    """Write the results of a drive, as its replay would."""
+    n = len(masks["blind", "post"]) if masks else 0
+    rows = {name: [*_rows(masks, name)] for name in ("frames", "regions")}
+    sums: Any = {}
+    if masks:
+        names = TABLES["frames"].names[2:]
+        frames = pd.DataFrame(rows["frames"], columns=names)
+        sums = tables.as_trees(tables.totals(frames))
+    facts = Facts(
+        verdict="",
+        drive=DriveFacts(member.name, CAMERA, 640, 480, 10.0),
+        frames=FrameAccount(in_log=n + 10, trained_on=10, evaluated=n),
+        totals=sums,
+        effects=[*_effects(masks)] if masks else [],
+        losses=[f"frame {i} cannot be decoded", "3 records are cut off"] if lost else [],
+        warnings=[] if masks else ["no truth"],
+        log=LogFacts(member.source, f"{i:064x}"),
+    )
+    with ResultsWriter(results_path(folder, member.drive)) as results:
+        results.append(csv_lines(Key(member.name, CAMERA), rows))
+        results.finish(facts, "")
 
 
-def _scores(drive, masks):
+def _rows(masks: Counts, name: str) -> Any:
+    """Yield the rows of ``frames`` or ``regions``, without the key."""
     for (variant, stage), counts in masks.items():
-        mask = {"drive": drive, "variant": variant, "stage": stage, "final": stage == "post"}
-        yield mask | {"region": "all", **_rates(counts)}
-        for place, region in enumerate(REGIONS, 2):
-            yield mask | {"region": region, **_rates(counts // place)}
+        mask = variant, stage
+        if name == "frames":
+            rates = metrics.table(counts, METRICS).tolist()
+            for frame, (four, own) in enumerate(zip(counts.tolist(), rates, strict=True)):
+                yield (frame, *[_stamp(frame)] * 2, *mask, *four, sum(four), *own, 1 + frame)
+        else:
+            for place, region in enumerate(REGIONS, 2):
+                for frame, four in enumerate((counts // place).tolist()):
+                    yield frame, *mask, region, *four, sum(four)
 
 
-def _effects(drive, masks):
-    pairs = [("filtered", s, "unfiltered", s) for s in STAGES]
-    pairs += [(v, "post", "blind", "post") for v in ("filtered", "unfiltered")]
-    for variant, stage, base, of_base in pairs:
-        mine, theirs = masks[variant, stage], masks[base, of_base]
-        differences = metrics.table(mine) - metrics.table(theirs)
-        means = differences.mean(axis=0).tolist()
-        errors = (differences.std(axis=0, ddof=1) / math.sqrt(len(mine))).tolist()
-        for place, metric in enumerate(METRICS):
-            if metric in COMPARED:
-                mean, error = means[place], errors[place]
-                yield {
-                    "drive": drive,
-                    "base": base,
-                    "variant": variant,
-                    "stage": stage,
-                    "final": stage == "post",
-                    "metric": metric,
-                    "mean": mean,
-                    "standard_error": error,
-                    "low": mean - 2 * error,
-                    "high": mean + 2 * error,
-                    "p": math.erfc(abs(mean) / (math.sqrt(2) * error)) if error else 1.0,
-                    "frames": len(mine),
-                    "effective_frames": float(len(mine)),
-                }
-
-
-def _worst(drive, masks):
-    rates = metrics.table(masks["filtered", "post"])
-    order = np.argsort(-rates[:, [*METRICS].index("ERR")], kind="stable")[:3].tolist()
-    for rank, frame in enumerate(order, 1):
-        own = dict(zip(METRICS, rates[frame].tolist(), strict=True))
-        yield {
-            "rank": rank,
-            "drive": drive,
-            "frame": frame,
-            "stamp_ns": _stamp(frame),
-            "variant": "filtered",
-            "stage": "post",
-            **{name: own[name] for name in ("ERR", "FPR", "FNR")},
-            "picture": f"pictures/{drive}/{frame}.jpg",
-        }
-
-
-def _stamp(frame):
+def _stamp(frame: int) -> int:
     return 1_700_000_000_000_000_000 + 100_000_000 * frame
 
 
-def _write_frames(folder, drive, masks):
-    n = len(masks["blind", "post"])
-    counts = np.concatenate([*masks.values()])
-    columns = {
-        "drive": [drive] * len(counts),
-        "camera": ["/camera/image"] * len(counts),
-        "frame": np.tile(np.arange(n), len(masks)),
-        "stamp_ns": _stamp(np.tile(np.arange(n), len(masks))),
-        "log_time_ns": _stamp(np.tile(np.arange(n), len(masks))),
-        "variant": [v for v, _ in masks for _ in range(n)],
-        "stage": [s for _, s in masks for _ in range(n)],
-        "final": [s == "post" for _, s in masks for _ in range(n)],
-        **dict(zip(("TP", "TN", "FP", "FN"), counts.T, strict=True)),
-        "N": counts.sum(axis=1),
-        **dict(zip(METRICS, metrics.table(counts).T, strict=True)),
-        "truth": np.tile(np.arange(n), len(masks)),
-    }
-    path = frames_path(folder, drive)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    table = pa.table(columns, schema=TABLES["frames"].arrow())
-    parquet.write_table(table, path, compression="zstd")
+def _effects(masks: Counts) -> Any:
+    """Yield the differences of the drive, with the intervals of independent frames."""
+    pairs = [("unfiltered", "filtered", s) for s in STAGES]
+    pairs += [("blind", v, "post") for v in ("filtered", "unfiltered")]
+    for base, variant, stage in pairs:
+        mine, theirs = masks[variant, stage], masks[base, stage]
+        rates = {}
+        for place, metric in enumerate(METRICS):
+            if metric in COMPARED:
+                change = (metrics.table(mine, METRICS) - metrics.table(theirs, METRICS))[:, place]
+                mean, n = float(change.mean()), len(change)
+                error = float(change.std(ddof=1)) / math.sqrt(n)
+                p = math.erfc(abs(mean) / (math.sqrt(2) * error)) if error else 1.0
+                ends = mean - 2 * error, mean + 2 * error
+                rates[metric] = Difference(mean, *ends, p, 0.95, "frames", n, effective=float(n))
+        yield Effect(base, variant, stage, stage == "post", rates)
 
 
-def _write_pictures(folder, drive):
-    rng = np.random.default_rng(0)
-    image = rng.integers(0, 255, (12, 16, 3), np.uint8)
+def _worst(masks: Counts) -> list[int]:
+    """Return the three frames whose final mask errs most."""
+    wrong = masks["filtered", "post"][:, [OUTCOMES.index("FP"), OUTCOMES.index("FN")]].sum(axis=1)
+    return np.argsort(-wrong, kind="stable")[:3].tolist()
+
+
+def _picture() -> bytes:
+    image = np.random.default_rng(0).integers(0, 255, (12, 16, 3), np.uint8)
     large = cv2.resize(image, (320, 240), interpolation=cv2.INTER_CUBIC)
-    content = cv2.imencode(".jpg", large)[1].tobytes()
-    for frame in range(20):
-        put(folder / "pictures" / drive / f"{frame}.jpg", content)
+    return cv2.imencode(".jpg", large)[1].tobytes()

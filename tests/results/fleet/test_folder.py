@@ -2,21 +2,13 @@
 
 import json
 import shutil
+from dataclasses import replace
 
-import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from roadeval import Result
-from roadeval.results.fleet import (
-    FleetFolder,
-    Record,
-    frames_path,
-    read_record,
-    record_path,
-)
-from roadeval.results.rows import Key, cells
-from roadeval.results.schema import OF_DRIVES
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.fleet import FleetFolder, FleetWriter, Made, cached_path, read_made
 from roadeval.results.tables import ResultsError
 from tests.results.fleet.making import fleet_of
 
@@ -67,21 +59,17 @@ def test_another_version_s_folder_is_not_written_to(folder):
         fleet_of(folder, 5)
 
 
-def test_a_damaged_table_of_frames_says_what_makes_it_anew(folder):
-    drive = Result(folder).drives.query("status == 'scored'").drive.iloc[0]
-    path = folder / "frames" / drive / "frames.parquet"
-    column = parquet.ParquetFile(path).metadata.row_group(0).column(0)
-    begin = column.dictionary_page_offset or column.data_page_offset
-    content = bytearray(path.read_bytes())
-    content[begin + column.total_compressed_size - 1] ^= 1
-    path.write_bytes(content)
-    remedy = f"remove .*records/{drive}.json and run the fleet's command again"
-    with pytest.raises(ResultsError, match=remedy):
-        FleetFolder(folder).frames(drive)
-    words = pa.table({name: ["x"] for name in parquet.read_schema(path).names})
-    parquet.write_table(words, path)
-    with pytest.raises(ResultsError, match="column frame is not of type int64"):
-        FleetFolder(folder).frames(drive)
+@pytest.mark.parametrize("name", ["frames", "scores"])
+def test_a_cached_table_that_has_gone_is_made_anew(folder, name):
+    rows = FleetFolder(folder).table(name)
+    drive = FleetFolder(folder).facts.drives[0].drive
+    cached_path(folder, name, drive).unlink()
+    if name == "frames":
+        with pytest.raises(ResultsError, match="is not there; run the fleet's command again"):
+            FleetFolder(folder).table(name)
+    FleetWriter(folder).finish(FleetFolder(folder).facts.drives, EvaluationSettings(), {}, "")
+    assert cached_path(folder, name, drive).exists()
+    assert FleetFolder(folder).table(name).equals(rows)
 
 
 @pytest.mark.parametrize("table", ["drives", "scores", "effects"])
@@ -98,42 +86,41 @@ def test_a_flipped_bit_in_a_table_s_page_is_damage(folder, table):
             FleetFolder(folder).table(table)
 
 
-# --- The record of a drive: written and read back as it was ---------------------------------------
+# --- How a drive's results were made: written and read back as it was -----------------------------
+
+MADE = Made("a", "asked", {"caf\udce9.mcap": [1, 2]})
+"""A file's name holds a byte that is no text."""
 
 
-def write(folder):
-    """Write a record whose drive has frames, and a file with a name that is no text."""
-    row = {"drive": "a", "evaluated": 100}
-    rows = {name: [] for name in OF_DRIVES} | {"drives": cells("drives", Key("a", ""), [row])}
-    made = Record("a", "asked", {"caf\udce9.mcap": [1, 2]}, rows)
-    (folder / "records").mkdir()
-    made.write(folder)
-    return made
-
-
-def test_a_file_s_name_that_is_no_text_comes_back(tmp_path):
-    made = write(tmp_path)
-    read = read_record(tmp_path, "a")
-    assert read is not None
-    assert read.stamp == made.stamp
-
-
-@pytest.mark.parametrize(("was", "now"), [(" 100,", " 900,"), (" 100,", ' "1",'), ("[1, 2]", "[]")])
-def test_a_record_that_was_changed_is_none(tmp_path, was, now):
-    write(tmp_path)
-    path = record_path(tmp_path, "a")
-    text = path.read_text()
-    assert text.count(was) == 1
-    path.write_text(text.replace(was, now))
-    assert read_record(tmp_path, "a") is None
-
-
-def test_a_drive_is_whole_where_its_summary_and_the_frames_that_it_has_are_there(tmp_path):
-    made = write(tmp_path)
-    summary, frames = tmp_path / "results" / "a" / "summary.json", frames_path(tmp_path, "a")
+@pytest.fixture
+def results(tmp_path):
+    """The folder of a fleet with a drive whose results are there."""
+    summary = tmp_path / "results" / "a" / "summary.json"
     summary.parent.mkdir(parents=True)
     summary.touch()
-    assert not made.is_whole(tmp_path)
-    frames.parent.mkdir(parents=True)
-    frames.touch()
-    assert made.is_whole(tmp_path)
+    MADE.write(tmp_path)
+    return tmp_path / "results"
+
+
+def test_what_is_read_is_what_was_written(results):
+    assert read_made(results.parent, "a") == MADE
+
+
+@pytest.mark.parametrize(
+    ("was", "now"), [('"asked"', '"other"'), ("[1, 2]", "[]"), ('"drive": "a"', '"drive": "b"')]
+)
+def test_what_was_changed_is_none(results, was, now):
+    path = results / "a.json"
+    text = path.read_text()
+    assert text.count(was) >= 1
+    path.write_text(text.replace(was, now))
+    assert read_made(results.parent, "a") is None
+
+
+def test_a_drive_whose_summary_has_gone_is_none_but_for_one_that_failed(results):
+    (results / "a" / "summary.json").unlink()
+    assert read_made(results.parent, "a") is None
+    failed = replace(MADE, problem="no frames")
+    failed.write(results.parent)
+    assert read_made(results.parent, "a") == failed
+    assert read_made(results.parent, "b") is None

@@ -1,0 +1,343 @@
+"""Tables of counted masks, summed up: totals, windows, pairs, worst frames. A table is a DataFrame.
+
+The rows of `roadeval.results.schema.TABLES` of one drive, or of any number: what is kept apart is
+named by columns, such as `KEY` and `MASK`, and everything follows from the four counts of a row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import FILTERED, FINAL_STAGE, OUTCOMES, UNFILTERED
+from roadeval.data.arrays import Flags, Sums
+from roadeval.evaluation import metrics
+from roadeval.evaluation.metric import Metric
+from roadeval.evaluation.metrics import METRICS, TESTED
+from roadeval.evaluation.regions import HALVES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KEY: Final = ["drive", "camera"]
+MASK: Final = ["variant", "stage"]
+COUNTS: Final = [*OUTCOMES]
+FILTER: Final = "filter"
+"""The part of an error rate that the filter caused, beside the stages'."""
+
+
+def grouped(table: pd.DataFrame, by: Sequence[str]) -> Any:
+    """Group rows by columns, in the order in which the groups first occur, as pandas does."""
+    return table.groupby([*by], sort=False, observed=True)
+
+
+def joined(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Return tables one below the other; names are categoricals in all, as in each."""
+    import pandas as pd
+    from pandas.api.types import union_categoricals
+
+    parts = [*tables]
+    whole = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+    for name in parts[0].columns[parts[0].dtypes == "category"] if len(whole) else ():
+        columns = [part[name].astype("category") for part in parts if len(part)]
+        whole[name] = union_categoricals(columns)
+    return whole
+
+
+def only(table: pd.DataFrame, **values: Any) -> pd.DataFrame:
+    """Return the rows that have a value in each of some columns."""
+    chosen = np.ones(len(table), bool)
+    for name, value in values.items():
+        chosen &= (table[name] == value).to_numpy()
+    return table[chosen]
+
+
+def values_of(table: pd.DataFrame, column: str) -> list[Any]:
+    """Return the values of a column, each once, in the order in which they first occur."""
+    values: list[Any] = table[column].unique().tolist()
+    return values
+
+
+def counts_of(table: pd.DataFrame) -> Sums:
+    """Return TP, TN, FP and FN of each row, ``(n, 4)`` int64."""
+    return table[COUNTS].to_numpy(np.int64)
+
+
+def rates_of(
+    table: pd.DataFrame, wanted: Mapping[str, Metric] = metrics.ALL, prefix: str = ""
+) -> pd.DataFrame:
+    """Compute metrics of each row's counts: a column each; NaN where a metric is undefined."""
+    import pandas as pd
+
+    names = [f"{prefix}{name}" for name in wanted]
+    return pd.DataFrame(metrics.table(counts_of(table), wanted), table.index, names)
+
+
+def totals(frames: pd.DataFrame, by: Sequence[str] = MASK) -> pd.DataFrame:
+    """Sum up rows of frames, a row for each value of the columns ``by``, which are its index.
+
+    Returned are ``frames``, the summed counts and ``N``; each metric as the mean of the frames'
+    (the paper's average), where it is defined; ``pooled_<metric>`` of the summed counts, and
+    ``undefined_<metric>``, the frames on which it is undefined.
+    """
+    import pandas as pd
+
+    sums = grouped(frames, by)[COUNTS].sum()
+    rates = rates_of(frames).groupby([frames[name] for name in by], sort=False, observed=True)
+    sizes = rates.size()
+    return pd.concat(
+        [
+            sizes.rename("frames"),
+            sums.assign(N=sums.sum(axis=1)),
+            rates.mean(),
+            rates_of(sums, prefix="pooled_"),
+            rates.count().rsub(sizes, axis=0).add_prefix("undefined_"),
+        ],
+        axis=1,
+    )
+
+
+def as_trees(sums: pd.DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return `totals` of masks by variant and stage, as ``summary.json`` has them."""
+    rates = [*METRICS, *(f"pooled_{name}" for name in METRICS)]
+    overlap = [*metrics.OVERLAP, *(f"pooled_{name}" for name in metrics.OVERLAP)]
+    trees: dict[str, dict[str, dict[str, Any]]] = {}
+    rows: dict[Any, dict[Any, Any]] = sums.to_dict("index")
+    for (variant, stage), row in rows.items():
+        undefined = {name: int(row[f"undefined_{name}"]) for name in metrics.ALL}
+        first = {name: row[name] for name in ("frames", *COUNTS, "N", *rates)}
+        last = {name: row[name] for name in overlap}
+        trees.setdefault(variant, {})[stage] = {**first, "undefined": undefined, **last}
+    return trees
+
+
+def over_cameras(sums: pd.DataFrame) -> pd.DataFrame:
+    """Return `totals` of each camera's masks together, by mask: means of the cameras' means."""
+    by_mask = sums.groupby(MASK, sort=False, observed=True)
+    undefined = [f"undefined_{name}" for name in metrics.ALL]
+    added = by_mask[["frames", *COUNTS, "N", *undefined]].sum()
+    means = by_mask[[*metrics.ALL]].mean()
+    return added.join(means).join(rates_of(added, prefix="pooled_"))[[*sums]]
+
+
+def windows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
+    """Cut each camera's frames into windows of ``size`` that follow each other.
+
+    Returned are the rows of ``windows.csv``, by window and then mask. Frames are evaluated where
+    any of the masks is; of windows with fewer than ``size`` the last is one.
+    """
+    rank = grouped(frames, KEY)["frame"].rank("dense").astype(np.int64)
+    cut = frames.assign(window=(rank - 1) // size)
+    spans = grouped(cut, [*KEY, "window"])["frame"].agg(first_frame="min", last_frame="max")
+    rows = totals(cut, [*KEY, "window", *MASK]).join(spans).reset_index()
+    names = [*KEY, "window", "first_frame", "last_frame", "frames", *MASK, *METRICS]
+    names += [f"pooled_{name}" for name in METRICS]
+    order = {mask: place for place, mask in enumerate(masks_of(frames))}
+    masks = zip(rows["variant"], rows["stage"], strict=True)
+    place = np.array([order[mask] for mask in masks], int)
+    ranked = np.lexsort((place, rows["window"].to_numpy()))
+    return rows.iloc[ranked][names].reset_index(drop=True)
+
+
+def masks_of(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return variant and stage of each mask, by variant in the table's order, then as stages ran.
+
+    The table's order is that of its categories, where variants are categoricals.
+    """
+    masks = table[MASK].drop_duplicates()
+    if masks["variant"].dtype == "category":
+        masks = masks.iloc[np.argsort(masks["variant"].cat.codes, kind="stable")]
+    return [*zip(masks["variant"], masks["stage"], strict=True)]
+
+
+def final_stages(masks: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Return each variant's final stage: ``post``, or the last that it has.
+
+    ``masks`` are in the order in which the stages ran.
+    """
+    stages: dict[str, str] = {}
+    for variant, stage in masks:
+        if stages.get(variant) != FINAL_STAGE:
+            stages[variant] = stage
+    return stages
+
+
+def is_final(table: pd.DataFrame) -> Flags:
+    """Return of which rows the mask is the final one of its variant on its drive, ``(n,)``."""
+    by = [name for name in (*KEY, "variant") if name in table]
+    mask = grouped(table, [*by, "stage"]).ngroup().to_numpy()
+    _, first = np.unique(mask, return_index=True)
+    masks = table.iloc[first]
+    is_post = masks["stage"] == FINAL_STAGE
+    with_post = is_post.groupby([masks[name] for name in by], observed=True).transform("any")
+    final = np.where(with_post, is_post, ~masks.duplicated(by, keep="last"))
+    return np.asarray(final[mask] if len(mask) else np.zeros(0), bool)
+
+
+def finals(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of each variant's final mask."""
+    return table[is_final(table)]
+
+
+def paired(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
+    """Return the rows that two tables have in common, by the columns ``on``, in the base's order.
+
+    Rows that are equal in these are matched in their order. The base's other columns end in
+    ``_base``.
+    """
+    tables = []
+    for table in (base, new):
+        words = {name: table[name].astype(str) for name in on if table[name].dtype == "category"}
+        tables.append(table.assign(**words, nth=grouped(table, on).cumcount()))
+    pairs = tables[0].merge(tables[1], on=[*on, "nth"], suffixes=("_base", ""))
+    return pairs.drop(columns="nth")
+
+
+def scene_ns(stamps: pd.Series[int]) -> int:
+    """Return how far apart frames of two scenes are: a quarter of the drive, at most 3 seconds."""
+    return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
+
+
+def near_ns(stamps: pd.Series[int] | Sums) -> int:
+    """Return how far apart frames are that are no neighbours: a 30th of the drive, at most 1 s."""
+    return min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
+
+
+def worst(
+    frames: pd.DataFrame, count: int, by: str = TESTED, apart_ns: int | None = None
+) -> pd.DataFrame:
+    """Return at most ``count`` rows with the highest value of a column, the worst first.
+
+    Neighbours fail alike, so of frames less than ``apart_ns`` apart, by default `near_ns`, only the
+    worst is there. Rows without a value are none.
+    """
+    known = frames[frames[by].notna()]
+    ranked = np.argsort(-known[by].to_numpy(), kind="stable")
+    return known.iloc[separate(known["stamp_ns"].to_numpy(), ranked, count, apart_ns)]
+
+
+def most_changed(
+    pairs: pd.DataFrame,
+    count: int,
+    *,
+    harmed: bool,
+    apart_ns: int | None = None,
+    besides: Sequence[int] = (),
+) -> pd.DataFrame:
+    """Return the rows whose ``change`` rose most (``harmed``) or fell most.
+
+    Only frames that did rise, or fall, and of neighbours only one, as in `worst`; none that is a
+    neighbour of the stamps ``besides``.
+    """
+    rise = (1 if harmed else -1) * pairs["change"].to_numpy()
+    ranked = np.argsort(-rise, kind="stable")
+    stamps = pairs["stamp_ns"].to_numpy()
+    return pairs.iloc[separate(stamps, ranked[rise[ranked] > 0], count, apart_ns, besides)]
+
+
+def separate(
+    stamps: Sums, ranked: Sums, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
+) -> Sums:
+    """Return the first ``count`` places of a ranking that are no neighbours of one before."""
+    if apart_ns is None:
+        apart_ns = near_ns(stamps)
+    places: list[int] = []
+    for place in ranked.tolist():
+        if len(places) == count:
+            break
+        taken = np.array([*besides, *stamps[places]], np.int64)
+        if (np.abs(taken - stamps[place]) >= apart_ns).all():
+            places.append(place)
+    return np.array(places, np.int64)
+
+
+def changes(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
+    """Subtract two variants' final masks frame by frame, ``treated`` minus ``control``.
+
+    Returned are the treated variant's rows with ``change`` of `TESTED` and ``wrong``, the net
+    change of wrong pixels; the other's columns end in ``_base``.
+    """
+    last = finals(frames)
+    pairs = paired(only(last, variant=control), only(last, variant=treated), [*KEY, "frame"])
+    wrong = pairs["FP"] + pairs["FN"] - pairs["FP_base"] - pairs["FN_base"]
+    change = pairs[TESTED] - pairs[f"{TESTED}_base"]
+    return pairs.assign(change=change, wrong=wrong).sort_values("frame")
+
+
+def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
+    """Take each frame's error rate apart, stage by stage: a row a frame, a column a part.
+
+    The final mask's ERR is a sum: the ERR of the mask that the final stage was given, as it is
+    without the filter; what the filter changed in that mask (`FILTER`, where both default
+    variants ran); and what the final stage changed. The parts add up to ERR exactly. A variant of
+    one stage has one part.
+    """
+    import pandas as pd
+
+    errors = _errors(only(frames, variant=variant))
+    if len(errors.columns) <= 1:
+        return errors
+    *_, before, last = errors
+    parts = {before: errors[before]}
+    if variant == FILTERED:
+        without = _errors(only(frames, variant=UNFILTERED)).reindex(errors.index)
+        if before in without:
+            parts = {before: without[before], FILTER: errors[before] - without[before]}
+    return pd.DataFrame({**parts, last: errors[last] - errors[before]})
+
+
+def _errors(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return a variant's ERR by frame, a column a stage, in the order they ran."""
+    stages = values_of(rows, "stage")
+    errors = rows.assign(stage=rows["stage"].astype(str))
+    return errors.pivot_table(TESTED, "frame", "stage", "first", dropna=False)[stages].rename_axis(
+        None, axis=1
+    )
+
+
+def by_region(rows: pd.DataFrame) -> pd.DataFrame:
+    """Pool the final masks' counts by region and variant, of frames or of drives.
+
+    Its index are both. Its columns are the rates of short tables, and ``pixels`` and ``errors``:
+    the region's share of all labelled pixels, and of all wrong ones.
+    """
+    sums = grouped(finals(rows), ["region", "variant"])[COUNTS].sum()
+    sums = sums.assign(pixels=sums.sum(axis=1), errors=sums["FP"] + sums["FN"])
+    regions = sums.index.get_level_values("region")
+    halves = sums[regions.isin(HALVES)].groupby("variant", observed=True)[["pixels", "errors"]]
+    whole = halves.sum().reindex(sums.index.get_level_values("variant")).set_axis(sums.index)
+    return rates_of(sums, metrics.SHORT).join(sums[["pixels", "errors"]] / whole)
+
+
+def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Yield the mean rates of final masks once a stage was replaced by the truth.
+
+    Each has ``variant``, ``oracle``, the rates, the ``frames`` that have both masks, and ``as_is``:
+    the ERR on the same frames as it really is.
+    """
+    last = finals(frames)
+    for (variant, oracle), rows in grouped(oracles, ["variant", "oracle"]):
+        final = rows[rows["stage"] == rows["stage"].iloc[-1]]
+        pairs = paired(only(last, variant=variant), final, [*KEY, "frame"])
+        about = {"variant": variant, "oracle": oracle, "frames": len(pairs)}
+        rates = {name: float(pairs[name].mean()) for name in METRICS}
+        yield {**about, **rates, "as_is": float(pairs[f"{TESTED}_base"].mean())}
+
+
+def merged(chains: Iterable[Iterable[str]]) -> list[str]:
+    """Return the names of several chains in one order, which is that of each chain where it can be.
+
+    >>> merged([("similarity", "svm", "post"), ("trees", "post")])
+    ['similarity', 'svm', 'trees', 'post']
+    """
+    names: list[str] = []
+    for chain in chains:
+        place = len(names)
+        for name in reversed(list(chain)):
+            if name in names:
+                place = names.index(name)
+            else:
+                names.insert(place, name)
+    return names

@@ -1,0 +1,273 @@
+"""Totals, windows, pairs, worst frames and causes, by numbers written by hand."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from roadeval.evaluation import tables
+from roadeval.evaluation.tables import only
+from tests.evaluation.making import a_table, table_of
+
+POST, SVM = ("filtered", "post"), ("filtered", "svm")
+CONTROL_POST, CONTROL_SVM = ("unfiltered", "post"), ("unfiltered", "svm")
+NOTHING = table_of("frames", [])
+
+
+def counted(*rows, frames=None, stage="post"):
+    """Rows of a mask with these counts: TP, TN, FP and FN."""
+    names = ("TP", "TN", "FP", "FN")
+    numbers = frames or range(len(rows))
+    mask = {"variant": "net", "stage": stage}
+    made = [
+        {"frame": n, **mask, **dict(zip(names, row, strict=True))}
+        for n, row in zip(numbers, rows, strict=True)
+    ]
+    return table_of("frames", made)
+
+
+# --- Totals ---------------------------------------------------------------------------------------
+
+
+def test_totals_sum_counts_average_rates_and_count_the_undefined():
+    (row,) = tables.totals(counted((3, 1, 0, 1), (0, 4, 4, 0))).to_dict("records")
+    assert row["frames"] == 2
+    assert [row[name] for name in ("TP", "TN", "FP", "FN", "N")] == [3, 5, 4, 1, 13]
+    assert row["ERR"] == (1 / 5 + 4 / 8) / 2
+    assert row["pooled_ERR"] == 5 / 13
+    assert row["TPR"] == 0.75  # the second frame has no road
+    assert {n for n in row if n.startswith("undefined_") and row[n]} == {
+        "undefined_TPR",
+        "undefined_FNR",
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "pooled"),
+    [
+        ("IoU", (3 / 4 + 1 / 3) / 2, 4 / 7),
+        ("mIoU", (5 / 8 + 5 / 12) / 2, (4 / 7 + 7 / 10) / 2),
+        ("F1", (6 / 7 + 2 / 4) / 2, 8 / 11),
+        ("precision", (1 + 1 / 3) / 2, 4 / 6),
+    ],
+)
+def test_totals_have_overlap_as_mean_of_frames_and_of_all_pixels(name, mean, pooled):
+    """A frame without road in mask and truth is in no mean, and counted as undefined."""
+    (row,) = tables.totals(counted((3, 1, 0, 1), (0, 4, 0, 0), (1, 2, 2, 0))).to_dict("records")
+    assert row[name] == pytest.approx(mean, abs=1e-15)
+    assert row[f"pooled_{name}"] == pytest.approx(pooled, abs=1e-15)
+    assert row[f"undefined_{name}"] == 1
+
+
+def test_a_rate_that_no_frame_has_is_undefined():
+    (row,) = tables.totals(counted((0, 0, 0, 0))).to_dict("records")
+    assert (row["frames"], row["N"], row["undefined_ERR"]) == (1, 0, 1)
+    assert math.isnan(row["ERR"])
+    assert math.isnan(row["pooled_ERR"])
+
+
+def test_variants_that_look_like_numbers_keep_their_names_and_order():
+    errors = {("10", "post"): [1], ("2", "post"): [3], ("nan", "post"): [5]}
+    sums = tables.totals(a_table(errors))
+    trees = tables.as_trees(sums)
+    assert [(name, own["post"]["ERR"]) for name, own in trees.items()] == [
+        ("10", 0.01),
+        ("2", 0.03),
+        ("nan", 0.05),
+    ]
+    assert tables.masks_of(a_table(errors)) == [*errors]
+
+
+def test_each_camera_counts_the_same_in_the_mean_of_a_rig():
+    front, rear = a_table({POST: [10, 10, 10]}), a_table({POST: [40]}, camera="/rear")
+    sums = tables.totals(tables.joined([front, rear]), ["camera", "variant", "stage"])
+    (row,) = tables.over_cameras(sums).to_dict("records")
+    assert (row["ERR"], row["pooled_ERR"], row["frames"]) == (0.25, 0.175, 4)
+
+
+def test_nothing_evaluated_is_nothing_in_every_table():
+    assert tables.as_trees(tables.totals(NOTHING)) == {}
+    assert len(tables.windows(NOTHING, 10)) == 0
+    assert [*tables.windows(NOTHING, 10)][:5] == [
+        *("drive", "camera", "window", "first_frame", "last_frame")
+    ]
+    assert tables.masks_of(NOTHING) == []
+    assert tables.is_final(NOTHING).shape == (0,)
+    assert len(tables.finals(NOTHING)) == len(tables.worst(NOTHING, 5)) == 0
+    assert len(tables.paired(NOTHING, NOTHING, ["drive", "frame"])) == 0
+    assert len(tables.changes(NOTHING, *("filtered", "unfiltered"))) == 0
+    assert len(tables.causes(NOTHING, "filtered")) == 0
+    assert len(tables.joined([NOTHING, NOTHING])) == 0
+    assert tables.by_region(table_of("regions", [])).empty
+    assert [*tables.perfect_stages(table_of("oracles", []), NOTHING)] == []
+
+
+# --- Windows --------------------------------------------------------------------------------------
+
+
+def test_the_last_window_may_be_short():
+    rows = tables.windows(counted(*[(1, 1, 1, 1)] * 7, frames=range(10, 17)), 3)
+    spans = rows[["window", "first_frame", "last_frame", "frames"]].to_numpy().tolist()
+    assert spans == [[0, 10, 12, 3], [1, 13, 15, 3], [2, 16, 16, 1]]
+
+
+def test_a_mask_that_is_missing_on_some_frames_says_how_many_it_has():
+    net = counted(*[(1, 1, 1, 1)] * 3, frames=[0, 4, 5])
+    whole = a_table({POST: [10] * 7})
+    rows = only(tables.windows(tables.joined([whole, net]), 2), variant="net")
+    assert rows[["window", "first_frame", "last_frame", "frames"]].to_numpy().tolist() == [
+        [0, 0, 1, 1],
+        [2, 4, 5, 2],
+    ]
+
+
+def test_a_window_has_the_mean_of_the_rates_that_are_defined_and_that_of_all_pixels():
+    rows = tables.windows(counted((3, 1, 0, 1), (0, 4, 4, 0), (1, 1, 0, 0)), 2)
+    assert rows["ERR"].tolist() == [(1 / 5 + 4 / 8) / 2, 0]
+    assert rows["pooled_ERR"].tolist() == [5 / 13, 0]
+    assert rows["TPR"].tolist() == [0.75, 1]
+
+
+def test_each_camera_and_each_drive_is_cut_by_itself():
+    parts = [a_table({POST: [10] * 3}), a_table({POST: [20] * 3}, camera="/rear")]
+    parts += [a_table({POST: [30] * 2}, drive="road")]
+    rows = tables.windows(tables.joined(parts), 2)
+    found = {key: own["frames"].tolist() for key, own in tables.grouped(rows, ["drive", "camera"])}
+    assert [*found.values()] == [[2, 1], [2, 1], [2]]
+
+
+def test_windows_go_by_window_and_then_by_mask_in_the_variants_order():
+    errors = {SVM: [1] * 3, POST: [1] * 3, CONTROL_POST: [1] * 3}
+    rows = tables.windows(a_table(errors), 2)
+    masks = [*zip(rows["window"], rows["variant"], rows["stage"], strict=True)]
+    assert masks == [(window, *mask) for window in (0, 1) for mask in errors]
+
+
+# --- Masks and pairs ------------------------------------------------------------------------------
+
+
+def test_the_final_stage_is_post_or_else_the_last():
+    found = tables.finals(
+        a_table(
+            {SVM: [1], POST: [1], ("mine", "net"): [1], ("mine", "crf"): [1], ("b", "post"): [1]}
+        )
+    )
+    masks = [*zip(found["variant"], found["stage"], strict=True)]
+    assert masks == [POST, ("mine", "crf"), ("b", "post")]
+
+
+def test_each_drive_has_its_own_final_stages():
+    drives = [a_table({SVM: [1] * 2}), a_table({SVM: [1], POST: [1]}, drive="road")]
+    found = tables.finals(tables.joined(drives))
+    assert [*zip(found["drive"], found["stage"], strict=True)] == [
+        *[("street", "svm")] * 2,
+        ("road", "post"),
+    ]
+
+
+def test_frames_are_paired_by_stamp_in_the_bases_order_and_equal_stamps_by_theirs():
+    base, new = (
+        pd.DataFrame({"stamp_ns": stamps, "place": range(len(stamps))})
+        for stamps in ([9, 5, 7, 7, 1], [7, 9, 7, 7, 2])
+    )
+    pairs = tables.paired(base, new, ["stamp_ns"])
+    assert pairs["place_base"].tolist() == [0, 2, 3]
+    assert pairs["place"].tolist() == [1, 0, 2]
+
+
+def test_changes_are_those_of_the_frames_that_both_have_in_their_order():
+    frames = a_table({CONTROL_POST: [10, 10, 10], POST: [12, 9]})
+    found = tables.changes(frames, "filtered", "unfiltered")
+    assert found["change"].tolist() == pytest.approx([0.02, -0.01])
+    assert found["wrong"].tolist() == [2, -1]
+
+
+def test_parts_of_one_table_that_know_other_words_are_joined():
+    whole = tables.joined([a_table({POST: [1]}), NOTHING, a_table({("7", "post"): [2]})])
+    assert whole["variant"].tolist() == ["filtered", "7"]
+    assert whole["variant"].dtype == "category"
+
+
+# --- Worst frames and causes ----------------------------------------------------------------------
+
+
+def test_neighbours_are_a_thirtieth_of_the_drive_apart_and_at_most_a_second():
+    errors = [40, 50, 45, *[0] * 57, 30]
+    short, long = (a_table({POST: errors}, hertz=hertz) for hertz in (10, 0.1))
+    assert tables.worst(short, 3)["frame"].tolist() == [1, 60, 3]
+    assert tables.worst(long, 3)["frame"].tolist() == [1, 2, 0]
+
+
+def test_a_frame_without_a_rate_is_none_of_the_worst():
+    frames = a_table({POST: [10, 30]}).assign(ERR=[0.1, math.nan])
+    assert tables.worst(frames, 5)["frame"].tolist() == [0]
+    assert tables.worst(a_table({POST: [7]}), 5)["frame"].tolist() == [0]
+
+
+@pytest.mark.parametrize(("harmed", "places"), [(True, [2, 1]), (False, [3])])
+def test_frames_that_changed_most_are_those_that_changed_at_all(harmed, places):
+    stamps = np.arange(4) * 1_000_000_000
+    pairs = pd.DataFrame({"stamp_ns": stamps, "change": [0, 0.1, 0.2, -0.1]})
+    assert tables.most_changed(pairs, 5, harmed=harmed).index.tolist() == places
+
+
+def test_the_causes_of_an_error_add_up_to_it():
+    frames = a_table({SVM: [30], POST: [12], CONTROL_SVM: [20], CONTROL_POST: [15]})
+    filtered = tables.causes(frames, "filtered").loc[0].to_dict()
+    assert filtered == pytest.approx({"svm": 0.20, "filter": 0.10, "post": -0.18})
+    assert sum(filtered.values()) == pytest.approx(0.12)
+    unfiltered = tables.causes(frames, "unfiltered").loc[0].to_dict()
+    assert unfiltered == pytest.approx({"svm": 0.20, "post": -0.05})
+    alone = tables.causes(a_table({("net", "post"): [7]}), "net")
+    assert alone.to_dict("records") == [{"post": 0.07}]
+
+
+def test_causes_are_undefined_where_a_mask_is_missing():
+    frames = a_table({SVM: [30, 20], POST: [12, 10], CONTROL_SVM: [20], CONTROL_POST: [15]})
+    found = tables.causes(frames, "filtered")
+    assert found["post"].tolist() == pytest.approx([-0.18, -0.10])
+    assert found["filter"].isna().tolist() == [False, True]
+
+
+# --- Regions and perfect stages -------------------------------------------------------------------
+
+
+def test_regions_pool_the_counts_of_final_masks_and_tell_their_shares():
+    def of(region, stage, *counts):
+        mask = {"variant": "net", "stage": stage, "region": region, "frame": 0}
+        return {**mask, **dict(zip(("TP", "TN", "FP", "FN"), counts, strict=True))}
+
+    rows = [of("boundary", "svm", 0, 0, 9, 9), of("interior", "svm", 0, 0, 9, 9)]
+    rows += [of("boundary", "post", 3, 1, 4, 2), of("interior", "post", 20, 8, 1, 1)]
+    rows += [of("lit", "post", 4, 4, 1, 1)]
+    found = tables.by_region(table_of("regions", rows))
+    assert found["ERR"].to_dict() == {
+        ("boundary", "net"): 6 / 10,
+        ("interior", "net"): 2 / 30,
+        ("lit", "net"): 2 / 10,
+    }
+    assert found["pixels"].tolist() == [10 / 40, 30 / 40, 10 / 40]
+    assert found["errors"].tolist() == [6 / 8, 2 / 8, 2 / 8]
+
+
+def test_a_perfect_stage_is_held_against_the_same_frames_as_they_are():
+    frames = a_table({SVM: [30, 30, 30], POST: [12, 10, 50]})
+    oracles = a_table({SVM: [6, 4], POST: [2, 4]}).assign(oracle="similarity")
+    (found,) = tables.perfect_stages(oracles, frames)
+    assert (found["variant"], found["oracle"], found["frames"]) == ("filtered", "similarity", 2)
+    assert found["ERR"] == pytest.approx(0.03)
+    assert found["as_is"] == pytest.approx(0.11)
+
+
+@pytest.mark.parametrize(
+    ("chains", "order"),
+    [
+        ([("svm", "post"), ("trees", "post")], ["svm", "trees", "post"]),
+        ([("net", "post"), ("svm", "post", "smooth")], ["net", "svm", "post", "smooth"]),
+        ([("a", "b"), ("b", "a")], ["a", "b"]),
+        ([], []),
+    ],
+)
+def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
+    assert tables.merged(chains) == order
