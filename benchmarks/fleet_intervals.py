@@ -18,7 +18,7 @@ import pandas as pd
 from scipy import special
 
 from benchmarks.intervals import show
-from roadeval.evaluation.stats import group_means, over_drives
+from roadeval.evaluation.stats.difference import group_means, over_drives
 
 Values = npt.NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Values]

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal, special, stats
 
-from roadeval.evaluation.stats import holm, interval, mean_distribution
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
+from roadeval.evaluation.stats.difference import holm, interval
 
 Values = npt.NDArray[np.float64]
 Drives = Values

@@ -25,7 +25,7 @@ from benchmarks.tables import idd
 from benchmarks.world import RenderSettings, write_drive
 from roadeval.data import IGNORE, ROAD
 from roadeval.evaluation.score.unlabelled import chosen, entropy
-from roadeval.evaluation.stats import Estimate, draw_order, estimate
+from roadeval.evaluation.stats.sampling import Estimate, draw_order, estimate
 from roadeval.pipeline.stage import View
 from roadeval.training.learning import fit
 

@@ -22,7 +22,7 @@ import roadeval
 from roadeval.results import schema
 
 UNRESOLVED: Final = (
-    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
+    r".*(array\[int\]|Series\[\w+\]|DataclassInstance|PydanticDataclass|ForwardRef)"
     r"|.* for roadeval\.[\w.]+\.__(init|new)__\."
 )
 """Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of

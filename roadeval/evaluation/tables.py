@@ -40,8 +40,9 @@ def joined(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
     parts = [*tables]
     whole = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
-    for name in parts[0].columns[parts[0].dtypes == "category"] if len(whole) else ():
-        columns = [part[name].astype("category") for part in parts if len(part)]
+    words = {n: None for part in parts for n in part.columns[part.dtypes == "category"]}
+    for name in words if len(whole) else ():
+        columns = [part[name].astype("str").astype("category") for part in parts if len(part)]
         whole[name] = union_categoricals(columns)
     return whole
 

@@ -17,7 +17,7 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.metres import band_name
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS
-from roadeval.evaluation.stats import mean_distribution
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.tables import grouped, only, values_of
 from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage

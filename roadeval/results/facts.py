@@ -20,7 +20,8 @@ from pydantic import TypeAdapter, ValidationError
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference, Estimate
+from roadeval.evaluation.stats.difference import Difference
+from roadeval.evaluation.stats.sampling import Estimate
 from roadeval.evaluation.tables import final_stages
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -45,13 +46,14 @@ from roadeval.results.tables import (
     AGAIN,
     FLEET_FORMAT,
     ResultsError,
+    made_of,
     read_parquet,
     read_table,
     write_parquet,
 )
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, check_output, leads_outside, put, writing
-from roadeval.runtime.text import is_utf8
+from roadeval.runtime.files import alone, check_output, leads_outside, put, sha256_of, writing
+from roadeval.runtime.text import is_utf8, visible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,17 +72,17 @@ CACHED: Final = ("frames", "regions", "scores", "worst")
 
 def results_path(folder: Path, drive: str) -> Path:
     """Return the results folder of a drive."""
-    return folder / RESULTS / drive
+    return inside(folder / RESULTS / drive, folder)
 
 
 def made_path(folder: Path, drive: str) -> Path:
     """Return the file that says how a drive's results were made."""
-    return folder / RESULTS / f"{drive}.json"
+    return inside(folder / RESULTS / f"{drive}.json", folder)
 
 
 def recording_path(folder: Path, drive: str) -> Path:
     """Return the recording of a drive, which may not have been kept."""
-    return folder / RECORDINGS / f"{drive}.rrd"
+    return inside(folder / RECORDINGS / f"{drive}.rrd", folder)
 
 
 def cached_path(folder: Path, name: str, drive: str) -> Path:
@@ -88,7 +90,7 @@ def cached_path(folder: Path, name: str, drive: str) -> Path:
 
     pandas and Arrow would read that as a second column ``drive``, and refuse the folder.
     """
-    return folder / name / drive / f"{name}.parquet"
+    return inside(folder / name / drive / f"{name}.parquet", folder)
 
 
 def inside(path: Path, folder: Path) -> Path:
@@ -115,28 +117,31 @@ class Made(Document):
     """Why the drive failed: there are no results then."""
     exit_code: int = 0
     seconds: float | None = None
+    results: str = ""
+    """SHA-256 of the results' summary, stated where it is written; empty where the drive failed."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
-    RESULTS = ("drive", "asked", "stamp", "problem")
+    RESULTS = ("drive", "asked", "stamp", "results", "problem")
 
     def write(self, folder: Path) -> None:
         """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
-        content = json.dumps(self.as_dict(), allow_nan=False)
+        summary = "" if self.problem else sha256_of(results_path(folder, self.drive) / SUMMARY)
+        content = json.dumps(replace(self, results=summary).as_dict(), allow_nan=False)
         put(made_path(folder, self.drive), content.encode())
 
 
 def read_made(folder: Path, drive: str) -> Made | None:
-    """Read how a drive's results were made; None unless they are there, of this version."""
+    """Read how a drive's results were made; None unless these are there, of this version."""
     path = made_path(folder, drive)
     try:
         made = Made.parse(read_bounded(path), path)
+        summary = "" if made.problem else sha256_of(results_path(folder, drive) / SUMMARY)
     except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
         return None  # not there, not ours, or not whole: it is made again
     except OSError as error:
         raise ResultsError(f"{path}: {error.strerror}") from error
-    is_whole = made.problem or (results_path(folder, drive) / SUMMARY).exists()
-    return made if made.drive == drive and is_whole else None
+    return made if (made.drive, made.results) == (drive, summary) else None
 
 
 class FleetFolder:
@@ -160,17 +165,6 @@ class FleetFolder:
         """The folder's name."""
         return self.path.resolve().name
 
-    def recording(self, drive: str) -> Path:
-        """Return where the recording of a drive lies, which may not have been kept.
-
-        A `ResultsError` if a link there leads out of the folder.
-        """
-        return inside(recording_path(self.path, drive), self.path)
-
-    def results(self, drive: str) -> Path:
-        """Return where the results folder of a drive lies, as of `recording`."""
-        return inside(results_path(self.path, drive), self.path)
-
     def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
         """Read a table of all drives, or of some of them.
 
@@ -185,10 +179,9 @@ class FleetFolder:
         scored = known["drive"][known["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
         if name in CACHED:
-            paths = [inside(cached_path(self.path, name, drive), self.path) for drive in chosen]
-            remedy = f"remove {self.path / name} and {AGAIN}"
-            return read_parquet(paths, name, remedy)[[*TABLES[name].names]]
-        folders = ((drive, ResultsFolder(self.results(drive))) for drive in chosen)
+            paths = [cached_path(self.path, name, drive) for drive in chosen]
+            return read_parquet(paths, name)[[*TABLES[name].names]]
+        folders = ((drive, ResultsFolder(results_path(self.path, drive))) for drive in chosen)
         return joined(
             [read_table(name, ""), *(of_drive(own, name, drive) for drive, own in folders)]
         )
@@ -274,14 +267,14 @@ def of_drive(results: ResultsFolder, name: str, drive: str) -> pd.DataFrame:
 
 
 def cache(folder: Path, drive: str) -> None:
-    """Write the Parquet tables of a drive, unless they are there and newer than its results."""
+    """Write the Parquet tables of a drive, unless those of its present results are there."""
     path = results_path(folder, drive)
-    made = (path / SUMMARY).stat().st_mtime_ns
     files = {name: cached_path(folder, name, drive) for name in CACHED}
-    if all(file.exists() and file.stat().st_mtime_ns >= made for file in files.values()):
+    summary = sha256_of(path / SUMMARY)
+    if all(made_of(file) == summary for file in files.values()):
         return
     results = ResultsFolder(path)
-    key = Key(drive, results.facts.drive.camera)
+    key = Key(drive, visible(results.facts.drive.camera))
     frames, regions = (of_drive(results, name, drive) for name in ("frames", "regions"))
     frames = frames.assign(final=is_final(frames))
     rows = {
@@ -290,14 +283,15 @@ def cache(folder: Path, drive: str) -> None:
         "scores": scores(frames, regions, beyond_masks(results.facts, key)),
         "worst": _pictured(folder, drive, frames).assign(rank=0),
     }
-    write_parquet({files[name]: (name, rows[name]) for name in CACHED})
+    write_parquet({files[name]: (name, rows[name]) for name in CACHED}, summary)
 
 
 def _pictured(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of ``worst``: of a drive's frames those that have pictures."""
     rows = frames[frames["final"] & (frames["variant"] != BASELINE)]
     place = Path(PICTURES, drive)
-    numbers = [int(path.stem) for path in (folder / place).glob("*.jpg")]
+    stems = [path.stem for path in inside(folder / place, folder).glob("*.jpg")]
+    numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]
     rows = rows[~rows.duplicated("frame") & rows["frame"].isin(numbers)]
     return rows.assign(picture=[(place / f"{number}.jpg").as_posix() for number in rows["frame"]])
 
@@ -372,12 +366,12 @@ class FleetWriter:
         rows: dict[str, list[Any]] = {"drives": [], "effects": [], "within": [], "cached": []}
         for member in members:
             self._add(member, self._made(member.drive, asked), rows)
-        made = {
-            name: read_parquet(
-                [cached_path(self.folder, name, drive) for drive in rows["cached"]], name
-            )
-            for name in ("scores", "worst")
-        }
+        try:
+            made = self._cached(rows["cached"])
+        except ResultsError:  # damaged: all of the cache is made anew
+            for name in CACHED:
+                shutil.rmtree(inside(self.folder / name, self.folder), ignore_errors=True)
+            made = self._cached(rows["cached"], again=True)
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
         words = made["worst"].astype({"drive": "str"})
@@ -402,14 +396,27 @@ class FleetWriter:
             rows["drives"].append({**how, **failure})
             return
         facts = Facts.read(results_path(self.folder, member.drive) / SUMMARY)
-        key = Key(member.drive, facts.drive.camera)
+        key = Key(member.drive, visible(facts.drive.camera))
         how |= {"camera": key.camera, "seconds": made.seconds}
         rows["effects"] += effect_rows(facts, key)
         rows["within"] += facts.final_effects
         if facts.frames.evaluated:
-            cache(self.folder, member.drive)
             rows["cached"].append(member.drive)
         rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
+
+    def _cached(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
+        """Return the cached sums of drives; what is missing or old is made from their results."""
+        for drive in drives:
+            try:
+                cache(self.folder, drive)
+            except ResultsError as error:
+                if again:  # its results are damaged: it is not done
+                    made_path(self.folder, drive).unlink(missing_ok=True)
+                raise ResultsError(f"{error.args[0].partition(';')[0]}; {AGAIN}") from error
+        return {
+            name: read_parquet([cached_path(self.folder, name, drive) for drive in drives], name)
+            for name in ("scores", "worst")
+        }
 
     def _made(self, drive: str, asked: Mapping[str, str]) -> Made:
         made = read_made(self.folder, drive)

@@ -11,11 +11,11 @@ from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.score.scoreboard import Effect, corrected
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import over_drives, strata
+from roadeval.evaluation.stats.difference import over_drives, strata
 from roadeval.evaluation.tables import COUNTS, MASK, grouped, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
-from roadeval.results.schema import FAILED
+from roadeval.results.schema import FAILED, TAG
 from roadeval.results.sentences import verdict
 from roadeval.version import VERSION
 
@@ -38,8 +38,6 @@ def summarise(
     ``tables`` has ``drives``, and of ``scores`` and ``effects`` the rows of final masks, on all
     pixels. ``alone`` are the differences within the drive, where only one was scored.
     """
-    import pandas as pd
-
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
     logs = drives[drives["log_digest"].fillna("") != ""]
@@ -47,9 +45,9 @@ def summarise(
     copies = {drive: of for drive, of in zip(logs["drive"], firsts, strict=True) if drive != of}
     cameras = {row["drive"]: row["camera"] for row in rows}
     groups = {m.drive: m.group or copies.get(m.drive, m.drive) for m in members}
-    tags = sorted({tag for member in members for tag in member.tags})
-    tagged = pd.DataFrame([{"drive": m.drive, **m.tags} for m in members], columns=["drive", *tags])
-    means = effects.assign(group=effects["drive"].map(groups)).merge(tagged, on="drive")
+    tags = [name for name in map(str, drives) if name.startswith(TAG)]
+    grouping = effects.assign(group=effects["drive"].map(groups))
+    means = grouping.merge(drives[["drive", *tags]], on="drive")
     differences = [*alone]
     parts: list[StratumFacts] = []
     for _, against in grouped(means, ["base"]) if not alone else ():
@@ -60,8 +58,8 @@ def summarise(
                 better = METRICS[rate].higher_is_better
                 rates[rate] = over_drives(drive_means, settings.confidence, higher_is_better=better)
             family.append(Effect(base, variant, stage, final=True, rates=rates))
-            found = strata(only(mask, metric=TESTED), tags, settings.confidence)
-            parts += (StratumFacts(base, variant, *stratum) for stratum in found)
+            for tag, value, change in strata(only(mask, metric=TESTED), tags, settings.confidence):
+                parts.append(StratumFacts(base, variant, tag.removeprefix(TAG), value, change))
         differences += corrected(family)
     totals = _totals(scores)
     return FleetFacts(

@@ -17,7 +17,7 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.thresholds import at_levels
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.tables import KEY, MASK, grouped, is_final, joined, totals
-from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, UNSCORED, Kind
+from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, TYPES, UNSCORED
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -178,14 +178,10 @@ def beyond_masks(facts: Facts, key: Key) -> list[dict[str, Any]]:
     rows = []
     for variant, known in facts.beyond.items():
         episodes = known.get("episodes", {})
-        further = {
-            "boundary_f": known.get("boundary_F"),
-            "boundary_iou": known.get("boundary_IoU"),
-            "episodes": episodes.get("episodes"),
-            "episode_seconds": episodes.get("seconds"),
-        }
-        flicker = {name: known.get(name) for name in ("flicker", "truth_flicker")}
-        rows.append({**key._asdict(), "variant": variant, **further, **flicker})
+        named = ("boundary_F", "boundary_IoU", "flicker", "truth_flicker")
+        further = {name.lower(): known.get(name) for name in named}
+        lasting = {"episodes": episodes.get("episodes"), "episode_seconds": episodes.get("seconds")}
+        rows.append({**key._asdict(), "variant": variant, **further, **lasting})
     return rows
 
 
@@ -205,18 +201,9 @@ def table_of(
     """Return rows as a table of drives, with its columns and their types; None is unknown."""
     import pandas as pd
 
-    types = {column.name: _TYPES[column.kind] for column in TABLES[name].columns}
+    types = {c.name: TYPES[c.kind].replace("int", "Int") for c in TABLES[name].columns}
     types |= {f"{TAG}{tag}": "str" for tag in tags}
     return pd.DataFrame([*rows], columns=[*types]).astype(types)
-
-
-_TYPES: Final[Mapping[Kind, str]] = {
-    **dict.fromkeys((Kind.NAME, Kind.TEXT), "str"),
-    **dict.fromkeys((Kind.COUNT, Kind.TIME), "Int64"),
-    **dict.fromkeys((Kind.RATE, Kind.NUMBER), "float64"),
-    Kind.FLAG: "bool",
-}
-"""Types of tables of drives, of which some were not scored."""
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:

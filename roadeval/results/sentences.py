@@ -14,7 +14,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import FILTER, final_stages
 from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
 

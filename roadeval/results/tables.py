@@ -66,7 +66,9 @@ def read_table(
     table = TABLES[name]
     where = source if isinstance(source, Path) else f"the recording's table {name}"
     try:
-        content = source.encode() if isinstance(source, str) else _content(source)
+        if isinstance(source, Path):
+            check_input(source)
+        content = source.encode() if isinstance(source, str) else source.read_bytes()
     except FileNotFoundError:
         content = b""
     except OSError as error:
@@ -85,11 +87,6 @@ def read_table(
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
     return rows[rows["camera"] == camera] if camera else rows
-
-
-def _content(path: Path) -> bytes:
-    check_input(path)
-    return path.read_bytes()
 
 
 def _check(where: Path | str, content: bytes, stated: TableFacts | None) -> None:
@@ -146,10 +143,11 @@ def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
             raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
 
 
-def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]]) -> None:
+def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str = "") -> None:
     """Write tables of a fleet, given by their files; all are whole before one takes its name.
 
-    Of each its name and its rows are given; NaN is no value. An OSError if one cannot be written.
+    Of each its name and its rows are given; NaN is no value. ``made_of`` is the SHA-256 of what
+    they were made of. An OSError if one cannot be written.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -161,6 +159,7 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]]) -> None:
             for tag in (name for name in map(str, rows) if name.startswith(TAG)):
                 schema = schema.append(pa.field(tag, pa.string()))
             about = {"roadeval": json.dumps(FLEET_FORMAT), "about": TABLES[name].doc}
+            about["made_of"] = made_of
             made = pa.Table.from_pandas(rows[schema.names], preserve_index=False)
             files.append(NewFile(path))
             stack.callback(files[-1].discard)
@@ -176,17 +175,28 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]]) -> None:
             file.publish()
 
 
-def read_parquet(paths: Sequence[Path], name: str, remedy: str = AGAIN) -> pd.DataFrame:
+def made_of(path: Path) -> str:
+    """Return of what a table was made, as it was written; empty where it cannot be read."""
+    from pyarrow import ArrowException, parquet
+
+    try:
+        stated: bytes = parquet.read_metadata(path).metadata[b"made_of"]
+        return stated.decode()
+    except (OSError, KeyError, TypeError, ValueError, ArrowException):
+        return ""
+
+
+def read_parquet(paths: Sequence[Path], name: str) -> pd.DataFrame:
     """Read a table of a fleet's folder from its files, which others may have damaged.
 
-    ``remedy`` is what the user can do where one is damaged. A `ResultsError` if one is not there,
-    cannot be read, or lacks a column, or one is of another type.
+    A `ResultsError` if one is not there, cannot be read, or lacks a column, or one is of another
+    type.
     """
     import pandas as pd
     import pyarrow as pa
 
     schema = TABLES[name].arrow()
-    parts = [_checked(path, schema, remedy) for path in paths] or [schema.empty_table()]
+    parts = [_checked(path, name) for path in paths] or [schema.empty_table()]
     table = pa.concat_tables(parts)
     rows: pd.DataFrame = table.unify_dictionaries().to_pandas(
         types_mapper={pa.int64(): pd.Int64Dtype()}.get
@@ -195,11 +205,12 @@ def read_parquet(paths: Sequence[Path], name: str, remedy: str = AGAIN) -> pd.Da
     return rows.astype(dict.fromkeys(counts, np.int64))
 
 
-def _checked(path: Path, schema: pa.Schema, remedy: str) -> pa.Table:
+def _checked(path: Path, name: str) -> pa.Table:
     """Read a file of a table, words as dictionaries."""
     import pyarrow as pa
     from pyarrow import parquet
 
+    schema = TABLES[name].arrow()
     try:
         check_input(path)
         metadata = parquet.read_metadata(path)
@@ -211,12 +222,7 @@ def _checked(path: Path, schema: pa.Schema, remedy: str) -> pa.Table:
             path, metadata=metadata, read_dictionary=words, page_checksum_verification=True
         ) as file:
             table = file.read()
-        for field in schema:
-            if field.name not in table.column_names:
-                raise ResultsError(f"{path}: has no column {field.name}; {remedy}")
-            kind = table.schema.field(field.name).type
-            if getattr(kind, "value_type", kind) != field.type:
-                raise ValueError(f"column {field.name} is not of type {field.type}")
+        _check_columns(table, name)
         for chunk in (chunk for word in words for chunk in table[word].chunks):
             texts = chunk.dictionary.to_pylist()
             if any(len(text) > LONG for text in texts):  # many rows may have one
@@ -228,9 +234,27 @@ def _checked(path: Path, schema: pa.Schema, remedy: str) -> pa.Table:
         raise ResultsError(f"{path}: is not there; {AGAIN}") from None
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = str(error).partition("\n")[0]
-        raise ResultsError(f"{path}: damaged ({reason}); {remedy}") from error
-    tags = [column for column in table.column_names if column.startswith(TAG)]
+        raise ResultsError(f"{path}: damaged ({reason}); {AGAIN}") from error
+    columns = table.column_names if name == "drives" else ()
+    tags = [column for column in columns if column.startswith(TAG)]
     return table.select([*schema.names, *tags])
+
+
+def _check_columns(table: pa.Table, name: str) -> None:
+    """Refuse, as a ValueError, a table that lacks a column, or a word, or has another type."""
+    import pyarrow as pa
+
+    if len({*table.column_names}) < len(table.column_names):
+        raise ValueError("a column is there twice")
+    for column in TABLES[name].arrow():
+        if column.name not in table.column_names:
+            raise ValueError(f"no column {column.name}")
+        kind = table.schema.field(column.name).type
+        if (kind.value_type if pa.types.is_dictionary(kind) else kind) != column.type:
+            raise ValueError(f"column {column.name} is not of type {column.type}")
+        needed = name != "drives" or column.name in ("drive", "name", "status")
+        if needed and column.type == pa.string() and table[column.name].null_count:
+            raise ValueError(f"column {column.name} lacks a value")
 
 
 def _check_size(metadata: parquet.FileMetaData, size: int) -> None:

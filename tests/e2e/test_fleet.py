@@ -19,7 +19,7 @@ from roadeval.jobs.results.compare import compare
 from roadeval.jobs.run.fleet_work import train_fold
 from roadeval.logs.log import open_log
 from roadeval.logs.writing.writer import LogWriter
-from roadeval.results.fleet import made_path
+from roadeval.results.fleet import made_path, results_path
 from tests.e2e.commands import here
 from tests.fixtures.make import make
 from tests.training.making import frame
@@ -160,7 +160,7 @@ def test_the_same_command_again_tries_what_failed_or_has_gone_alone(gone, drives
     folder = copied(ran, tmp_path)
     before = tables(folder)
     for name in gone:
-        shutil.rmtree(next((folder / "results").glob(f"{name}-*")))
+        shutil.rmtree(next((folder / "results").glob(f"{name}-*/")))
     again, submitted = run(drives, folder, keep="all")
     assert (again.replayed, submitted) == (1 + len(gone), ["b", *gone])
     assert (again.counts, again.problems) == (ran.counts, ran.problems)
@@ -275,6 +275,8 @@ def test_results_that_another_command_has_made_meanwhile_are_not_mixed_with_ours
             future = super().submit(do, task)
             if task.entry.name == "a":
                 own = task.entry.id
+                theirs, ours = (results_path(f, own) for f in (tmp_path / "other", task.folder))
+                shutil.copytree(theirs, ours, dirs_exist_ok=True)
                 shutil.copy(made_path(tmp_path / "other", own), made_path(task.folder, own))
             return future
 

@@ -26,7 +26,7 @@ from roadeval.evaluation.comparison.compare import Change, ComparedResult, Compa
 from roadeval.evaluation.comparison.pairing import ComparedDrive, Side
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import joined, rates_of
 from roadeval.results.schema import TABLES
 from roadeval.results.tables import read_table

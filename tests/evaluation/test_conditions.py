@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.evaluation.comparison.compare import Change
 from roadeval.evaluation.comparison.conditions import Condition, ConditionError
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 
 MASK = Change(
     result="new",

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from pypdf import PdfReader
 
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.report.blocks import Cell, Details, Document
 from roadeval.report.findings import Findings
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.report.chart import ChartKind, looks_of_results
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import DRAWN, MEAN

@@ -8,7 +8,7 @@ import pytest
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.score.scoreboard import Effect
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.results.sentences import (
     notes,
     sentence,

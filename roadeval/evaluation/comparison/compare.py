@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 from itertools import chain, product
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from roadeval.data import BASELINE, UNFILTERED
 from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
@@ -39,7 +41,7 @@ from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.score.scoreboard import within
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference, benjamini_hochberg, holm, over_drives
+from roadeval.evaluation.stats.difference import Difference, benjamini_hochberg, holm, over_drives
 from roadeval.evaluation.tables import (
     COUNTS,
     KEY,
@@ -420,7 +422,9 @@ class _Over:
 
     def mean(self, rows: pd.DataFrame, names: Sequence[str]) -> list[float]:
         """Average drives as their differences are, so that these lie between two rates."""
-        means: list[float] = rows.groupby(self._group(rows))[[*names]].mean().mean().tolist()
+        means: list[float] = (
+            rows.groupby(np.array(self._group(rows)))[[*names]].mean().mean().tolist()
+        )
         return means
 
     def difference(self, rows: pd.DataFrame, rate: str, pairs: pd.DataFrame) -> Difference:

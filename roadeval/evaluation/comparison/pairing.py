@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data.words import first_of
+from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.tables import (
     COUNTS,
@@ -147,7 +148,10 @@ def one_drive(sides: Sequence[Side]) -> list[Side] | None:
 def renamed(rows: pd.DataFrame, keys: Mapping[tuple[str, str], tuple[str, str]]) -> pd.DataFrame:
     """Return rows of drives under other keys: names are text, as in both results."""
     words = {name: rows[name].astype(str) for name in KEY}
-    names = [keys[key] for key in zip(words["drive"], words["camera"], strict=True)]
+    there = [*zip(words["drive"], words["camera"], strict=True)]
+    if unknown := {*there} - keys.keys():
+        raise RoadevalError(f"a table has rows of {' '.join(min(unknown))}, which is not compared")
+    names = [keys[key] for key in there]
     drive, camera = [*zip(*names, strict=True)] or ([], [])
     return rows.assign(drive=[*drive], camera=[*camera])
 

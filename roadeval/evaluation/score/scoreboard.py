@@ -40,7 +40,7 @@ from roadeval.evaluation.score.metres import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
-from roadeval.evaluation.stats import CameraRates, Difference, holm, within_drive
+from roadeval.evaluation.stats.difference import CameraRates, Difference, holm, within_drive
 from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, paired
 from roadeval.geometry.ground import Ground
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, VariantResult, ones
 from roadeval.data.arrays import Floats, Sums, Values
-from roadeval.evaluation.stats import draw_order
+from roadeval.evaluation.stats.sampling import draw_order
 from roadeval.evaluation.tables import near_ns, separate
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from roadeval.evaluation.score.unlabelled import SIGNS, sign_of
 from roadeval.evaluation.tables import finals, only, values_of
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.results.fleet import FleetFolder, recording_path
+from roadeval.results.fleet import FleetFolder, recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
 from roadeval.runtime.text import visible, without_secrets
@@ -142,10 +142,10 @@ def recording_of(fleet: FleetFolder, drive: str) -> Path:
 
     A `RoadevalError` if it was not kept, with the command that makes it.
     """
-    if (path := fleet.recording(drive)).exists():
+    if (path := recording_path(fleet.path, drive)).exists():
         return path
     source = visible(without_secrets(str(fleet.drives.loc[drive, "source"])))
-    words = ["roadeval", "replay", source, "--config", str(fleet.results(drive) / RUN)]
+    words = ["roadeval", "replay", source, "--config", str(results_path(fleet.path, drive) / RUN)]
     words += ["--record", "worst:10", "--save", str(path), "--reports", str(Path("reports", drive))]
     raise RoadevalError(f"{drive}: no recording was kept; make it with: {shlex.join(words)}")
 

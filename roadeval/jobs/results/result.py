@@ -28,7 +28,7 @@ from roadeval.results.facts import (
     TrainingFacts,
     is_fleet,
 )
-from roadeval.results.fleet import FleetFolder
+from roadeval.results.fleet import FleetFolder, results_path
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.rows import (
     Key,
@@ -389,7 +389,8 @@ class Result:
     @cached_property
     def windows(self) -> pd.DataFrame:
         """A row per window of evaluated frames, variant and stage of every drive."""
-        return tables.windows(self.frames, self.facts.evaluation.window)
+        size = self.facts.evaluation.window
+        return joined([tables.windows(each.table("frames"), size) for each in self._opened])
 
     def table(self, name: str, drives: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
         """Return a table of all drives, or of some, by drive and camera.
@@ -417,7 +418,7 @@ def _members(fleet: FleetFolder) -> Iterator[ComparedDrive]:
     scored = next((row["drive"] for row in drives if row["evaluated"]), None)
     if scored is not None:
         with suppress(RoadevalError):  # the folders of its drives may be gone
-            files = contents(ResultsFolder(fleet.results(scored)).facts)
+            files = contents(ResultsFolder(results_path(fleet.path, scored)).facts)
             # Masks and truth of one drive say nothing of the others'.
             settings |= {name: each for name, each in files.items() if name.startswith(OF_ALL)}
     for row in drives:

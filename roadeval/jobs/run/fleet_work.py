@@ -96,17 +96,17 @@ class Done:
     status: str
     reason: str
     asked: str
-    """What its record was made for."""
+    """What its results were made for."""
     repeated: bool = False
     """Whether the drive was done before."""
 
 
 def replay_drive(task: DriveTask) -> Done:
-    """Replay a drive and write its record, unless it is there already.
+    """Replay a drive into the fleet's folder, unless it is done already.
 
     While another command works on the same drive, this one waits for it. A `FleetError` if the
-    fleet's disk fails, or the worker has other software: any problem of the drive itself is in its
-    record.
+    fleet's disk fails, or the worker has other software: any problem of the drive itself is told
+    in `Done`.
     """
     _check(task.software, task.config)
     model = task.config.training.model

@@ -19,14 +19,14 @@ from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score.fit import LAST_LAG, TRUTH, Finding, FitCheck, Misfit
 from roadeval.evaluation.score.scoreboard import DriveSums, drive_effects
 from roadeval.evaluation.score.unlabelled import Unlabelled, sign_of
-from roadeval.evaluation.stats import Estimate, estimate
+from roadeval.evaluation.stats.sampling import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.logs.errors import FrameError
 from roadeval.logs.frames import Selection
 from roadeval.logs.log import Log
 from roadeval.logs.settings import LogConfig
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.truth.pairing import NamedLabels
+from roadeval.logs.truth.names import NamedLabels
 from roadeval.logs.truth.picks import PICK, Picks
 from roadeval.results.facts import (
     DriveFacts,

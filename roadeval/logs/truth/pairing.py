@@ -24,7 +24,7 @@ from roadeval.logs.files import some
 from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
-from roadeval.logs.truth.names import NamedLabels as NamedLabels  # noqa: PLC0414  (jobs use it)
+from roadeval.logs.truth.names import NamedLabels
 
 REACH: Final = 4
 """Messages to look at on either side: topics are logged nearly, not always, in stamp order. Where

@@ -15,7 +15,7 @@ from roadeval.data.words import DASH, in_percent
 from roadeval.evaluation.metrics import METRICS, SHORT, TESTED
 from roadeval.evaluation.score.thresholds import LEVELS, Thresholds
 from roadeval.evaluation.score.unlabelled import SIGNS
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import MASK, finals, grouped, merged, only, values_of
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import (

@@ -6,8 +6,7 @@ from scipy import stats
 from scipy.fft import dct
 from scipy.linalg import toeplitz
 
-from roadeval.evaluation.stats import mean_distribution
-from roadeval.evaluation.stats.autocorrelation import cosine_variances
+from roadeval.evaluation.stats.autocorrelation import cosine_variances, mean_distribution
 from tests.evaluation.making import autoregression
 
 INDEPENDENT = np.random.default_rng(1).standard_normal(400)

@@ -10,13 +10,13 @@ from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import (
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
+from roadeval.evaluation.stats.difference import (
     CameraRates,
     Difference,
     benjamini_hochberg,
     holm,
     interval,
-    mean_distribution,
     over_drives,
     sign_flip_interval,
     sign_flip_p,

@@ -7,8 +7,7 @@ import pytest
 import statsmodels.api as sm
 from scipy import signal, stats
 
-from roadeval.evaluation.stats import draw_order, estimate
-from roadeval.evaluation.stats.sampling import REGRESSION_FROM
+from roadeval.evaluation.stats.sampling import REGRESSION_FROM, draw_order, estimate
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 64, 1000])

@@ -15,7 +15,7 @@ from roadeval.evaluation import metrics, tables
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.stats.difference import Difference
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount, LogFacts, Member
 from roadeval.results.fleet import FleetWriter, Made, results_path
 from roadeval.results.folder import ResultsWriter

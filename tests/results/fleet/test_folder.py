@@ -1,6 +1,7 @@
 """A fleet's folder read back: what is damaged in it is told in one line."""
 
 import json
+import os
 import shutil
 from dataclasses import replace
 
@@ -8,6 +9,7 @@ import pytest
 from pyarrow import parquet
 
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.tables import only
 from roadeval.results.fleet import FleetFolder, FleetWriter, Made, cached_path, read_made
 from roadeval.results.tables import ResultsError
 from tests.results.fleet.making import fleet_of
@@ -103,7 +105,9 @@ def results(tmp_path):
 
 
 def test_what_is_read_is_what_was_written(results):
-    assert read_made(results.parent, "a") == MADE
+    read = read_made(results.parent, "a")
+    assert read is not None
+    assert replace(read, results="") == MADE
 
 
 @pytest.mark.parametrize(
@@ -117,6 +121,11 @@ def test_what_was_changed_is_none(results, was, now):
     assert read_made(results.parent, "a") is None
 
 
+def test_a_drive_whose_results_are_others_by_now_is_none(results):
+    (results / "a" / "summary.json").write_text("{}")
+    assert read_made(results.parent, "a") is None
+
+
 def test_a_drive_whose_summary_has_gone_is_none_but_for_one_that_failed(results):
     (results / "a" / "summary.json").unlink()
     assert read_made(results.parent, "a") is None
@@ -124,3 +133,67 @@ def test_a_drive_whose_summary_has_gone_is_none_but_for_one_that_failed(results)
     failed.write(results.parent)
     assert read_made(results.parent, "a") == failed
     assert read_made(results.parent, "b") is None
+
+
+# --- The cache of tables, which follows from the results ------------------------------------------
+
+
+def finished(folder, members=None):
+    members = members or FleetFolder(folder).facts.drives
+    return FleetWriter(folder).finish(members, EvaluationSettings(), {}, "")
+
+
+def test_a_tag_may_be_called_as_a_column_is(tmp_path):
+    folder = fleet_of(tmp_path / "f", 12)
+    drives = FleetFolder(folder).facts.drives
+    tagged = [replace(d, tags={"camera": "left" * (n % 2)}) for n, d in enumerate(drives)]
+    assert {part.tag for part in finished(folder, tagged).strata} == {"camera"}
+
+
+@pytest.mark.parametrize("table", ["frames", "regions", "scores", "worst"])
+@pytest.mark.parametrize("left", [b"", b"PAR1"])
+def test_a_cached_table_that_is_missing_or_damaged_is_made_anew(tmp_path, table, left):
+    folder = fleet_of(tmp_path / "f", 3, pictures=3)
+    before = finished(folder)
+    path = next((folder / table).rglob("*.parquet"))
+    path.unlink()
+    if left:
+        path.write_bytes(left)
+    assert finished(folder) == before
+    assert len(FleetFolder(folder).table(table))
+
+
+def test_results_that_are_put_in_place_of_others_are_never_taken_for_these(tmp_path):
+    folder, other = (fleet_of(tmp_path / name, 2, seed) for seed, name in enumerate("fg"))
+    drive = FleetFolder(folder).facts.drives[0].drive
+    shutil.copytree(other / "results" / drive, folder / "results" / drive, dirs_exist_ok=True)
+    assert read_made(folder, drive) is None
+    shutil.copy(other / "results" / f"{drive}.json", folder / "results")
+    os.utime(folder / "results" / drive / "summary.json", (0, 0))
+    assert finished(folder).totals != (before := finished(other)).totals
+    errors = [only(FleetFolder(f).scores, drive=drive)["ERR"] for f in (folder, other)]
+    assert errors[0].tolist() == errors[1].tolist()
+    assert before.frames
+
+
+def test_a_link_that_leads_out_of_the_folder_is_not_followed(tmp_path):
+    folder = fleet_of(tmp_path / "f", 2)
+    drive = FleetFolder(folder).facts.drives[0].drive
+    shutil.move(folder / "frames" / drive, tmp_path / "out")
+    content = (tmp_path / "out" / "frames.parquet").read_bytes()
+    (folder / "frames" / drive).symlink_to(tmp_path / "out")
+    with pytest.raises(ResultsError, match="a link leads out of the fleet's folder"):
+        FleetFolder(folder).table("frames")
+    finished(folder)
+    assert not (folder / "frames" / drive).is_symlink()
+    assert (tmp_path / "out" / "frames.parquet").read_bytes() == content
+
+
+def test_a_drive_whose_results_are_damaged_is_not_done(tmp_path):
+    folder = fleet_of(tmp_path / "f", 2)
+    drive = FleetFolder(folder).facts.drives[0].drive
+    (folder / "results" / drive / "frames.csv").write_text("drive,camera\n")
+    shutil.rmtree(folder / "scores" / drive)
+    with pytest.raises(ResultsError, match="run the fleet's command again"):
+        finished(folder)
+    assert read_made(folder, drive) is None
