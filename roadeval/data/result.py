@@ -1,4 +1,4 @@
-"""Results of a frame: what each variant's stages give, their score and names; rows of tables."""
+"""Results of a frame: what each variant's stages give, their score and names."""
 
 from __future__ import annotations
 

@@ -31,7 +31,6 @@ _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 _SCAN: Final = b"\xff\xda"
 _TWELVE_BITS: Final = re.compile(rb"\xff[\xc0-\xc2]\x00[\x0b\x11]\x0c", re.DOTALL)
 """The head of a frame of one or three colours."""
-_PNG: Final = b"\x89PNG\r\n\x1a\n"
 _DEEP: Final = (b"\x10\2", b"\x10\6")
 """Bits a sample, and kind, of a PNG of 16 bits with colours, without and with opacity."""
 OPAQUE: Final = 128
@@ -71,12 +70,17 @@ def deep_samples(data: File, limits: Limits) -> Array | None:
 
 
 def _deep_colours(data: File) -> Array | None:
-    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits: Pillow would keep eight of them."""
+    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits: Pillow would keep eight of them.
+
+    An `ImageError` if it is damaged. None of any other file.
+    """
     import cv2
 
-    if bytes(data[:8]) != _PNG or bytes(data[24:26]) not in _DEEP:
+    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in _DEEP:
         return None
     colours: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if colours is None:
+        raise ImageError("a damaged PNG (its colours of 16 bits cannot be decoded)")
     return np.ascontiguousarray(colours[..., 2::-1])
 
 

@@ -64,9 +64,8 @@ def jpeg_of_size(width: int, height: int) -> bytes:
     return bytes(data)
 
 
-def png_of_size(width: int, height: int) -> bytes:
+def png_of_size(width: int, height: int, data: bytes = EXACT["PNG"]) -> bytes:
     """Return a PNG whose head claims a size, under a checksum that is right."""
-    data = EXACT["PNG"]
     head = b"IHDR" + width.to_bytes(4, "big") + height.to_bytes(4, "big") + data[24:29]
     return data[:12] + head + zlib.crc32(head).to_bytes(4, "big") + data[33:]
 

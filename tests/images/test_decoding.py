@@ -2,10 +2,11 @@
 
 from contextlib import suppress
 
+import cv2
 import numpy as np
 import pytest
 
-from roadeval.images.decoding import palette_indices, size_of, to_labels, to_rgb
+from roadeval.images.decoding import deep_samples, palette_indices, size_of, to_labels, to_rgb
 from roadeval.images.formats import ImageError, Limits, format_of
 from tests.images.making import (
     EXACT,
@@ -127,6 +128,16 @@ def test_a_flipped_bit_of_a_png_is_told_wherever_it_lies(at: int) -> None:
     data[at] ^= 8
     with pytest.raises(ImageError, match="a damaged PNG"):
         to_rgb(bytes(data), LIMITS)
+
+
+def test_a_png_of_sixteen_bits_that_lacks_rows_is_damaged() -> None:
+    # Its checksums are right: nothing but the number of rows tells.
+    for channels in (3, 4):
+        whole = cv2.imencode(".png", np.zeros((5, 4, channels), np.uint16))[1].tobytes()
+        data = png_of_size(4, 6, whole)
+        for read in (to_rgb, deep_samples):
+            with pytest.raises(ImageError, match="a damaged PNG"):
+                read(data, LIMITS)
 
 
 @pytest.mark.parametrize("data", [b"", b"no image", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"])

@@ -85,6 +85,7 @@ def test_json_is_read_with_every_form_of_a_stamp(fields: dict[str, Any]) -> None
         ("json", None, b'{"x": 1}'),
         ("json", None, b"{"),
         ("json", None, b'{"format": "jpeg", "data": "?"}'),
+        ("json", None, b'{"format": "jpeg", "data": 4000000000}'),
         ("cdr", schema(NAME, ""), b"\x00\x01\x00"),
         ("cdr", schema(NAME, ""), PACKED[:-2]),
         ("flatbuffer", schema("foxglove.CompressedImage", "flatbuffer"), b"\x10\x00\x00\x00abc"),

@@ -118,7 +118,7 @@ def _json_message(data: Buffer) -> Any:
     if isinstance(content := getattr(message, "data", None), str):
         message.data = base64.b64decode(content, validate=True)
     elif hasattr(message, "data"):  # else it is no image
-        message.data = bytes(message.data)
+        message.data = bytes([*message.data])  # of a number it would make as many zeros
     return message
 
 
