@@ -21,7 +21,7 @@ def histogram(probability: Probability, truth: Truth) -> Histogram:
     ``probability`` is ``(H, W)`` uint16 codes, ``truth`` ``(H, W)`` uint8: 0 non-road, 1 road, 255
     ignored.
     """
-    counts = [np.bincount(probability[truth == each], minlength=CODES) for each in (NON_ROAD, ROAD)]
+    counts = [np.bincount(probability[truth == side], minlength=CODES) for side in (NON_ROAD, ROAD)]
     return np.array(counts, np.uint32)
 
 

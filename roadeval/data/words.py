@@ -132,8 +132,8 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     begin = end = 0
     if len(names) > 1:
         begin = len(commonprefix(parts))  # noqa: RUF071 - of lists it compares part by part
-        end = len(commonprefix([own[:begin:-1] for own in parts]))  # noqa: RUF071
-    short = ["/".join(own[begin : len(own) - end]) for own in parts]
+        end = len(commonprefix([path[:begin:-1] for path in parts]))  # noqa: RUF071
+    short = ["/".join(path[begin : len(path) - end]) for path in parts]
     clear = len({*short}) == len(short) and ("" not in short or len(short) == 1)
     return dict(zip(names, short if clear else names, strict=True))
 

@@ -210,18 +210,18 @@ def ground_of(
         turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
         plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
     parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
-    made = Ground(*parts, is_posed=is_posed).scaled(*size)
+    ground = Ground(*parts, is_posed=is_posed).scaled(*size)
     # Places all over the image, its edges included.
     columns, rows = np.meshgrid(*(np.linspace(0, length - 1, 9) for length in size))
-    if not np.isfinite(made.places(np.column_stack([columns.ravel(), rows.ravel()]))).any():
+    if not np.isfinite(ground.places(np.column_stack([columns.ravel(), rows.ravel()]))).any():
         return None, "no metres: the camera sees no ground: it looks up"
-    (near, _), (far, _) = (made.pixel_at(ahead) for ahead in STATED)
+    (near, _), (far, _) = (ground.pixel_at(ahead) for ahead in STATED)
     covers = (
         f"a pixel covers {near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
     )
     doubt = lens.doubt if settings.focal else ""
     told = f"metres: flat ground, {text}", covers if math.isfinite(near + far) else "", doubt
-    return made, "; ".join(filter(None, told))
+    return ground, "; ".join(filter(None, told))
 
 
 def _lens(
@@ -267,11 +267,11 @@ def _pose(
         roll = angles[1] if roll is None else roll
         if height is None and mounting.parent in GROUND_FRAMES:
             height = mounting.translation[2]
-    is_low = height is None or not LOWEST <= height <= HIGHEST
-    if height is None or pitch is None or is_low:
+    has_no_height = height is None or not LOWEST <= height <= HIGHEST
+    if height is None or pitch is None or has_no_height:
         above = f": the log has it above {mounting.parent} alone" if mounting else ""
         above = above if height is None else f": the log says {height:.6g} m"
-        missing = [f"the camera's height above the ground{above}"] * is_low
+        missing = [f"the camera's height above the ground{above}"] * has_no_height
         missing += ["its pitch"] * (pitch is None)
         return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
     # Adding 0 makes 0.0 of what would be read as -0.0.

@@ -98,14 +98,14 @@ class Selection:
     @property
     def masks(self) -> dict[str, LabelSource]:
         """Other systems' road masks by name."""
-        return {name: each for name, each in self.labels.items() if name not in (TRUTH, SHADOW)}
+        return {name: s for name, s in self.labels.items() if name not in (TRUTH, SHADOW)}
 
     def digests(self) -> dict[str, str]:
         """Return the SHA-256 of labels that are not in the log: of ``truth``, and masks by name."""
         return {
-            name.removeprefix("/"): each.digest()
-            for name, each in self.labels.items()
-            if each.digest
+            name.removeprefix("/"): source.digest()
+            for name, source in self.labels.items()
+            if source.digest
         }
 
     @property
@@ -209,11 +209,11 @@ def settle(
     labels = {}
     for name, (chosen, reason) in choices.items():
         if chosen is not None:
-            own = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
+            settings = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
             reader = readers[chosen.name]
             pairing = by_time(reader, camera, asked.sync_offset_ms if name == TRUTH else 0.0)
             check_size(chosen.size, reader, 0, camera, pairing)
-            meaning = meaning_of(reader, own)
+            meaning = meaning_of(reader, settings)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     known = calibration_of(image, topics, readers)
     if any(known) and image.turned != 1 and camera.images.limits.turn:
@@ -299,21 +299,21 @@ class Accounting:
     in_log: int = 0
     """Messages of the image topic."""
     in_range: int = 0
-    """Those inside the range, before its stride and its limit."""
+    """Messages inside the range, before its stride and its limit."""
     read: int = 0
     """Frames returned so far."""
     labelled: int = 0
-    """Of these, those with truth."""
+    """Frames returned that have truth."""
     masks: Counter[str] = field(default_factory=Counter)
-    """Of these, those that have a mask of another method, by its name."""
+    """Frames returned that have a mask of another method, by its name."""
     repeated: int = 0
-    """Of these, those that repeat an earlier one, by stamp and content."""
+    """Frames returned that repeat an earlier one, by stamp and content."""
     labels_repeated: int = 0
     """Labelled frames whose label equals an earlier one bit for bit."""
     frame_ids: Counter[str] = field(default_factory=Counter)
     """Frames by the ``frame_id`` of their images."""
     undecodable: dict[int, str] = field(default_factory=dict)
-    """Of the frames returned, those that could not be decoded, and why."""
+    """Why frames could not be decoded, by their numbers."""
     odd_sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
     """Frames that have another width and height than the topic's first image."""
     blank: dict[int, str] = field(default_factory=dict)
@@ -321,11 +321,11 @@ class Accounting:
     of_video: Mapping[str, str] = field(default_factory=dict)
     """Sentences on a video, by what they are of."""
     in_chunks: set[int] = field(default_factory=set)
-    """Those of them whose chunk cannot be read, which is a damage of the log by itself."""
+    """Undecodable frames whose chunk cannot be read, which is a damage of the log by itself."""
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """The other frames that could not be decoded: a sentence each."""
+        """Return a sentence on each undecodable frame that is not ``in_chunks``."""
         lost = sorted(self.undecodable.keys() - self.in_chunks)
         return tuple(f"frame {number}: {self.undecodable[number]}" for number in lost)
 
@@ -354,7 +354,7 @@ class Accounting:
                 "`topics.frame_id` chooses one"
             )
         for level in ("black", "white"):
-            blank = [number for number, own in self.blank.items() if own == level]
+            blank = [number for number, colour in self.blank.items() if colour == level]
             if blank and FEW * len(blank) >= self.read:
                 yield (
                     f"{len(blank)} of the {self.read} images are {level} (frames {_named(blank)}): "
@@ -615,9 +615,9 @@ def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int])
         return
     wanted = frozenset(numbers)
     by_label = frames_of(source.pairing, begin, end, few=True)
-    found = (number for number in by_label if number in wanted)
-    waiting = sorted(islice(found, 2 * REACH))  # labels may be logged nearly in order
-    yield from (heappushpop(waiting, number) for number in found)
+    labelled = (number for number in by_label if number in wanted)
+    waiting = sorted(islice(labelled, 2 * REACH))  # labels may be logged nearly in order
+    yield from (heappushpop(waiting, number) for number in labelled)
     yield from sorted(waiting)
 
 
@@ -626,8 +626,8 @@ def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]
 
     So the log is read once for all of them.
     """
-    times = np.concatenate([each.log_times for each in streams])
-    whose = np.repeat(np.arange(len(streams)), [len(each) for each in streams])
+    times = np.concatenate([stream.log_times for stream in streams])
+    whose = np.repeat(np.arange(len(streams)), [*map(len, streams)])
     for place in whose[np.argsort(times, kind="stable")].tolist():
         yield place, next(streams[place])
 

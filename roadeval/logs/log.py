@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -78,7 +78,7 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
 
 
 def _states(files: Sequence[Path]) -> dict[Path, tuple[int, ...]]:
-    """Return what tells that a file was written anew, of those that no recorder still writes."""
+    """Return `Log.states` of those files that no recorder still writes."""
     states: dict[Path, tuple[int, ...]] = {}
     for file in files:
         with suppress(OSError), file.open("rb") as content:
@@ -112,7 +112,8 @@ class Log:
     lost_files: Sequence[Damage]
     """Files that cannot be read at all."""
     states: Mapping[Path, tuple[int, ...]]
-    """What tells that a file was written anew."""
+    """Inode, bytes and time of change (ns) of each file when it was opened: a file that is written
+    anew has others. A file that a recorder still writes is not among them."""
     of_rig: bool = False
     """Whether other cameras of it are replayed, too."""
     beside: list[Log] = field(default_factory=list)
@@ -132,11 +133,9 @@ class Log:
 
     @property
     def damage(self) -> tuple[Damage, ...]:
-        """What could not be read, in the order of the files."""
-        found = [damage for container in self.containers for damage in damage_of(container)]
-        return tuple(
-            replace(damage, log_start_ns=self.start_ns) for damage in (*self.lost_files, *found)
-        )
+        """Return what could not be read, in the order of the files."""
+        damages = [*self.lost_files, *chain(*map(damage_of, self.containers))]
+        return tuple(replace(damage, log_start_ns=self.start_ns) for damage in damages)
 
     @property
     def losses(self) -> tuple[str, ...]:
@@ -172,10 +171,10 @@ class Log:
 
     @cached_property
     def digest(self) -> str:
-        """What tells this log from another, in hexadecimal: its messages are not read for it.
+        """Return the log's identity in hexadecimal, for which no message is read.
 
-        SHA-256 of sizes, of the places and log times of messages, and of the chunks' own checksums.
-        Equal wherever the log lies. A `LogError` if the disk fails.
+        It is the SHA-256 of sizes, of the places and log times of messages, and of the chunks' own
+        checksums: the same wherever the log lies. A `LogError` if the disk fails.
         """
         try:
             parts = [container.fingerprint() for container in self.containers]
@@ -200,8 +199,8 @@ class Log:
                         on_bytes(done, 2 * self.size)  # chunk by chunk, and as a whole for the sum
             except BadRecord:
                 return None
-        found = [each.hexdigest() for each in sums.values()]
-        return found[0] if len(found) == 1 else hashlib.sha256("".join(found).encode()).hexdigest()
+        parts = [digest.hexdigest() for digest in sums.values()]
+        return parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
 
     def select(self) -> Selection:
         """Settle what to replay: what is asked for, and the rest where the log leaves no doubt.
@@ -211,17 +210,17 @@ class Log:
         label image has another size, or no mask belongs to a frame.
         """
         try:
-            found = settle(self.topics, self.readers, self.config, of_rig=self.of_rig)
+            selection = settle(self.topics, self.readers, self.config, of_rig=self.of_rig)
             if (place := self.config.truth).path:
                 settings = MaskSettings(**vars(place), labels=self.config.labels)
-                truth = self._beside_log(settings, found, self.config.topics.sync_offset_ms)
-                found = replace(found, labels={TRUTH: truth, **found.labels})
-            masks = {name: self._masks(name, m, found) for name, m in self.config.masks.items()}
+                truth = self._beside_log(settings, selection, self.config.topics.sync_offset_ms)
+                selection = replace(selection, labels={TRUTH: truth, **selection.labels})
+            masks = {name: self._masks(name, m, selection) for name, m in self.config.masks.items()}
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
-        return replace(found, labels={**found.labels, **masks})
+        return replace(selection, labels={**selection.labels, **masks})
 
-    def _masks(self, name: str, settings: MaskSettings, found: Selection) -> LabelSource:
+    def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> LabelSource:
         """Settle masks that lie beside the log; words on them name their variant's settings."""
 
         def of_variant(text: str) -> str:
@@ -231,8 +230,8 @@ class Log:
         try:
             if (log := log_and_topic(settings.path)[0]) == settings.path:
                 raise LogError(f"{log}: a log; name a topic of it, as {log}:/topic")
-            masks = self._beside_log(settings, found)
-            if found.truth is not None and masks.where == found.truth.where:
+            masks = self._beside_log(settings, selection)
+            if selection.truth is not None and masks.where == selection.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
         except LogError as error:
             reason = str(error)
@@ -245,11 +244,11 @@ class Log:
         return replace(masks, meaning=meaning, notes=(*map(of_variant, masks.notes),))
 
     def _beside_log(
-        self, settings: MaskSettings, found: Selection, offset_ms: float = 0.0
+        self, settings: MaskSettings, selection: Selection, offset_ms: float = 0.0
     ) -> LabelSource:
         """Settle labels of a folder, of an annotation tool's file, or of another log."""
         log, topic = log_and_topic(settings.path)
-        camera, images = found.camera, found.camera.images
+        camera, images = selection.camera, selection.camera.images
         if log is None:
             origin = labels_in(Path(settings.path), camera.topic.size, settings)
             if settings.names == "*" and settings.images is None:
@@ -346,7 +345,7 @@ class LogDescription:
     losses: tuple[str, ...]
     """The damage of the files, and the losses by it, a sentence each."""
     digest: str
-    """What tells the log from another, see `Log.digest`."""
+    """The log's identity, see `Log.digest`."""
     verified: bool
     """Whether the log was read whole: of one that was not, damage inside chunks is not known."""
     sha256: str | None

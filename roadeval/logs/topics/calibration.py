@@ -114,12 +114,12 @@ def _lens_of(
         try:
             message = reader.fields(position)
             frame = str(getattr(message, "header", message).frame_id)
-            made, why = _read(topic.name, message, image)
+            lens, why = _read(topic.name, message, image)
         except _UNREADABLE:
             why = f"its {topic.encoding} messages of {topic.schema} cannot be read: {_ADVICE}"
             continue
-        if made is not None:
-            return frame, made, why
+        if lens is not None:
+            return frame, lens, why
     return frame, None, why
 
 
@@ -131,42 +131,42 @@ def _read(topic: str, message: Any, image: TopicInfo) -> Known:
         return tuple(map(float, getattr(message, name.upper(), ()) if value is None else value))
 
     size, p = (int(message.width), int(message.height)), numbers("p")
-    lens = str(getattr(message, "distortion_model", "")), numbers("d")
+    bent = str(getattr(message, "distortion_model", "")), numbers("d")
     frame = str(getattr(message, "header", message).frame_id)
-    made, note = Calibration(topic, *size, numbers("k"), *lens, frame), ""
+    lens, note = Calibration(topic, *size, numbers("k"), *bent, frame), ""
     if is_rectified(image.name):
-        flat = replace(made, matrix=(*p[:3], *p[4:7], *p[8:11]), model="", distortion=())
-        if made.bends and not any(p):
+        flat = replace(lens, matrix=(*p[:3], *p[4:7], *p[8:11]), model="", distortion=())
+        if lens.bends and not any(p):
             return None, f"its projection P is zero, and the images are rectified: {_ADVICE}"
-        if made.bends and np.array_equal(flat.matrix, made.matrix):
+        if lens.bends and np.array_equal(flat.matrix, lens.matrix):
             note = "the images are taken as not rectified: P is K, and there is distortion"
         elif any(p):
-            made = flat
-    if made.problem:
-        return None, f"its {made.problem}"
-    fitted, said = _fitted(made, message, image.size or size)
+            lens = flat
+    if lens.problem:
+        return None, f"its {lens.problem}"
+    fitted, said = _fitted(lens, message, image.size or size)
     return fitted, "; ".join(filter(None, (note, said)))
 
 
-def _fitted(made: Calibration, message: Any, size: Size) -> Known:
+def _fitted(full: Calibration, message: Any, size: Size) -> Known:
     """Return a calibration for images of a size: of a part of the sensor, binned, or scaled."""
     region = getattr(message, "roi", None)
     left, top, across, down = (
         int(getattr(region, name, 0)) for name in ("x_offset", "y_offset", "width", "height")
     )
     bins = [max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy"]
-    across, down = across or made.width - left, down or made.height - top
-    if min(left, top) < 0 or left + across > made.width or top + down > made.height:
-        return None, f"its region of interest lies outside its images of {made.width}x{made.height}"
-    part = made.part((left, top), (across // bins[0], down // bins[1]), bins)
+    across, down = across or full.width - left, down or full.height - top
+    if min(left, top) < 0 or left + across > full.width or top + down > full.height:
+        return None, f"its region of interest lies outside its images of {full.width}x{full.height}"
+    part = full.part((left, top), (across // bins[0], down // bins[1]), bins)
     if part.problem:
         return None, f"its {part.problem} of its region of interest, binned"
     if max(abs(part.width - size[0]), abs(part.height - size[1])) <= (max(bins) > 1):
         note = "" if left or top else part.doubt
         return replace(part, width=size[0], height=size[1]), note
-    if size == (made.width, made.height):
-        return made, "its region of interest and binning are not those of the images, and not used"
-    for lens in (part, made):
+    if size == (full.width, full.height):
+        return full, "its region of interest and binning are not those of the images, and not used"
+    for lens in (part, full):
         if lens.has_shape(*size):
             note = f"it is for images of {lens.width}x{lens.height}, and scaled"
             return lens.scaled(*size), "; ".join(filter(None, (note, lens.doubt)))

@@ -441,8 +441,8 @@ def log_and_topic(path: str) -> tuple[str | None, str | None]:
     >>> log_and_topic("night/masks.mcap:/net/road")
     ('night/masks.mcap', '/net/road')
     """
-    if (found := _TOPIC_OF_A_LOG.fullmatch(path)) is not None:
-        return found[1], found[2]
+    if (match := _TOPIC_OF_A_LOG.fullmatch(path)) is not None:
+        return match[1], match[2]
     return (path if path.endswith(".mcap") else None), None
 
 

@@ -112,7 +112,7 @@ class Nearby:
 
 
 class Clock(StrEnum):
-    """What the images of a log can be paired by."""
+    """A quantity by which the images of a log can be paired with labels."""
 
     STAMP = "header stamps"
     LOG_TIME = "log times"
@@ -180,7 +180,7 @@ class Pairing:
     is_small: bool = False
     """Whether all stamps may be read to find an equal one."""
     by: str = Clock.STAMP
-    """What pairs them."""
+    """The quantity that is compared: a `Clock`, or the ``number`` or ``name`` of the frame."""
     unused: int = 0
     """Labels that belong to no frame of the log, as far as that is known beforehand."""
     note: str = ""
@@ -258,15 +258,15 @@ class Partners:
         images, labels = self._pairing.images, self._pairing.labels
         if not self._few:
             return images, labels
-        moved = [own if isinstance(own, Later) else Later(own, 0) for own in (images, labels)]
-        delays = [own.stamps.delays for own in moved if isinstance(own.stamps, TopicReader)]
+        both = [side if isinstance(side, Later) else Later(side, 0) for side in (images, labels)]
+        delays = [side.stamps.delays for side in both if isinstance(side.stamps, TopicReader)]
         spreads = [most - least for least, most in filter(None, delays)]
         doubt = self._pairing.tolerance + max([*spreads, self._pairing.tolerance // 2])
         images, labels = (
-            Later(Nearby(own.stamps, moment - own.offset, doubt), own.offset)
-            if isinstance(own.stamps, TopicReader)
-            else own
-            for own in moved
+            Later(Nearby(side.stamps, moment - side.offset, doubt), side.offset)
+            if isinstance(side.stamps, TopicReader)
+            else side
+            for side in both
         )
         return images, labels
 

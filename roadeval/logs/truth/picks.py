@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
@@ -86,16 +85,16 @@ class Picks:
         if not path.is_file():
             return None
         try:
-            found = TypeAdapter(cls).validate_python(read_json(read_bounded(path)))
+            picks = TypeAdapter(cls).validate_python(read_json(read_bounded(path)))
         except (OSError, ValueError, ValidationError) as error:
             reason = str(error).partition("\n")[0]
             raise LogError(f"{path}: damaged ({reason}); pick into a new folder") from error
-        if problem := found._contradiction():
+        if problem := picks._contradiction():
             raise LogError(
                 f"{path}: not as roadeval pick writes it ({problem}): take the file as it was "
                 "written, or pick into a new folder"
             )
-        return found
+        return picks
 
     @classmethod
     def of_labels(cls, labels: Path) -> Picks | None:
@@ -114,11 +113,9 @@ class Picks:
             return "a frame is picked twice"
         if any(frame_of.get(frame.stamp_ns) != frame.frame for frame in self.picked):
             return "a picked frame is not in the list of all"
-        return (
-            ""
-            if random == self.drawn
-            else f"{random} frames are random, but {self.drawn} were drawn"
-        )
+        if random != self.drawn:
+            return f"{random} frames are random, but {self.drawn} were drawn"
+        return ""
 
     # Stamps are compared as floats, for programs that rewrite JSON round them to such.
 
@@ -130,20 +127,20 @@ class Picks:
     @cached_property
     def by_stamp(self) -> dict[float, Picked]:
         """The picked frames by their stamps."""
-        return {float(each.stamp_ns): each for each in self.picked}
+        return {float(frame.stamp_ns): frame for frame in self.picked}
 
     def is_picked(self, stamp_ns: int, why: Why) -> bool:
         """Return whether a frame was picked for a reason."""
-        own = self.by_stamp.get(float(stamp_ns))
-        return own is not None and own.why is why
+        picked = self.by_stamp.get(float(stamp_ns))
+        return picked is not None and picked.why is why
 
     def every_score(self) -> npt.NDArray[np.float64]:
         """Return how much each frame was in doubt, ``(n,)``; NaN where that is not known."""
-        return np.array([math.nan if each is None else each for each in self.scores])
+        return np.array(self.scores, np.float64)
 
     def check(self, labels: NamedLabels) -> None:
         """Refuse, as a `LogError`, labels with numbers that are not those of the picked frames."""
-        picked = {each.frame for each in self.picked}
+        picked = {frame.frame for frame in self.picked}
         keys = labels.log_times.tolist()
         others = [labels.labels[at].path for at, key in enumerate(keys) if key not in picked]
         if labels.by == "number" and others:
@@ -154,11 +151,11 @@ class Picks:
 
     def is_proposal(self, stamp_ns: int, truth: Truth) -> bool:
         """Return whether a label is still as it was proposed, so that nobody has corrected it."""
-        own = self.by_stamp.get(float(stamp_ns))
-        return own is not None and own.proposal == digest_of(truth == ROAD)
+        picked = self.by_stamp.get(float(stamp_ns))
+        return picked is not None and picked.proposal == digest_of(truth == ROAD)
 
 
 def digest_of(road: npt.NDArray[np.bool_]) -> str:
-    """Return what tells an ``(H, W)`` mask from another, in hexadecimal."""
+    """Return the BLAKE2b of an ``(H, W)`` mask, 8 bytes in hexadecimal."""
     packed = np.packbits(road).tobytes()
     return hashlib.blake2b(packed, digest_size=8).hexdigest()

@@ -13,9 +13,9 @@ def _cityscapes(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
 ) -> Iterator[drawn.Drawing]:
     shapes = (
-        drawn.Outline(thing["label"], drawn.flat(thing["polygon"]))
-        for thing in content["objects"]
-        if not thing.get("deleted")
+        drawn.Outline(area["label"], drawn.flat(area["polygon"]))
+        for area in content["objects"]
+        if not area.get("deleted")
     )
     yield drawn.Drawing(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
 

@@ -99,18 +99,18 @@ def lengths_in(text: str) -> Sequence[int]:
 def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
     """Return one file, with a region of uncompressed runs for each image."""
     images, annotations = [], []
-    for number, each in enumerate(proposals, 1):
-        width, height = each.size
-        rows, columns = (np.flatnonzero(each.road.any(axis=axis)).tolist() for axis in (1, 0))
+    for number, proposal in enumerate(proposals, 1):
+        width, height = proposal.size
+        rows, columns = (np.flatnonzero(proposal.road.any(axis=axis)).tolist() for axis in (1, 0))
         box = [0, 0, 0, 0]
         if rows:
             left, top = columns[0], rows[0]
             box = [left, top, columns[-1] + 1 - left, rows[-1] + 1 - top]
-        images.append({"id": number, "file_name": each.image, "width": width, "height": height})
+        images.append({"id": number, "file_name": proposal.image, "width": width, "height": height})
         about = {"id": number, "image_id": number, "category_id": 1, "iscrowd": 1}
-        runs = {"size": [height, width], "counts": each.runs(by_columns=True)}
+        runs = {"size": [height, width], "counts": proposal.runs(by_columns=True)}
         annotations.append(
-            {**about, "area": int(each.road.sum()), "bbox": box, "segmentation": runs}
+            {**about, "area": int(proposal.road.sum()), "bbox": box, "segmentation": runs}
         )
     content = {"images": images, "annotations": annotations}
     content["categories"] = [{"id": 1, "name": "road"}]

@@ -42,16 +42,16 @@ def _label_studio(
     tasks: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
     sizes: dict[str, drawn.Size | None] = {}
     for task in content:
-        made = task.get("annotations", [task]) or []
+        annotations = task.get("annotations", [task]) or []
         regions: list[Mapping[str, Any]] = []
         with suppress(AttributeError, TypeError):
-            regions = [region for annotation in made for region in _regions(annotation)]
+            regions = [region for annotation in annotations for region in _regions(annotation)]
         image = _image(task, regions)
-        tasks[image] += made
+        tasks[image] += annotations
         stated = (drawn.size_in(r, "original_width", "original_height") for r in regions)
         sizes[image] = sizes.get(image) or next(filter(None, stated), None)
-    for image, made in tasks.items():
-        yield drawn.Drawing(image, sizes[image], _shapes(made, sizes[image] or size))
+    for image, annotations in tasks.items():
+        yield drawn.Drawing(image, sizes[image], _shapes(annotations, sizes[image] or size))
 
 
 def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -91,17 +91,17 @@ def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str
 def _shapes(
     annotations: Sequence[Mapping[str, Any]], size: drawn.Size | None
 ) -> Iterator[drawn.Shape]:
-    made = [annotation for annotation in annotations if not annotation.get("was_cancelled")]
-    made = [made[0]] if len(made) == 1 else [a for a in made if a.get("ground_truth")] or made
-    if len(made) > 1:
-        who = " and ".join(str(a.get("completed_by", a.get("annotator"))) for a in made)
+    valid = [annotation for annotation in annotations if not annotation.get("was_cancelled")]
+    valid = [valid[0]] if len(valid) == 1 else [a for a in valid if a.get("ground_truth")] or valid
+    if len(valid) > 1:
+        who = " and ".join(str(a.get("completed_by", a.get("annotator"))) for a in valid)
         raise BadMessage(
-            f"it has {len(made)} annotations (of annotators {who}): mark one of them as "
+            f"it has {len(valid)} annotations (of annotators {who}): mark one of them as "
             "ground truth in Label Studio and export JSON, or delete the others"
         )
     # A region and its class may be two results of one id, or of one place where there are no ids.
     merged: dict[Any, dict[str, Any]] = {}
-    for region in _regions(made[0]) if made else ():
+    for region in _regions(valid[0]) if valid else ():
         place = json.dumps([region.get(name) for name in ("x", *_AREAS)])
         merged.setdefault(region.get("id", place), {}).update(region)
     for region in merged.values():
