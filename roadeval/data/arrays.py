@@ -43,7 +43,7 @@ Sums = npt.NDArray[np.int64]
 Values = npt.NDArray[np.floating]
 """float32 of any shape. The type is wider: NumPy's stubs do not know that Python floats keep it."""
 Floats = npt.NDArray[np.float64]
-"""Of any shape."""
+"""float64 of any shape."""
 Vector = npt.NDArray[np.float64]
 """``(n,)``."""
 Matrix = npt.NDArray[np.float64]

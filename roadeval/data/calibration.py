@@ -16,11 +16,11 @@ class Mounting:
     """Where a camera is, as seen from the frame at the root of the log's transforms."""
 
     parent: str
-    """That frame's name, as ``base_link``."""
+    """The root frame's name, as ``base_link``."""
     translation: tuple[float, ...]
-    """Of the camera in it: x, y, z in metres."""
+    """The camera's place in it: x, y, z in metres."""
     rotation: tuple[float, ...]
-    """From the camera's axes to its axes, as a quaternion x, y, z, w."""
+    """The rotation from the camera's axes to its axes, as a quaternion x, y, z, w."""
 
     @property
     def has_body_axes(self) -> bool:
@@ -36,7 +36,7 @@ class Calibration:
     topic: str
     width: int
     height: int
-    """Of the image that they are for, in pixels."""
+    """Size in pixels of the images that they are for."""
     matrix: tuple[float, ...]
     """The nine numbers of K, row by row: focal lengths and principal point in pixels."""
     model: str = ""

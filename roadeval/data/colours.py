@@ -30,13 +30,13 @@ FILTERED: Final = BLUE
 UNFILTERED: Final = ORANGE
 BLIND: Final = GREY
 EXTRA: Final = (GREEN, PURPLE, SKY_BLUE, VERMILLION, YELLOW)
-"""Of further variants, in the order in which they are given out; then from the first again."""
+"""Colours of further variants, in the order in which they are given out, again and again."""
 
 TP: Final = GREEN
 FP: Final = VERMILLION
 FN: Final = PURPLE
 TN: Final = SKY_BLUE
-"""In graphs; an error map leaves true negatives clear."""
+"""The colour of true negatives in graphs; an error map leaves them clear."""
 
 MOST_ERRORS: Final = (26, 10, 0)
 NEVER_LABELLED: Final = (187, 187, 187)
@@ -47,7 +47,7 @@ IGNORE: Final = (128, 128, 128)
 BOUNDARY: Final = YELLOW
 SHADOW: Final = SKY_BLUE
 RING: Final = YELLOW
-"""Of lit road around a shadow, from which its compensation is estimated."""
+"""The colour of lit road around a shadow, from which its compensation is estimated."""
 
 CLEAR: Final = (0, 0, 0, 0)
 """Fully transparent: what is under it shows."""

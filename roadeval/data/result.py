@@ -99,7 +99,7 @@ class Change(NamedTuple):
 Contour = tuple[float, float, Sums]
 """A final mask's boundary F and boundary IoU, NaN where undefined, and its trimap, ``(w, 2)``."""
 Transition = tuple[str, str, str, str]
-"""From one mask to another: variant and stage before, variant and stage after."""
+"""A change of masks: variant and stage before, variant and stage after."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class Output:
     threshold on it.
     """
     by_class: tuple[Probability, ...] = ()
-    """The same of each class of road, where there are several."""
+    """Probabilities of each class of road, where there are several."""
 
 
 @dataclass(frozen=True, eq=False)

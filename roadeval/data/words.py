@@ -12,7 +12,7 @@ DASH: Final = "\N{EN DASH}"
 """Between two numbers; and where a number is undefined."""
 MINUS: Final = "\N{MINUS SIGN}"
 UNSET: Final = "not given"
-"""Of a setting."""
+"""The value of a setting that is not given."""
 _YEAR_NS: Final = 365 * 24 * 3600 * 1_000_000_000
 
 

@@ -40,7 +40,7 @@ TOLERANCE: Final = 1e-6
 STEPS: Final = 30
 """How often a ray is corrected, at most."""
 AXES: Final = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""From ahead, left and up to a camera's right, down and forward."""
+"""The rotation from ahead, left and up to a camera's right, down and forward."""
 
 
 class GroundError(RoadevalError):
@@ -53,7 +53,7 @@ class Ground:
 
     width: int
     height: int
-    """Of its images, in pixels."""
+    """Size of its images in pixels."""
     matrix: tuple[float, ...]
     """Nine numbers, row by row: from a ray's direction to its pixel."""
     plane: tuple[float, ...]

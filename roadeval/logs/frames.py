@@ -286,7 +286,7 @@ Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
 NAMED: Final = 5
 """Frames that a sentence names."""
 FEW: Final = 10
-"""Where one in so many images is blank, it is told."""
+"""Blank images are told if at least one in so many is blank."""
 
 
 @dataclass(slots=True)
@@ -380,7 +380,7 @@ class Label(NamedTuple):
     picture: Picture | FrameError
     """The picture, or why it cannot be read."""
     place: str
-    """Where it lies: its topic, or its own file."""
+    """Its topic, or its own file, for messages."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -398,7 +398,7 @@ class LoggedFrame:
     """The labels that belong to it, by their names in `Selection.labels`."""
     selection: Selection
     accounting: Accounting
-    """Where decoding counts what it finds."""
+    """The counts that decoding adds to."""
 
     @property
     def labelled(self) -> bool:

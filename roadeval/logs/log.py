@@ -338,7 +338,7 @@ class LogDescription:
     """Log times of its first and last message."""
     topics: tuple[TopicInfo, ...]
     picks: tuple[str, ...]
-    """What a replay would pick and why, a sentence each."""
+    """The topics that a replay would pick and why, a sentence each."""
     problem: str
     """Why a replay could not pick, or empty."""
     damage: tuple[str, ...]
@@ -349,7 +349,7 @@ class LogDescription:
     verified: bool
     """Whether the log was read whole: of one that was not, damage inside chunks is not known."""
     sha256: str | None
-    """Of a log that was read whole."""
+    """SHA-256 of a log that was read whole, see `Log.verify`; else None."""
     misfits: tuple[str, ...] = ()
     """How truth that lies beside the log does not fit its images, a sentence each."""
 

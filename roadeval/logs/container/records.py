@@ -59,7 +59,7 @@ BLOCK: Final = 1 << 20
 LARGEST_CHUNK: Final = 1 << 30
 """Most bytes that are uncompressed of a chunk: a few of them can become any number."""
 LIKELY: Final = 64
-"""By how much a chunk may have been compressed whose head claims another size."""
+"""Largest ratio of compression of a chunk whose head claims another size."""
 IN_MEMORY: Final = 16 << 20
 """A chunk of more bytes is held in a temporary file; writers make chunks of about a megabyte."""
 CACHE: Final = 16 << 20
@@ -132,7 +132,7 @@ class Record(NamedTuple):
     body: int
     end: int
     content: Any = None
-    """What it says, as far as that was read."""
+    """Its fields, as far as they were read."""
 
 
 class Message(NamedTuple):
@@ -168,7 +168,7 @@ class Chunk(NamedTuple):
 
     @property
     def data_end(self) -> int:
-        """Where its data ends in the file."""
+        """Return the byte of the file where its data ends."""
         return self.data_offset + self.data_size
 
     @property
@@ -396,7 +396,7 @@ class Summary:
     """The contents of the summary; nothing where it cannot be relied on."""
 
     start: int | None = None
-    """Where it should begin, and the data end, as the file's end says; None if that is missing."""
+    """The byte where it should begin, and the data end, by the footer; None if that is missing."""
     checked: bool = False
     """Whether its checksum is given, and right."""
     problem: str = ""
@@ -406,7 +406,7 @@ class Summary:
     chunks: dict[int, Chunk] = field(default_factory=dict)
     """The chunks' heads but for their checksums, by offset."""
     index_ends: dict[int, int] = field(default_factory=dict)
-    """Where the message indexes of a chunk end, by the chunk's offset."""
+    """The byte where a chunk's message indexes end, by the chunk's offset."""
     statistics: Statistics | None = None
 
     def fill(self, records: memoryview) -> None:

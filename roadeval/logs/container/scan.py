@@ -89,18 +89,18 @@ class Gap(NamedTuple):
 
 
 class Scan:
-    """What there is in a file."""
+    """The chunks, messages, descriptions and gaps of a file."""
 
     def __init__(self, source: FileBytes, stamp_of: StampOf) -> None:
         self.source, self.stamp_of = source, stamp_of
         self.reader = ChunkReader(source)
         self.summary = read_summary(source)
         self.chunks: list[Chunk] = []
-        """In the order of the file."""
+        """The chunks in the order of the file."""
         self.indexes: list[dict[int, Entries] | None] = []
         """For each chunk, its messages by channel; None where its message indexes are damaged."""
         self.seen: dict[int, Mapping[int, Entries]] = {}
-        """The same of the chunks that were looked into."""
+        """The messages by channel of the chunks that were looked into."""
         self.loose: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         """Log times and offsets, in turn, of the messages outside chunks, by channel."""
         self.schemas = dict(self.summary.schemas)
@@ -112,13 +112,13 @@ class Scan:
         self.gaps: list[Gap] = []
         self.data_end: int | None = None
         self.after_data: int | None = None
-        """Where the data section ends, None if the file ends before; and what comes after it."""
+        """Ends of the data section and of the record that ends it; None if the file ends before."""
         self.data_crc = 0
         """Its checksum, 0 if not given."""
         self.saved_ns: int | None = None
         """Log time of the last message saved from a chunk that is cut off."""
         self.next_log: int | None = None
-        """Where another log begins in the same file."""
+        """The byte where another log begins in the same file."""
         self._stop = None if self.summary.problem else self.summary.start
         self._listed = self.summary.chunks if self.summary.checked else {}
         end = self.summary.start or inf

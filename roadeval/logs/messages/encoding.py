@@ -119,7 +119,7 @@ LONGEST_TEXT: Final = 1 << 16
 """Bytes of a schema that the libraries are given: their time grows with the square of it."""
 
 Decode = Callable[[Buffer], Any]
-"""From a message's bytes to an object that has its fields as attributes."""
+"""Read a message's bytes to an object that has its fields as attributes."""
 
 
 class MessageReader(NamedTuple):

@@ -55,7 +55,7 @@ class CompressedPicture:
     data: Buffer
     frame_id: str = ""
     number: int | None = None
-    """Of a packet, as its encoder or its recorder counts it."""
+    """A packet's number, as its encoder or its recorder counts it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ class TopicInfo:
     name: str
     schema: str
     encoding: str
-    """Of the messages: ``cdr``, ``protobuf``, ..."""
+    """The messages' encoding: ``cdr``, ``protobuf``, ..."""
     kind: TopicKind
     """What its messages carry, by the schema's name."""
     count: int
@@ -212,7 +212,7 @@ class TopicReader:
         table = table[np.argsort(table[:, 0], kind="stable")]
         self.log_times: npt.NDArray[np.int64] = np.ascontiguousarray(table[:, 0])
         self._places = table[:, 1:]
-        """Of each message the offset, the number of its channel here, and that of its chunk."""
+        """``(n, 3)``: each message's offset, its channel's number here, and its chunk's."""
         # An array of Python's own: each image asks for some thirty stamps, one by one.
         self._stamps = array("q", [UNREAD]) * len(table)
         self.delays: tuple[int, int] | None = None

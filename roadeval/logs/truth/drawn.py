@@ -262,7 +262,7 @@ class LabelFormat:
 
     name: str
     ending: str
-    """Of its files, in lower case."""
+    """The ending of its files, in lower case."""
     holds: Callable[[Path, Any], bool]
     """Whether a parsed file is of this format."""
     read: Callable[[Path, Any, Size | None], Iterable[Drawing]]

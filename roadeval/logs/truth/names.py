@@ -61,7 +61,7 @@ class LabelSet:
     classes: Mapping[str, int] = field(default_factory=dict)
     """Values of the classes by their names, where the format has names."""
     occurring: Mapping[str, int] = field(default_factory=dict)
-    """In how many labels each class occurs, if that is known without decoding them."""
+    """Number of labels in which each class occurs, if it is known without decoding them."""
     lost: int = 0
     """How many of them cannot be read, so that their classes are not known."""
     notes: tuple[str, ...] = ()

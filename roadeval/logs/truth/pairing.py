@@ -191,7 +191,7 @@ class Pairing:
 
     @cached_property
     def reach_ns(self) -> int | None:
-        """Where both are in order: the first stamp on a side that is farther away ends a search."""
+        """The distance (ns) beyond which a search ends; None if stamps may lie anywhere."""
         if self.is_small or not self.period or not (_rise(self.images) and _rise(self.labels)):
             return None
         return max(REACH * self.period, self.tolerance)

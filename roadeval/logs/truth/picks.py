@@ -46,12 +46,12 @@ class Picked:
     stamp_ns: int
     why: Why
     probability: float | None
-    """Of being among those that were drawn; None of a ranked one."""
+    """Probability of being among those that were drawn; None of a ranked one."""
     score: float | None
     proposal: str
     """Digest of the mask that was proposed, see `digest_of`."""
     wave: int = 1
-    """By which command, from 1."""
+    """The number of the command that picked it, from 1."""
 
 
 @dataclass(frozen=True)

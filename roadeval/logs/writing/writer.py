@@ -58,7 +58,7 @@ class LogWriter:
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[Schema, int] = {}
         self._channels: dict[str, tuple[int, Iterator[int]]] = {}
-        """Of each topic, and the numbers of its messages."""
+        """The channel of each topic, and the numbers of its messages."""
 
     def image(
         self,
