@@ -175,8 +175,9 @@ class Document:
         try:
             facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
         except ValidationError as error:
-            part = error.errors(include_url=False, include_input=False)[0]["loc"][0]
-            part = part if part in content else "difference"
+            wrong = [each["loc"][0] for each in error.errors(include_url=False, include_input=False)]
+            part = next((name for name in wrong if name in content), wrong[0])
+            part = "difference" if part == "effects" and part not in content else part
             raise cls._damaged(where, f"`{part}` is not what it must be") from error
         if not is_as_written(content):
             raise cls._damaged(where, "its content is not what was written")
@@ -328,14 +329,14 @@ class Facts(Document):
                 for variant, rates in content.get(f"against_{name}", {}).items():
                     of = base or variant.removesuffix(TUNED)
                     effects.append((of, variant, finals[variant], True, rates))
+            cameras = content.get("cameras", {}).items()
+            return {
+                **content,
+                "effects": [dict(zip(names, effect, strict=True)) for effect in effects],
+                "cameras": {name: cls.read_content(facts) for name, facts in cameras},
+            }
         except (AttributeError, KeyError, TypeError):
             return {**content, "effects": None}  # the parts tell what is wrong
-        cameras = content.get("cameras", {}).items()
-        return {
-            **content,
-            "effects": [dict(zip(names, effect, strict=True)) for effect in effects],
-            "cameras": {name: cls.read_content(facts) for name, facts in cameras},
-        }
 
     @property
     def final_effects(self) -> list[Effect]:

@@ -203,7 +203,8 @@ def table_of(
 
     types = {c.name: TYPES[c.kind].replace("int", "Int") for c in TABLES[name].columns}
     types |= {f"{TAG}{tag}": "str" for tag in tags}
-    return pd.DataFrame([*rows], columns=[*types]).astype(types)
+    table = pd.DataFrame([*rows], columns=[*types])
+    return table.astype(types).where(table.notna())  # pandas 2 makes None the word "None"
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:

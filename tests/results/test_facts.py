@@ -100,11 +100,21 @@ def test_a_summary_of_another_format_is_refused_with_who_wrote_it(summary, told)
         ("drive", {}),
         ("frames", {"evaluated": "many"}),
         ("difference", {"post": {"ERR": {"mean": "high"}}}),
+        ("cameras", []),
+        ("cameras", {"left": "no facts"}),
     ],
 )
 def test_a_part_of_another_shape_is_damage(part, value):
     with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
         Facts.parse(changed(**{part: value}), "here")
+
+
+@pytest.mark.parametrize("part", ["verdict", "frames", "totals", "difference"])
+def test_a_part_that_is_not_there_is_named(part):
+    content = json.loads(WRITTEN.text())
+    del content[part]
+    with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
+        Facts.parse(json.dumps(content), "here")
 
 
 def test_a_number_that_was_changed_is_damage():
