@@ -89,7 +89,8 @@ def read_yaml(path: Path) -> Any:
                 if depth > DEPTH:
                     raise RecursionError
             document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    # PyYAML raises any of these for a value that its tag does not fit.
+    except (yaml.YAMLError, AttributeError, LookupError) as error:
         raise ValueError("it is damaged") from error
     _check(document, VALUES)
     return document
@@ -97,7 +98,7 @@ def read_yaml(path: Path) -> Any:
 
 @contextmanager
 def _in_words() -> Iterator[None]:
-    """Say in plain words what a parser found."""
+    """Turn the errors of a parser into a ValueError in plain words."""
     try:
         yield
     except RecursionError as error:

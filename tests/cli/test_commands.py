@@ -50,6 +50,14 @@ def test_what_was_left_out_is_told_and_decides_the_exit_code(tmp_path, monkeypat
     assert (tmp_path / "m.model").exists()
 
 
+def test_of_several_logs_the_one_that_frames_are_picked_from_is_named_with_its_folder(bare, capsys):
+    write_log(bare.with_name("longer.mcap"), truth=False, numbers=range(40))
+    words = ["bare.mcap", "longer.mcap", "-n", "1", "-o", "picks", "--config", "patch.toml"]
+    assert main(["pick", *words]) == 0
+    command = capsys.readouterr().out.rpartition("next")[2]
+    assert "replay longer.mcap --config picks/longer/run.toml --truth picks/longer" in command
+
+
 # --- The command ``pack``: a folder of images becomes a log that ``info`` and ``replay`` take -----
 
 

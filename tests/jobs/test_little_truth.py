@@ -13,6 +13,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
+from roadeval.jobs.results.inspect import worst_frames
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LogConfig, TopicSettings
 from roadeval.logs.writing.writer import LogWriter
@@ -188,3 +189,27 @@ def test_train_and_info_take_truth_beside_the_log(places, tmp_path):
     picks = json.loads(run.stdout)["picks"]
     assert f"truth: {places / '21'} (21 labels, paired by number; " in picks[1]
     assert "no truth" not in " ".join(picks)
+
+
+def test_frames_without_truth_and_without_doubt_are_not_ranked(tmp_path):
+    """One method alone differs from no other, and one frame from none before."""
+    write_log(tmp_path / "drive.mcap", truth=False, numbers=range(6))
+    config = roadeval.configure({"only": ["unfiltered"], "training": {"frames": 5}})
+    roadeval.replay(tmp_path / "drive.mcap", config, reports=tmp_path / "out")
+    with pytest.raises(RoadevalError, match="nothing was scored, so no frame is the worst"):
+        worst_frames(roadeval.Result(tmp_path / "out"))
+
+
+def test_a_drive_gives_frames_to_pick_by_its_length_whatever_was_scored(tmp_path):
+    for name, only in (("one", ["unfiltered"]), ("two", [])):
+        write_log(tmp_path / f"{name}.mcap", truth=False, numbers=range(12))
+        config = roadeval.configure({"only": only, "training": {"frames": 2}})
+        roadeval.replay(tmp_path / f"{name}.mcap", config, save=tmp_path / f"{name}.rrd")
+    recordings = [tmp_path / "one.rrd", tmp_path / "two.rrd"]
+    assert [each.new for each in roadeval.pick(recordings, 6, tmp_path / "picks")] == [3, 3]
+
+
+@pytest.mark.parametrize("job", [roadeval.compare, lambda none: roadeval.pick(none, 1, "picks")])
+def test_a_job_that_is_given_nothing_says_so(job):
+    with pytest.raises(RoadevalError, match="nothing to "):
+        job([])

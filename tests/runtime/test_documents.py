@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from roadeval.runtime.documents import LONGEST, read_bounded, read_json, read_toml
+from roadeval.runtime.documents import LONGEST, read_bounded, read_json, read_toml, read_yaml
 
 BIG = "x" * (LONGEST + 1)
 MANY = "y" * 1_001
@@ -81,3 +81,10 @@ def test_a_document_is_a_file_that_ends(tmp_path):
         read_bounded(tmp_path / "large")
     with pytest.raises(OSError, match="is a folder"):
         read_bounded(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["!!timestamp noon", '!!int ""', "!!bool maybe", "a: [1"])
+def test_yaml_whose_values_are_not_of_their_tags_is_damaged(tmp_path, text):
+    (tmp_path / "camera.yaml").write_text(text)
+    with pytest.raises(ValueError, match="it is damaged"):
+        read_yaml(tmp_path / "camera.yaml")

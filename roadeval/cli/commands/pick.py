@@ -83,6 +83,6 @@ def _next(found: Sequence[Outcome], output: Path) -> str:
     """Return the command that scores the logs with their labels, in the way they were replayed."""
     logs, config = join(each.log for each in found), quote(str(found[0].config))
     if len(found) == 1:
-        return f"roadeval replay {logs} --config {config} --truth {quote(str(output))}"
+        return f"roadeval replay {logs} --config {config} --truth {quote(str(found[0].folder))}"
     truth = quote(f"{output}/{{drive}}")
     return f"roadeval fleet {logs} --config {config} --truth {truth} -o labelled"

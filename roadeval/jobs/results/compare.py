@@ -82,6 +82,8 @@ def compare(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     paths = [Path(path) for path in listed(results)]
+    if not paths:
+        raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
     opened = [Result(path) for path in paths]
     if across:

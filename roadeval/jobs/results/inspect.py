@@ -59,8 +59,8 @@ def worst_frames(
 
     Where nothing was scored, they are ranked by how much the mask is in doubt, one a scene.
     Of a fleet the frames of all drives are ranked together, all that are known by default, and
-    always of the first variant. A `RoadevalError` if nothing was scored, or ERR is undefined on
-    every frame, or there is no such variant.
+    always of the first variant. A `RoadevalError` if there is nothing to rank by, as where ERR is
+    undefined on every frame, or there is no such variant.
     """
     if fleet := result.fleet:
         if fleet.worst.empty:
@@ -72,8 +72,10 @@ def worst_frames(
     found = [replace(each, rank=rank) for rank, each in enumerate(found, 1)]
     if not found:
         (path,) = result.paths
+        if not (scored := _scored(cameras[0])):
+            raise _nothing_scored(path)
         raise RoadevalError(
-            f"{path}: ERR of {variant or _scored(cameras[0])[0]} is undefined on "
+            f"{path}: ERR of {variant or scored[0]} is undefined on "
             "every frame, so no frame is the worst"
         )
     return found

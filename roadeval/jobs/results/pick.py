@@ -97,6 +97,8 @@ def pick(
     from roadeval.jobs.run.replay import replay
 
     given = [source] if isinstance(source, str | PathLike) else [*source]
+    if not given:
+        raise RoadevalError("nothing to pick from: name a result, a log or a fleet")
     with TemporaryDirectory(prefix="roadeval-") as place:
         drives, config = [], config or RunConfig()
         masks = config.override({"output": {"record": "masks", "figures": False}})
@@ -120,10 +122,10 @@ def pick(
         if len({*names}) < len(names):
             raise RoadevalError("two drives have the same name; pick from each into its own folder")
         how = labels, variant, seed
-        shares = _shares([len(drive.table("unlabelled")) for _, drive, _ in drives], count)
+        lengths = [drive.table("unlabelled")["frame"].nunique() for _, drive, _ in drives]
         return [
             _picked(drive, _Wanted(each, own, Path(folder, *[drive.name] * many), *how, run))
-            for (each, drive, run), own in zip(drives, shares, strict=True)
+            for (each, drive, run), own in zip(drives, _shares(lengths, count), strict=True)
             if own
         ]
 
