@@ -207,6 +207,12 @@ def test_curves_of_bdd100k_are_cubic(tmp_path, types):
     assert ((label == "road") ^ expected).sum() <= 2
 
 
+def test_a_curve_without_a_place_costs_its_image(tmp_path):
+    part = {"category": "road", "poly2d": [{"vertices": [None], "types": "LCCL", "closed": True}]}
+    lost = one(tmp_path, "a.json", [{"name": "1.png", "labels": [part]}])
+    assert lost == "an outline of road whose points are no pixels"
+
+
 @pytest.mark.parametrize(("what", "listed"), [("image", "images"), ("category", "categories")])
 def test_ids_that_are_used_twice_are_refused(tmp_path, what, listed):
     content = coco([[0, 0, 9, 0, 9, 9]])

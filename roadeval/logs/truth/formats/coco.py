@@ -56,9 +56,8 @@ def _shapes(
                 yield from (drawn.Outline(label, ring) for ring in rings if ring)
             case None | [] | [[]]:
                 left, top, width, height = annotation.get("bbox") or (0, 0, 0, 0)
-                box = (
-                    drawn.rectangle(label, left, top, left + width, top + height) if width else None
-                )
+                corners = left, top, left + width, top + height
+                box = drawn.rectangle(label, *corners) if width else None
                 yield drawn.Undrawn(label, "box without an outline", box)
             case other:
                 yield drawn.Outline(label, other)
@@ -70,9 +69,8 @@ def run_lengths(label: str, counts: Any, stated: Any, size: drawn.Size | None) -
         raise BadMessage(
             f"a mask of {label} that is {stated[1]}x{stated[0]}, on an image of {size[0]}x{size[1]}"
         )
-    return drawn.Runs(
-        label, lengths_in(counts) if isinstance(counts, str) else counts, by_columns=True
-    )
+    lengths = lengths_in(counts) if isinstance(counts, str) else counts
+    return drawn.Runs(label, lengths, by_columns=True)
 
 
 def lengths_in(text: str) -> Sequence[int]:

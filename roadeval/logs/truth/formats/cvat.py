@@ -32,9 +32,8 @@ def _shape(element: Element) -> drawn.Shape:
     degrees = float(at.get("rotation", 0))
     match element.tag:
         case "polygon":
-            return drawn.Outline(
-                label, [float(n) for n in at["points"].replace(";", ",").split(",")]
-            )
+            points = at["points"].replace(";", ",").split(",")
+            return drawn.Outline(label, [*map(float, points)])
         case "box":
             left, top, right, bottom = (float(at[name]) for name in ("xtl", "ytl", "xbr", "ybr"))
             box = drawn.rectangle(label, left, top, right, bottom)
@@ -44,9 +43,8 @@ def _shape(element: Element) -> drawn.Shape:
             return drawn.ellipse(label, x, y, across, down).turned(degrees, (x, y))
         case "cuboid":
             corners = [side + end for side in ("tl", "bl", "tr", "br") for end in "12"]
-            return drawn.hull(
-                label, [float(at[axis + corner]) for corner in corners for axis in "xy"]
-            )
+            points = [at[axis + corner] for corner in corners for axis in "xy"]
+            return drawn.hull(label, [*map(float, points)])
         case "mask":
             left, top, width, height = (int(at[n]) for n in ("left", "top", "width", "height"))
             lengths = [int(number) for number in at["rle"].split(",")]

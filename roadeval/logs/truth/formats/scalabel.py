@@ -65,7 +65,8 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     """
     if types is None or "C" not in types:
         return drawn.flat(points)
-    corners, ring = np.array([*points, points[0]], np.float64), [np.array(points[0])]
+    corners = np.array([*points, points[0]], np.float64)
+    ring = [corners[0]]
     for part in re.finditer("L|CC[CL]?|.", types[1 : len(points)]):
         if part[0] == "L":
             ring.append(corners[part.end()])
