@@ -61,19 +61,21 @@ def values_of(table: pd.DataFrame, column: str) -> list[Any]:
     return values
 
 
-def counts_of(table: pd.DataFrame) -> Sums:
-    """Return TP, TN, FP and FN of each row, ``(n, 4)`` int64."""
-    return table[COUNTS].to_numpy(np.int64)
-
-
 def rates_of(
-    table: pd.DataFrame, wanted: Mapping[str, Metric] = metrics.ALL, prefix: str = ""
+    table: pd.DataFrame,
+    wanted: Mapping[str, Metric] = metrics.ALL,
+    prefix: str = "",
+    end: str = "",
 ) -> pd.DataFrame:
-    """Compute metrics of each row's counts: a column each; NaN where a metric is undefined."""
+    """Compute metrics of each row's counts: a column each; NaN where a metric is undefined.
+
+    With ``end`` they are of the counts in columns such as ``TP_base``, and end alike.
+    """
     import pandas as pd
 
-    names = [f"{prefix}{name}" for name in wanted]
-    return pd.DataFrame(metrics.table(counts_of(table), wanted), table.index, names)
+    counts = table[[f"{name}{end}" for name in COUNTS]].to_numpy(np.int64)
+    names = [f"{prefix}{name}{end}" for name in wanted]
+    return pd.DataFrame(metrics.table(counts, wanted), table.index, names)
 
 
 def totals(frames: pd.DataFrame, by: Sequence[str] = MASK) -> pd.DataFrame:

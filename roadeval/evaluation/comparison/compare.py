@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from typing import TYPE_CHECKING, Any, Final
@@ -34,7 +34,6 @@ from roadeval.evaluation.comparison.pairing import (
     left_out,
     match_drives,
     moved_frames,
-    renamed,
     truth_differs,
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
@@ -304,40 +303,35 @@ def _against(
     apart: list[str] = []
     pairs = parts = pd.DataFrame()
     for batch in _batches(new.scored):
-        own = {key: key for key in batch}
-        frames = renamed(new.table("frames", own), own)
+        frames = new.table("frames", {key: key for key in batch})
         sums["new"] += _frames(frames)
         levels.append(by_drive(frames.assign(final=is_final(frames)), MASK))
         olds = {old_keys[key]: key for key in batch if key in old_keys}
         if not olds:
             continue
-        old_frames = renamed(base.table("frames", olds), olds)
+        old_frames = base.table("frames", olds)
         sums["base"] += _frames(old_frames)
-        found = common_masks(old_frames, frames)
-        there = {*zip(found["drive"], found["camera"], strict=True)}
+        common = common_masks(old_frames, frames)
+        there = {*zip(common["drive"], common["camera"], strict=True)}
         apart += [over.names[key] for key in olds.values() if key not in there]
         if not there:
             continue
-        both = [_of_drives(table, there) for table in (old_frames, frames)]
-        sums["lost by new"] += _frames(both[0]) - _frames(found, "_base")
-        sums["lost by base"] += _frames(both[1]) - _frames(found)
-        sums["relabelled"] += truth_differs(*both)
-        pairs = found
+        pairs = common
+        sums.update(_differing(*(_of_drives(each, there) for each in (old_frames, frames)), pairs))
         masks.append(by_drive(pairs, MASK))
         tested = only(pairs, final=True)
         tested = tested[tested["variant"] != BASELINE]
         drives += over.within_drives(tested)
-        own = {key: key for key in olds.values()}
-        of_regions = (new.table("regions", own), own), (base.table("regions", olds), olds)
-        parts = common_regions(tested, *(renamed(*each) for each in of_regions))
+        new_regions = new.table("regions", {key: key for key in olds.values()})
+        parts = common_regions(tested, new_regions, base.table("regions", olds))
         regions.append(by_drive(parts, ["variant", "region"]))
     if not masks:
         raise ComparisonError(
             f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
             "nothing can be compared; replay the same range into both"
         )
-    moved: Iterable[MovedFrame] = ()
-    disagreed: Iterable[Disagreement] = ()
+    moved: Iterator[MovedFrame] = iter(())
+    disagreed: Iterator[Disagreement] = iter(())
     changed, labels = _changed_settings(matched), (base.label, new.label)
     if len(matched) == 1:  # one camera of one drive, whose frames have numbers of their own
         moved = moved_frames(new.label, pairs)
@@ -386,10 +380,10 @@ def by_drive(rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
 
     counts, rates = [*COUNTS], [rates_of(rows, METRICS)]
     if "TP_base" in rows:
-        old_counts = [f"{name}_base" for name in COUNTS]
-        old = rates_of(rows[old_counts].set_axis(COUNTS, axis=1), METRICS)
-        rates += [old.add_suffix("_base"), (rates[0] - old).add_prefix("change_")]
-        counts += old_counts
+        old = rates_of(rows, METRICS, end="_base")
+        change = rates[0] - old.set_axis([*METRICS], axis=1)
+        rates += [old, change.add_prefix("change_")]
+        counts += [f"{name}_base" for name in COUNTS]
     keys = [*KEY, *by]
     groups, rated = grouped(rows, keys), pd.concat([rows[keys], *rates], axis=1)
     sums = groups[counts].sum().assign(frames=groups.size(), final=groups["final"].all())
@@ -438,9 +432,10 @@ class _Over:
     def rates(self, rows: pd.DataFrame, end: str = "") -> dict[str, float]:
         """Return the means over drives of a mask's rates, and those of all its pixels together."""
         means = self.mean(rows, [f"{name}{end}" for name in METRICS])
-        sums = rows[[f"{name}{end}" for name in COUNTS]].sum().to_frame().T.set_axis(COUNTS, axis=1)
-        pooled = rates_of(sums, metrics.OVERLAP).join(rates_of(sums, prefix="pooled_"))
-        rest = {str(name): float(value) for name, value in pooled.iloc[0].items()}
+        sums = rows[[f"{name}{end}" for name in COUNTS]].sum().to_frame().T
+        overlap = rates_of(sums, metrics.OVERLAP, end=end)
+        pooled = overlap.join(rates_of(sums, prefix="pooled_", end=end)).iloc[0]
+        rest = {str(name).removesuffix(end): float(value) for name, value in pooled.items()}
         return dict(zip(METRICS, means, strict=True)) | rest
 
     def changes(self, rows: pd.DataFrame, pairs: pd.DataFrame | None = None) -> Iterator[Change]:
@@ -506,6 +501,15 @@ def _surest_first(change: DriveChange) -> tuple[float, float, str]:
 def _frames(rows: pd.DataFrame, end: str = "") -> int:
     """Return on how many frames there is any mask."""
     return len(rows[[*KEY, f"frame{end}"]].drop_duplicates())
+
+
+def _differing(base: pd.DataFrame, new: pd.DataFrame, pairs: pd.DataFrame) -> dict[str, int]:
+    """Count the frames of which only one result has masks, and those whose truth differs."""
+    return {
+        "lost by new": _frames(base) - _frames(pairs, "_base"),
+        "lost by base": _frames(new) - _frames(pairs),
+        "relabelled": truth_differs(base, new),
+    }
 
 
 def _warnings(

@@ -11,7 +11,7 @@ import numpy as np
 
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.metrics import SHORT, TESTED
+from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.tables import (
     COUNTS,
     KEY,
@@ -66,8 +66,14 @@ class Side:
     """Maps each variant to compare to its name in the comparison; None keeps all."""
 
     def table(self, name: str, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
-        """Return some drives' rows of the variants to compare, under the comparison's names."""
+        """Return some drives' rows of the variants to compare, under the comparison's names.
+
+        A mapping of drives gives the keys that they have in the comparison; names are text then, as
+        in both results.
+        """
         rows = self.tables(name, drives)
+        if isinstance(drives, Mapping):
+            rows = _renamed(rows, drives)
         if self.variants is None or "variant" not in rows:
             return rows
         rows = rows[rows["variant"].isin([*self.variants])]
@@ -145,8 +151,8 @@ def one_drive(sides: Sequence[Side]) -> list[Side] | None:
     return [replace(side, drives=[drive]) for side, drive in zip(sides, drives, strict=True)]
 
 
-def renamed(rows: pd.DataFrame, keys: Mapping[tuple[str, str], tuple[str, str]]) -> pd.DataFrame:
-    """Return rows of drives under other keys: names are text, as in both results."""
+def _renamed(rows: pd.DataFrame, keys: Mapping[tuple[str, str], tuple[str, str]]) -> pd.DataFrame:
+    """Return rows of drives under other keys."""
     words = {name: rows[name].astype(str) for name in KEY}
     there = [*zip(words["drive"], words["camera"], strict=True)]
     if unknown := {*there} - keys.keys():
@@ -209,12 +215,9 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     shared = parts["same"].transform("all") & parts[["known", "there"]].transform("any").all(axis=1)
     both = both[shared & both["known"]].sort_values("pair", kind="stable")
     stamps = numbered.set_index("pair")["stamp_ns"].reindex(both["pair"]).to_numpy()
-    rates = {f"{TESTED}{end}": rates_of(_counts(both, end), SHORT)[TESTED] for end in ("", "_base")}
-    return both.assign(stamp_ns=stamps, final=True, **rates)
-
-
-def _counts(rows: pd.DataFrame, end: str) -> pd.DataFrame:
-    return rows[[f"{name}{end}" for name in COUNTS]].set_axis(COUNTS, axis=1)
+    both = both.assign(stamp_ns=stamps, final=True)
+    tested = {TESTED: METRICS[TESTED]}
+    return both.join([rates_of(both, tested), rates_of(both, tested, end="_base")])
 
 
 @dataclass(frozen=True)

@@ -54,17 +54,6 @@ def of(counts: Counts) -> dict[str, float]:
     return {name: metric.function(counts) for name, metric in METRICS.items()}
 
 
-def pooled(counts: Sums, metrics: Mapping[str, Metric] = METRICS) -> dict[str, float]:
-    """Compute metrics of summed counts, ``(4,)``, by names as ``pooled_ERR``."""
-    sums = Counts(*counts.tolist())
-    return {f"pooled_{name}": metric.function(sums) for name, metric in metrics.items()}
-
-
-def overlap(counts: Counts) -> dict[str, float]:
-    """Compute the metrics without a column in tables."""
-    return {name: metric.function(counts) for name, metric in OVERLAP.items()}
-
-
 def table(counts: Sums, metrics: Mapping[str, Metric] = METRICS) -> Floats:
     """Compute metrics of many frames at once, exactly as `of` does.
 
