@@ -97,6 +97,7 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 
 
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
+    """See `plain.ring_sums`."""
     _require(runs, len(runs), 4)
     height, columns = _shape(*planes)
     _require(ring, height, -(-columns // 64))
@@ -109,6 +110,7 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
 
 
 def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
+    """See `plain.transfer`."""
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)
@@ -192,6 +194,7 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 def tree_sum(
     features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
 ) -> Values:
+    """See `plain.tree_sum`."""
     count, pixels = features.shape
     trees, nodes = _shape(feature, threshold, kept)
     _require(values, trees, plain.LEAVES)

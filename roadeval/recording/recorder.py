@@ -256,6 +256,10 @@ class Recorder:
             layouts = self._layouts
             texts = "".join(prefix + layout.to_json() for prefix, layout in layouts.items())
             identity = hashlib.blake2b(texts.encode(), digest_size=16).hexdigest()
+            # Rerun 0.41 keeps two threads and the last data of a closed stream until its next
+            # `init`, which opens none here, and is not waited for if another file is stuck. No call
+            # frees those of a blueprint that was given to `save`.
+            wait([in_thread(lambda: rr.init(at.APPLICATION, init_logging=False))], LOOK_S)
             self._stream = stream = rr.RecordingStream(
                 at.APPLICATION, recording_id=identity, send_properties=False
             )

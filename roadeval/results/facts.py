@@ -175,7 +175,8 @@ class Document:
         try:
             facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
         except ValidationError as error:
-            wrong = [each["loc"][0] for each in error.errors(include_url=False, include_input=False)]
+            errors = error.errors(include_url=False, include_input=False)
+            wrong = [each["loc"][0] for each in errors]
             part = next((name for name in wrong if name in content), wrong[0])
             part = "difference" if part == "effects" and part not in content else part
             raise cls._damaged(where, f"`{part}` is not what it must be") from error

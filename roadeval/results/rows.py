@@ -35,7 +35,7 @@ ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evalua
 
 
 class Key(NamedTuple):
-    """What every row begins with."""
+    """The first cells of every row."""
 
     drive: str
     camera: str

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import psutil
 import pytest
 import rerun as rr
 
@@ -40,6 +41,16 @@ def test_an_exception_leaves_a_partial_recording_with_every_frame_so_far(stop, d
     assert partial.summary == {}
     assert not recorder.path.exists()
     assert rerun("verify", recorder.partial) == 0
+
+
+def test_recordings_of_one_process_leave_the_threads_of_their_blueprints_alone(drive, tmp_path):
+    """Rerun 0.41 keeps two for each closed stream until `init`, for each blueprint for ever."""
+    process, threads = psutil.Process(), []
+    for _ in range(9):
+        with Recorder(tmp_path / "out.rrd", layout()) as recorder:
+            recorder.write(recorder.encode(drive[0], 0), lines(drive[0]))
+        threads.append(process.num_threads())
+    assert threads[-1] <= threads[0] + 2 * 8 + 2
 
 
 def _record_and_stop(recorder, results, stop):

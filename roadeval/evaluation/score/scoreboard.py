@@ -290,7 +290,7 @@ class Scoreboard:
 
 @dataclass(frozen=True, eq=False)
 class DriveSums:
-    """What a camera's frames come to."""
+    """Sums over the frames of one camera of a drive."""
 
     frames: pd.DataFrame
     windows: pd.DataFrame

@@ -55,7 +55,7 @@ class Difference:
     """Two-sided p-value of no difference."""
     confidence: float
     unit: Literal["frames", "drives"]
-    """What is averaged: the frames of one drive, or the means of drives."""
+    """Whether the mean is over the frames of one drive, or over the means of drives."""
     units: int
     """How many have a difference."""
     effective: float | None = None

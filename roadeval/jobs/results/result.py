@@ -159,7 +159,7 @@ class DriveResult:
 
     @property
     def key(self) -> Key:
-        """What every row of its tables begins with."""
+        """Drive and camera, the first cells of every row of its tables."""
         return Key(visible(self.name), visible(self.facts.drive.camera))
 
     def table(self, name: str) -> pd.DataFrame:

@@ -96,7 +96,7 @@ class Done:
     status: str
     reason: str
     asked: str
-    """What its results were made for."""
+    """Digest of settings, software and model, as of its `DriveTask`."""
     repeated: bool = False
     """Whether the drive was done before."""
 

@@ -137,7 +137,7 @@ class Run:
 
     @property
     def key(self) -> Key:
-        """What every row of its tables begins with."""
+        """Drive and camera, the first cells of every row of its tables."""
         return Key(self.log.name, self.camera or self.selection.image.name)
 
     @property

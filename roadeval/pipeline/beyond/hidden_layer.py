@@ -27,7 +27,7 @@ LEAST: Final = 1e-6
 PENALTY: Final = 0.1
 """Of the squared weights (scikit-learn's ``alpha``)."""
 PLANES: Final = 64
-"""What a decision costs grows with them."""
+"""Number of units of the hidden layer. The time of a decision grows with it."""
 PASSES: Final = 12
 """Of the training through as many pixels as there are."""
 NOISE: Final = 0.1

@@ -204,7 +204,7 @@ class TreesSettings:
     """Whether what the stage before says of a pixel is a feature, too: its log-odds of road, or the
     distance to its mask's edge."""
     trees: Annotated[int, Field(ge=1, le=10_000)] = 150
-    """How many. What a decision costs grows with them."""
+    """Number of trees. The time of a decision grows with it."""
     reach_weight: Annotated[float, Field(ge=0, le=100)] | None = None
     """``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
     the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
