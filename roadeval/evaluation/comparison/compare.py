@@ -17,6 +17,7 @@ from itertools import chain, product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import BASELINE, UNFILTERED
 from roadeval.data.words import setting
@@ -47,6 +48,7 @@ from roadeval.evaluation.tables import (
     MASK,
     grouped,
     is_final,
+    keys_of,
     only,
     rates_of,
     values_of,
@@ -312,7 +314,7 @@ def _against(
         old_frames = base.table("frames", olds)
         sums["base"] += _frames(old_frames)
         common = common_masks(old_frames, frames)
-        there = {*zip(common["drive"], common["camera"], strict=True)}
+        there = {*keys_of(common)[0]}
         apart += [over.names[key] for key in olds.values() if key not in there]
         if not there:
             continue
@@ -366,7 +368,8 @@ def _batches(drives: Sequence[ComparedDrive]) -> Iterator[list[tuple[str, str]]]
 
 
 def _of_drives(rows: pd.DataFrame, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
-    return rows[[key in keys for key in zip(rows["drive"], rows["camera"], strict=True)]]
+    keys_there, places = keys_of(rows)
+    return rows[np.array([key in keys for key in keys_there], bool)[places]]
 
 
 def by_drive(rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
@@ -411,14 +414,13 @@ class _Over:
         several = len({drive.drive for _, drive in matched}) > 1
         return cls(new.label, settings, groups | of_base, names, several)
 
-    def _group(self, rows: pd.DataFrame) -> list[str]:
-        return [self.groups[key] for key in zip(rows["drive"], rows["camera"], strict=True)]
+    def _group(self, rows: pd.DataFrame) -> npt.NDArray[np.object_]:
+        keys, places = keys_of(rows)
+        return np.array([self.groups[key] for key in keys], object)[places]
 
     def mean(self, rows: pd.DataFrame, names: Sequence[str]) -> list[float]:
         """Average drives as their differences are, so that these lie between two rates."""
-        means: list[float] = (
-            rows.groupby(np.array(self._group(rows)))[[*names]].mean().mean().tolist()
-        )
+        means: list[float] = rows.groupby(self._group(rows))[[*names]].mean().mean().tolist()
         return means
 
     def difference(self, rows: pd.DataFrame, rate: str, pairs: pd.DataFrame) -> Difference:
@@ -473,11 +475,12 @@ class _Over:
     def within_drives(self, pairs: pd.DataFrame) -> Iterator[DriveChange]:
         """Yield each of several drives' changes of final masks, not corrected for their number."""
         by_mask = grouped(pairs, [*KEY, *MASK])
-        means = by_mask[[f"{TESTED}_base", TESTED]].mean()
-        for (drive, camera, variant, stage), rows in by_mask if self.several else ():
-            base, new = means.loc[drive, camera, variant, stage].tolist()
+        means = by_mask[[f"{TESTED}_base", TESTED]].mean().T.to_dict("list")
+        for key, rows in by_mask if self.several else ():
+            drive, camera, variant, stage = key
             change = within(rows, TESTED, self.settings)
             about = self.label, variant, stage, self.names[drive, camera], len(rows)
+            base, new = means[key]
             yield DriveChange(*about, base, new, change, q=None, changed=False)
 
     def drives(self, changes: Sequence[DriveChange]) -> Iterator[DriveChange]:
