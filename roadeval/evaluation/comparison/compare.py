@@ -319,7 +319,8 @@ def _against(
         if not there:
             continue
         pairs = common
-        sums.update(_differing(*(_of_drives(each, there) for each in (old_frames, frames)), pairs))
+        old_frames, frames = (_of_drives(rows, there) for rows in (old_frames, frames))
+        sums.update(_differing(old_frames, frames, pairs))
         masks.append(by_drive(pairs, MASK))
         tested = only(pairs, final=True)
         tested = tested[tested["variant"] != BASELINE]
