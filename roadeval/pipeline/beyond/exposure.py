@@ -1,7 +1,7 @@
 """Exposure and white balance: the ground in front of the vehicle gets the same grey in each frame.
 
-What is brighter than the patch is compressed and not clipped, so that it keeps its differences
-where the patch lies in the shade or on a dark vehicle.
+Pixels brighter than the patch are compressed and not clipped, so that they keep their differences
+if the patch lies in the shade or on a dark vehicle.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class ExposureSettings:
 
 @per_view
 def bind(_settings: ExposureSettings, _learnt: None, view: View) -> Output:
-    """Expose what is seen."""
+    """Expose the image of a view."""
     image = exposed(view.image, ReferencePatch())
     return Output((Layer(EXPOSED, image),), image=image)
 
