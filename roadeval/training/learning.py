@@ -18,7 +18,7 @@ from roadeval.logs.frames import LoggedFrame
 from roadeval.logs.truth.picks import Picks, Why
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
-from roadeval.pipeline.scene import exposed, reach, scene_of, stretched
+from roadeval.pipeline.scene import expose_by_patch, reach, scene_of, stretch
 from roadeval.pipeline.stage import Output, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
@@ -159,8 +159,8 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
-    scene = scene_of(exposed(image, settings.patch), WIDTH, settings.patch)
-    near = stretched(reach(scene), image.shape) < settings.far
+    scene = scene_of(expose_by_patch(image, settings.patch), WIDTH, settings.patch)
+    near = stretch(reach(scene), image.shape) < settings.far
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))

@@ -10,7 +10,7 @@ from typing import Final
 
 from roadeval.data import Layer, LayerKind, LayerSpec
 from roadeval.pipeline.reference_patch import ReferencePatch
-from roadeval.pipeline.scene import exposed
+from roadeval.pipeline.scene import expose_by_patch
 from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
@@ -24,7 +24,7 @@ class ExposureSettings:
 @per_view
 def bind(_settings: ExposureSettings, _learnt: None, view: View) -> Output:
     """Expose the image of a view."""
-    image = exposed(view.image, ReferencePatch())
+    image = expose_by_patch(view.image, ReferencePatch())
     return Output((Layer(EXPOSED, image),), image=image)
 
 

@@ -35,7 +35,7 @@ from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
 from roadeval.pipeline.reference_patch import ReferencePatch
-from roadeval.pipeline.scene import Scene, enlarged, mean, reduced, stretched
+from roadeval.pipeline.scene import Scene, enlarge, mean, reduce_to, stretch
 from roadeval.pipeline.stage import (
     Output,
     Stage,
@@ -209,7 +209,7 @@ def fit(sample: TrainingSet, _settings: GatedSettings) -> ShadedRoad:
     values, labels = [], []
     for index, image in enumerate(sample.images):
         here = sample.frame == index
-        seen = look(reduced(image, WIDTH), place)
+        seen = look(reduce_to(image, WIDTH), place)
         rows, columns = seen.candidates.shape
         row = sample.row[here] * rows // image.shape[0]
         column = sample.column[here] * columns // image.shape[1]
@@ -323,7 +323,7 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
         # Interpolation reaches no further than to the next row.
         first, end = int((touched[0] - 1) * scale), math.ceil((touched[-1] + 2) * scale)
         rows = slice(max(first, 0), end)
-        here = stretched(gain, image.shape)[rows]
+        here = stretch(gain, image.shape)[rows]
         result = cv2.multiply(image[rows], here, dtype=cv2.CV_32F)
         cv2.scaleAdd(here, OFFSET, result, dst=result)
         cv2.convertScaleAbs(result, dst=bright[rows], beta=-OFFSET)
@@ -334,7 +334,7 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
 def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     """Filter the image of a view."""
     shape = view.image.shape
-    seen = look(reduced(view.image, WIDTH), model.place)
+    seen = look(reduce_to(view.image, WIDTH), model.place)
     likely = probability(seen, model, settings.odds)
     shaded = np.maximum((likely - DOUBT) / (1 - DOUBT), 0)
     gain = gains(seen, shaded)
@@ -342,13 +342,13 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     small = (shaded > 0.5).view(np.uint8)
     edge = cv2.dilate(small, np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) - small
     masks = {"shadow": small, "shadow_edge": edge, "lit": 1 - (small | edge)}
-    regions = {name: Packed.of(enlarged(mask, shape)) for name, mask in masks.items()}
+    regions = {name: Packed.of(enlarge(mask, shape)) for name, mask in masks.items()}
     return Output(
         layers=(
-            Layer(CANDIDATES, enlarged(seen.candidates.view(np.uint8), shape)),
-            Layer(SHADED, stretched(shaded, shape)),
+            Layer(CANDIDATES, enlarge(seen.candidates.view(np.uint8), shape)),
+            Layer(SHADED, stretch(shaded, shape)),
             Layer(SHADOW, regions["shadow"]),
-            Layer(GAIN, stretched(np.maximum.reduce(cv2.split(gain)), shape)),
+            Layer(GAIN, stretch(np.maximum.reduce(cv2.split(gain)), shape)),
             Layer(COMPENSATED, image),
         ),
         image=image,
@@ -358,8 +358,8 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
 
 def oracle(_settings: GatedSettings, model: ShadedRoad, view: View, truth: Truth) -> Output:
     """Brighten the true shadow."""
-    small = reduced(view.image, WIDTH)
-    shadow = enlarged((truth == 1).view(np.uint8), small.shape)
+    small = reduce_to(view.image, WIDTH)
+    shadow = enlarge((truth == 1).view(np.uint8), small.shape)
     gain = gains(look(small, model.place), shadow.astype(np.float32))
     return Output(image=brighten(view.image, gain) if shadow.any() else view.image)
 

@@ -22,7 +22,7 @@ class GivenSettings:
 @per_view
 def bind(settings: GivenSettings, _learnt: None, view: View) -> Output:
     """Return the method's mask of the frame; an `AbsentError` if there is none."""
-    output = view.given.get(settings.name)
+    output = view.external.get(settings.name)
     if output is None or output.mask is None:
         frame = f"frame {view.moment.number}" if view.moment else "the image"
         raise AbsentError(f"given: {frame} has no mask of {settings.name}")

@@ -120,30 +120,13 @@ def train(values: Values, road: Flags, weights: Floats | None, seed: int) -> Hid
 def descend(
     passes: Iterable[tuple[Values, Flags, float]], inputs: int, units: int, batch: int, seed: int
 ) -> list[Values]:
-    """Train a network by Adam [1]_, as scikit-learn's ``MLPClassifier`` does, bit for bit.
+    """Train a network by Adam (Kingma and Ba, ICLR 2015), bit for bit as scikit-learn does.
 
-    That class cannot shorten its steps from pass to pass, and takes twice as long.
-
-    Parameters
-    ----------
-    passes
-        For each pass the ``(n, inputs)`` float32 pixels, their labels, and the length of a step.
-    units
-        Size of the hidden layer.
-    batch
-        Pixels of a step.
-    seed
-        Seed of the first weights, and of the order of the pixels in a pass.
-
-    Returns
-    -------
-    list
-        Weights of the hidden layer ``(inputs, units)`` and of the output ``(units, 1)``, then the
-        biases of both, float32.
-
-    References
-    ----------
-    .. [1] D. P. Kingma, J. Ba, Adam: A Method for Stochastic Optimization, ICLR 2015.
+    scikit-learn's ``MLPClassifier`` takes twice as long, and its steps have one length. A pass is
+    ``(n, inputs)`` float32 pixels, their labels, and the length of a step, for which ``batch``
+    pixels are taken. ``seed`` decides the first weights, and the order of pixels in a pass.
+    Returned are the weights of the hidden layer ``(inputs, units)`` and of the output
+    ``(units, 1)``, then the biases of both, float32.
     """
     from scipy.special import expit
 
@@ -167,7 +150,7 @@ def descend(
             hidden = np.maximum(values @ inner + bias, 0)
             error = expit(hidden @ out + shift) - road[drawn, None]
             back = (error @ out.T) * (hidden != 0)
-            gradients = (
+            slopes = (
                 (values.T @ back + PENALTY * inner) / count,
                 (hidden.T @ error + PENALTY * out) / count,
                 back.sum(axis=0) / count,
@@ -175,11 +158,9 @@ def descend(
             )
             time += 1
             step = length * np.sqrt(1 - SQUARE_DECAY**time) / (1 - MEAN_DECAY**time)
-            for layer, mean, square, gradient in zip(
-                layers, means, squares, gradients, strict=True
-            ):
-                mean[...] = MEAN_DECAY * mean + (1 - MEAN_DECAY) * gradient
-                square[...] = SQUARE_DECAY * square + (1 - SQUARE_DECAY) * gradient**2
+            for layer, mean, square, slope in zip(layers, means, squares, slopes, strict=True):
+                mean[...] = MEAN_DECAY * mean + (1 - MEAN_DECAY) * slope
+                square[...] = SQUARE_DECAY * square + (1 - SQUARE_DECAY) * slope**2
                 layer[...] -= step * mean / (np.sqrt(square) + TINY)
     return layers
 

@@ -42,7 +42,7 @@ from roadeval.pipeline.beyond.features import (
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
-from roadeval.pipeline.scene import Scene, reach, scene_of, stretched
+from roadeval.pipeline.scene import Scene, reach, scene_of, stretch
 from roadeval.pipeline.stage import (
     GREATEST,
     MisfitError,
@@ -372,11 +372,11 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
             weight = OWN_CAMERA if learnt.knows(view.original) else OTHERS
         values = planes.reshape(len(planes), -1)
         odds = learnt.log_odds(values, network_weight(values, settings)).reshape(scene.shape)
-        share = stretched(sigmoid(odds - weight * beyond(far, light)), shape)
+        share = stretch(sigmoid(odds - weight * beyond(far, light)), shape)
         codes = np.rint(share * CERTAIN).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * CERTAIN))
         shown = (
-            Layer(GEODESIC, stretched(far, shape)),
+            Layer(GEODESIC, stretch(far, shape)),
             Layer(share_spec, (codes >> 8).astype(np.uint8)),
             Layer(TREES, road),
         )
