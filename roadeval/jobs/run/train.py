@@ -75,7 +75,7 @@ def draw(
             return streams[-1]
 
         by_truth = labelled or own.training.source != "patch"
-        for frame in learning.spread(begin, own.training.frames, labelled=by_truth):
+        for frame in learning.decode_evenly(begin, own.training.frames, labelled=by_truth):
             if labelled and frame.truth is None:
                 return [], []
             held.add(frame)
