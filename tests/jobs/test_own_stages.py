@@ -94,7 +94,7 @@ def test_results_tell_the_code_and_are_known_by_it(drive, tmp_path, monkeypatch)
     assert told["sha256"] == hashlib.sha256(Path(somebody.__file__).read_bytes()).hexdigest()
 
     def known_by(text):
-        stages._somebodys.cache_clear()
+        stages.import_stage.cache_clear()
         (tmp_path / "changing.py").write_text(text)
         sys.modules.pop("changing", None)
         importlib.invalidate_caches()

@@ -74,8 +74,8 @@ def draw(
             streams.append(log.frames(selection))
             return streams[-1]
 
-        by_truth = labelled or config.training.source != "patch"
-        for frame in learning.spread(begin, config.training.frames, labelled=by_truth):
+by_truth = labelled or config.training.source != "patch"
+        for frame in learning.decode_evenly(begin, config.training.frames, labelled=by_truth):
             if labelled and frame.truth is None:
                 return [], []
             held.add(frame)
