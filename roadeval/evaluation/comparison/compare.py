@@ -87,7 +87,7 @@ class ComparedResult:
 
 
 @dataclass(frozen=True)
-class Change:
+class MaskChange:
     """What changed in a mask of a new result: one stage of one variant."""
 
     result: str
@@ -161,9 +161,9 @@ class Comparison:
     """The base first."""
     changed_settings: Mapping[str, Mapping[str, tuple[Any, Any]]]
     """By new result the settings that it does not share with the base: both values by name."""
-    changes: tuple[Change, ...]
+    changes: tuple[MaskChange, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
-    levels: tuple[Change, ...]
+    levels: tuple[MaskChange, ...]
     """The same on all of its own frames, without the base."""
     drives: tuple[DriveChange, ...]
     """Where several drives are compared: each, mask by mask, the surest first."""
@@ -178,7 +178,7 @@ class Comparison:
     settings: EvaluationSettings
     """The confidence of the intervals, and the frames that they need."""
 
-    def finals(self) -> list[Change]:
+    def finals(self) -> list[MaskChange]:
         """Return the final masks; without the baseline's, which says nothing of a method."""
         finals = [change for change in self.changes if change.final]
         return [change for change in finals if change.variant != BASELINE] or finals
@@ -269,7 +269,7 @@ def _result(side: Side, frames: int, relabelled: int = 0) -> ComparedResult:
     )
 
 
-def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
+def _corrected(changes: Sequence[MaskChange]) -> Iterator[MaskChange]:
     """Correct the changes of ERR of final masks, but for the baseline's, for how many they are."""
     family = [each.final and each.variant != BASELINE for each in changes]
     tested = [each.difference[TESTED] for each, own in zip(changes, family, strict=True) if own]
@@ -441,14 +441,16 @@ class _Over:
         rest = {str(name).removesuffix(end): float(value) for name, value in pooled.items()}
         return dict(zip(METRICS, means, strict=True)) | rest
 
-    def changes(self, rows: pd.DataFrame, pairs: pd.DataFrame | None = None) -> Iterator[Change]:
+    def changes(
+        self, rows: pd.DataFrame, pairs: pd.DataFrame | None = None
+    ) -> Iterator[MaskChange]:
         """Yield a row for each mask; without pairs its rates alone."""
         for (variant, stage), mask in grouped(rows, MASK):
             difference = {}
             if pairs is not None:
                 frames = pairs if self.several else only(pairs, variant=variant, stage=stage)
                 difference = {rate: self.difference(mask, rate, frames) for rate in COMPARED}
-            yield Change(
+            yield MaskChange(
                 result=self.label,
                 variant=variant,
                 stage=stage,
