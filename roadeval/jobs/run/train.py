@@ -74,7 +74,7 @@ def draw(
             streams.append(log.frames(selection))
             return streams[-1]
 
-by_truth = labelled or config.training.source != "patch"
+        by_truth = labelled or config.training.source != "patch"
         for frame in learning.decode_evenly(begin, config.training.frames, labelled=by_truth):
             if labelled and frame.truth is None:
                 return [], []
