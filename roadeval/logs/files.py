@@ -192,7 +192,7 @@ def is_shown(file: Path) -> bool:
     return not file.name.startswith(".")
 
 
-def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
+def list_files(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
     """Return the files of a folder that have one of these endings, in natural order.
 
     ``below`` includes the folders in it. A `LogError` if there is no such folder, or no such file.
@@ -208,7 +208,7 @@ def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> li
     return sorted(files, key=natural)
 
 
-def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
+def order_by_time(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
     """Return files in the order of the times in their names, with these times in nanoseconds.
 
     If not every name is a time, or two are the same, return them unchanged, with None.
@@ -220,13 +220,13 @@ def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
     return in_order, [times[file] for file in in_order]
 
 
-def some(files: Sequence[str | Path]) -> str:
+def first_names(files: Sequence[str | Path]) -> str:
     """Return the names of the first three files, for messages."""
     names = ", ".join(visible(Path(file).name) for file in files[:3])
     return names + (", ..." if len(files) > 3 else "")
 
 
-def of_ids(labels: Sequence[Path]) -> Sequence[Path]:
+def prefer_ids(labels: Sequence[Path]) -> Sequence[Path]:
     """Return Cityscapes' label images with ids of classes if there are any, else all labels."""
     return [label for label in labels if label.stem.endswith("_labelIds")] or labels
 
@@ -234,10 +234,10 @@ def of_ids(labels: Sequence[Path]) -> Sequence[Path]:
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
     """Find for each label the image of the same name.
 
-    Names are compared unchanged, as `bare`, or without the begin and end that all labels share.
+    Names are compared unchanged, as `bare_name`, or without the ends that all labels share.
     """
-    exact, loose = {file.stem: file for file in images}, {bare(file): file for file in images}
-    names = without_hashes([*map(bare, labels)])
+    exact, loose = {file.stem: file for file in images}, {bare_name(file): file for file in images}
+    names = without_hashes([*map(bare_name, labels)])
     ends = [len(part) for part in _shared([name[::-1] for name in names])]
     matches = (
         [loose.get(name.removeprefix(begin)[: -end or None]) for name in names]
@@ -246,7 +246,7 @@ def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, P
     )
     best = max(matches, key=lambda belong: len(belong) - belong.count(None), default=[])
     pairs = {
-        label: exact.get(label.stem) or exact.get(bare(label)) or image
+        label: exact.get(label.stem) or exact.get(bare_name(label)) or image
         for label, image in zip(labels, best, strict=True)
     }
     return {label: image for label, image in pairs.items() if image is not None}
@@ -274,7 +274,7 @@ def without_hashes(names: Sequence[str]) -> Sequence[str]:
     return names
 
 
-def matching(pattern: str, name: str) -> re.Match[str] | None:
+def match_name(pattern: str, name: str) -> re.Match[str] | None:
     """Match a name with a pattern: ``*`` is any text, ``?`` any letter, `NUMBER` digits."""
     kinds = {"*": ".*", "?": ".", NUMBER: r"(?<!\d)(\d+)"}
     parts = re.split(rf"([*?]|{re.escape(NUMBER)})", pattern)
@@ -282,10 +282,10 @@ def matching(pattern: str, name: str) -> re.Match[str] | None:
     return re.fullmatch(regex, name, re.DOTALL)
 
 
-def bare(file: Path) -> str:
+def bare_name(file: Path) -> str:
     """Return a file's name without its ending, and without marks of an image or a label.
 
-    >>> bare(Path("um_road_000012.png")), bare(Path("a_000019_gtFine_labelIds.png"))
+    >>> bare_name(Path("um_road_000012.png")), bare_name(Path("a_000019_gtFine_labelIds.png"))
     ('um_000012', 'a_000019')
     """
     return _SUFFIX.sub("", _KITTI.sub(r"\1_", file.stem))

@@ -27,7 +27,7 @@ from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
-from roadeval.logs.truth.names import shown_name, with_keys
+from roadeval.logs.truth.names import find_keys, shown_name
 from roadeval.runtime.text import visible
 
 
@@ -248,7 +248,7 @@ class Log:
                 names = [shown_name(label.path, settings.path) for label in origin.labels]
                 check_names(names, camera.topic, self.topics)
             count = len(images) if images.sure == images.expected() == len(images) else None
-            labels = with_keys(origin, settings.path, settings, images.limits, count)
+            labels = find_keys(origin, settings.path, settings, images.limits, count)
             return beside_log(labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms)
         other = open_log(log, LogConfig(frames=self.config.frames))
         self.beside.append(other)

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import FrameError, LogError
-from roadeval.logs.files import some
+from roadeval.logs.files import first_names
 from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
@@ -498,9 +498,10 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
+        names = first_names([label.path for label in labels.labels])
         raise LogError(
             f"{name}: none of them belongs to a frame by {labels.by}: theirs are "
-            f"{keys[0] + first} to {keys[-1] + first} ({some([n.path for n in labels.labels])}), "
+            f"{keys[0] + first} to {keys[-1] + first} ({names}), "
             f"the frames' {first} to {first + frames - 1}: if {keys[0] + first} is the first "
             "frame's, set `truth.first` to it; or name the folder of the images that the log was "
             "made of with `truth.images`"

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from roadeval.data import ROAD, Truth
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import some
+from roadeval.logs.files import first_names
 from roadeval.logs.truth.names import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
@@ -146,7 +146,8 @@ class Picks:
         if labels.by == "number" and others:
             raise LogError(
                 f"{labels.name}: {len(others)} of {len(keys)} labels have numbers of frames that "
-                f"were not picked ({some(others)}): give them the names of their images in {IMAGES}"
+                f"were not picked ({first_names(others)}): give them the names of their images in "
+                f"{IMAGES}"
             )
 
     def is_proposal(self, stamp_ns: int, truth: Truth) -> bool:

@@ -25,7 +25,14 @@ from roadeval.data.arrays import Image
 from roadeval.images.decoding import orientation_of, png_of, size_of, upright
 from roadeval.images.formats import ImageError, Limits, format_of
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
+from roadeval.logs.files import (
+    IMAGES,
+    first_names,
+    images_of,
+    list_files,
+    order_by_time,
+    prefer_ids,
+)
 from roadeval.logs.messages.pictures import turn_of
 from roadeval.logs.settings import NS
 from roadeval.runtime.files import NewFile, check_input, writing
@@ -299,15 +306,17 @@ def pack(
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
-    files, labels = listed(images, IMAGES), _label_images(masks, images) if masks else []
+    files, labels = list_files(images, IMAGES), _label_images(masks, images) if masks else []
     belong = images_of(labels, files)
     if labels and not belong:
-        raise LogError(f"{masks}: no mask has the name of an image in {images} ({some(labels)})")
+        raise LogError(
+            f"{masks}: no mask has the name of an image in {images} ({first_names(labels)})"
+        )
     by_image: dict[Path, Path] = {}
     for label, image in belong.items():
         if (other := by_image.setdefault(image, label)) != label:
             raise LogError(f"{masks}: {other.name} and {label.name} belong to the same image")
-    in_order, times = ordered(files)
+    in_order, times = order_by_time(files)
     if rate_hz is None and times is not None:
         files, words = in_order, "the times in the files' names"
     else:
@@ -328,7 +337,9 @@ def _pack_folder(
         "masks without an image": [label for label in labels if label not in belong],
         "images that their EXIF orientation turns, in replay as in viewers": turned,
     }
-    told = (f"{what}: {some(odd)} ({len(odd)} in all)" for what, odd in unpaired.items() if odd)
+    told = (
+        f"{what}: {first_names(odd)} ({len(odd)} in all)" for what, odd in unpaired.items() if odd
+    )
     return PackResult(output, len(files), len(by_image), words, tuple(told))
 
 
@@ -336,7 +347,7 @@ def _label_images(masks: Path, images: Path) -> Sequence[Path]:
     try:
         if masks.resolve() == images.resolve():
             raise LogError(f"{masks}: the images themselves")
-        return of_ids(listed(masks, IMAGES))
+        return prefer_ids(list_files(masks, IMAGES))
     except LogError as error:
         if not masks.exists():
             raise

@@ -17,7 +17,7 @@ from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import LabelSettings, MaskSettings
 from roadeval.logs.truth.beside import file_label
 from roadeval.logs.truth.labels import meaning_of, seen_in, understand
-from roadeval.logs.truth.names import LabelSet, with_keys
+from roadeval.logs.truth.names import LabelSet, find_keys
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()
@@ -184,7 +184,7 @@ def test_road_that_covers_hardly_any_pixel_is_told_with_the_classes(tmp_path, ro
         classes = {"fence": 7, "road": 3}
         origin = replace(origin, classes=classes, occurring={"fence": 1, "road": 1})
     place = MaskSettings(str(tmp_path), labels=LabelSettings(road=road))
-    (note,) = meaning_of(with_keys(origin, str(tmp_path), place, LIMITS), place).notes
+    (note,) = meaning_of(find_keys(origin, str(tmp_path), place, LIMITS), place).notes
     names = "3 (99.5 %), 7 (0.5 %)" if road == (7,) else "road (99.5 %), fence (0.5 %)"
     assert note.startswith("road is 0.50 % of the labelled pixels that were looked at, which are")
     assert f"{names}: does `labels.road` name the road?" in note
