@@ -31,10 +31,10 @@ from roadeval.logs.truth.labels import (
     LabelSource,
     check_size,
     meaning_of,
-    nothing_of,
     read_or_error,
     samples,
     size_problem,
+    undecodable,
 )
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -276,7 +276,7 @@ def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
             problem = problem or str(error)
         else:
             return
-    raise nothing_of(reader, problem)
+    raise undecodable(reader, problem)
 
 
 @dataclass(slots=True)
@@ -496,7 +496,7 @@ class FrameStream:
         """The stamp of the first label of each content, by the hash of the content."""
         read: Iterable[int] = numbers
         if labelled:
-            read = with_label(truth, images, numbers) if truth else ()
+            read = labelled_numbers(truth, images, numbers) if truth else ()
         self._iterator = map(self._frame, read)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
@@ -564,7 +564,7 @@ class FrameStream:
         )
 
 
-def looked_at(selection: Selection) -> Iterator[str]:
+def look_at_images(selection: Selection) -> Iterator[str]:
     """Look at some images of a camera; yield a sentence on each thing to know before a replay."""
     images = selection.camera.images
     places = [*range(min(LOOKED_AT, len(images)))]
@@ -583,7 +583,9 @@ def are_few(images: TopicReader, numbers: Sequence[int]) -> bool:
     return images.chunks_of(numbers) < images.chunks_of(between)
 
 
-def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int]) -> Iterator[int]:
+def labelled_numbers(
+    source: LabelSource, images: TopicReader, numbers: Sequence[int]
+) -> Iterator[int]:
     """Yield the frames that have a label, in order.
 
     The search goes image by image, or label by label if it reads fewer chunks.
@@ -607,7 +609,7 @@ def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int])
     yield from sorted(waiting)
 
 
-def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
+def merge_streams(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
     """Yield the frames of several streams by log time, each with the number of its stream.
 
     The log is read once for all of them.

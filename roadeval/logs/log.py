@@ -19,14 +19,21 @@ from roadeval.logs.container.file import Container, Damage, containers_in, damag
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import check_content, files_of
-from roadeval.logs.frames import TRUTH, FrameStream, Selection, looked_at, settle, with_label
+from roadeval.logs.frames import (
+    TRUTH,
+    FrameStream,
+    Selection,
+    labelled_numbers,
+    look_at_images,
+    settle,
+)
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
+from roadeval.logs.truth.labels import LabelSource, log_and_topic, source_beside_log
 from roadeval.logs.truth.names import find_keys, shown_name
 from roadeval.runtime.text import visible
 
@@ -249,7 +256,9 @@ class Log:
                 check_names(names, camera.topic, self.topics)
             count = len(images) if images.sure == images.expected() == len(images) else None
             labels = find_keys(origin, settings.path, settings, images.limits, count)
-            return beside_log(labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms)
+            return source_beside_log(
+                labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms
+            )
         other = open_log(log, LogConfig(frames=self.config.frames))
         self.beside.append(other)
         if topic is None:
@@ -259,7 +268,9 @@ class Log:
             topic = choice.topic.name
         reader = other.readers[named(other.topics, topic, "topic").name]
         name = "" if other.path.resolve() == self.path.resolve() else other.name
-        return beside_log(reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms)
+        return source_beside_log(
+            reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms
+        )
 
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with the settings of one camera of a rig."""
@@ -296,7 +307,7 @@ class Log:
                     f"the first has {images.frame_id(first) or 'none'}"
                 )
         if settings.labelled:
-            numbers = [*islice(with_label(truth, images, numbers), most)] if truth else []
+            numbers = [*islice(labelled_numbers(truth, images, numbers), most)] if truth else []
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
@@ -368,7 +379,7 @@ def describe(
         picks, problem = tuple[str, ...](), ""
         try:
             selection = log.select()
-            picks = (*selection.reasons, *looked_at(selection))
+            picks = (*selection.reasons, *look_at_images(selection))
         except LogError as error:
             problem = str(error)
         verified = verify or log.size <= SMALL
