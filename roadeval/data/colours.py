@@ -53,12 +53,9 @@ CLEAR: Final = (0, 0, 0, 0)
 """A fully transparent colour."""
 
 
-_ON_PAPER: Final = {YELLOW: BLACK, GREY: (138, 138, 138)}
-
-
 def on_paper(colour: Colour) -> Colour:
     """Return the colour, or a substitute if it is faint on white."""
-    return _ON_PAPER.get(colour, colour)
+    return {YELLOW: BLACK, GREY: (138, 138, 138)}.get(colour, colour)
 
 
 def hex_of(colour: Colour) -> str:

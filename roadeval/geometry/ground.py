@@ -22,8 +22,6 @@ from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
 
-GROUND_FRAMES: Final = ("base_footprint",)
-"""Frames of a vehicle that lie on the ground (REP 120)."""
 COEFFICIENTS: Final = {
     **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (0, 4, 5, 8, 12)),
     **dict.fromkeys(FISHEYE, (4,)),
@@ -262,7 +260,9 @@ def _find_pose(
             pitch = math.degrees(math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0])))
         if roll is None:
             roll = math.degrees(math.atan2(turn[2, 1], turn[2, 2]))
-        if height is None and mounting.parent in GROUND_FRAMES:
+        if (
+            height is None and mounting.parent == "base_footprint"
+        ):  # it lies on the ground (REP 120)
             height = mounting.translation[2]
     has_no_height = height is None or not 0.01 <= height <= 1000
     if height is None or pitch is None or has_no_height:

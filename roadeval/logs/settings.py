@@ -94,8 +94,8 @@ class TopicSettings:
     sync_tolerance_ms: Annotated[
         float | None, Interval(ge=0, le=86_400_000), Flag("--sync-tolerance", "MS")
     ] = None
-    """Most milliseconds between the stamps of an image and its truth. Default: half the frame
-    period."""
+    """Greatest difference in milliseconds between the stamps of an image and its truth. Default:
+    half the frame period."""
     sync_offset_ms: Annotated[
         float, Interval(ge=-86_400_000, le=86_400_000), Flag("--sync-offset", "MS")
     ] = 0.0
@@ -158,8 +158,8 @@ class LabelPlace:
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
     """A folder of label images or NPY files, one a frame; files of an annotation tool (COCO, CVAT,
-    LabelMe, YOLO, Label Studio, Cityscapes, BDD100K, VIA); or LOG.mcap:/topic. ``{drive}`` in the
-    path is the name of the drive's file without its ending."""
+    LabelMe, YOLO, Label Studio, Cityscapes, BDD100K, VIA); or LOG.mcap:/topic. In the path
+    ``{drive}`` is the name of the drive's file without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
     """The pairing of labels with frames: by ``number``, by which the labels' names differ, or by
     ``stamp``, if each name is a time (seconds, or milli-, micro- or nanoseconds since 1970).
@@ -167,7 +167,7 @@ class LabelPlace:
     first: Annotated[int | None, Interval(ge=0, le=1_000_000_000), Flag("--truth-first", "N")] = (
         None
     )
-    """The number of the first frame's label. Default: found out if the numbers leave no doubt."""
+    """The number of the first frame's label. Default: the only one that the numbers allow."""
     names: Annotated[str, Flag("--truth-names", "PATTERN")] = "*"
     """A pattern of the names of labels to read, such as ``left/*`` for one of several cameras. In
     ``*_{number}_v?.png`` the part ``{number}`` is the frame's number; ``*`` and ``?`` are any
@@ -176,8 +176,8 @@ class LabelPlace:
     """The folder of the images in the log, in their order: a label belongs to the image of the same
     name, without endings such as ``_mask``. It may contain ``{drive}``."""
     skip_roadless: Annotated[bool, Flag("--skip-roadless")] = False
-    """Only drawn labels with road. By default an image with shapes of other classes alone counts as
-    one without road."""
+    """Only drawn labels that contain road. Otherwise an image with shapes of other classes alone
+    counts as one without road."""
 
     def __post_init__(self) -> None:
         if self.images is not None and (self.pair, self.first) != (None, None):
@@ -219,14 +219,15 @@ class FrameSettings:
     """Only frames that have truth. Windows and flicker are of consecutive ones of these, however
     far apart they are."""
     max_frames: Annotated[int | None, Count, Flag("--max-frames", "N")] = None
-    """Most frames to read."""
+    """Greatest number of frames to read."""
     scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0
     """Share of their width and height to which frames and truth are reduced. A smaller one is
     quicker and coarser, and gives other results."""
     max_pixels: Annotated[int, Interval(ge=1, le=1 << 30), Flag("--max-pixels", "N", "Input")] = (
         MAX_PIXELS
     )
-    """Most pixels of an image. Larger ones are not decoded: a damaged head may claim any size."""
+    """Greatest number of pixels of an image. Larger images are not decoded: a damaged head may
+    claim any size."""
     unturned: Annotated[bool, Flag("--unturned", group="Input")] = False
     """Images as they are stored, without the turn of their EXIF orientation or a video's display
     matrix. Viewers and annotation tools turn them; calibrations are for the sensor."""

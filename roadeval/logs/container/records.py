@@ -383,8 +383,6 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
 
 
 _FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
-_OTHER_INDEXES: Final = Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET
-"""Records of a summary that are checked, but not used."""
 
 
 @dataclass(slots=True)
@@ -416,8 +414,8 @@ class Summary:
                 (self.schemas if opcode == Opcode.SCHEMA else self.channels)[record.id] = record
             elif opcode == Opcode.STATISTICS:
                 self.statistics = parse(opcode, records[body:end])
-            elif opcode in _OTHER_INDEXES:
-                parse(opcode, records[body:end])
+            elif opcode in (Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET):
+                parse(opcode, records[body:end])  # they are only checked
             elif opcode < PRIVATE:
                 raise BadRecord("its summary is not where it should be")
         if end != len(records):

@@ -73,15 +73,12 @@ LoggedPicture = RawPicture | CompressedPicture
 Picture = LoggedPicture | DecodedPicture
 
 _BUFFERS: Final = (bytes, bytearray, memoryview)
-_SECONDS: Final = ("sec", "secs", "seconds")
-_NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
 _CODECS: Final = {
     **dict.fromkeys(("h264", "avc", "libx264"), "h264"),
     **dict.fromkeys(("h265", "hevc", "libx265"), "hevc"),
     "vp9": "vp9",
     "av1": "av1",
 }
-_START_CODES: Final = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
 
 
 def codec_of(picture: Picture) -> str | None:
@@ -91,7 +88,8 @@ def codec_of(picture: Picture) -> str | None:
     for word in re.split(r"[^a-z0-9]+", picture.format.lower()):
         if word in _CODECS:
             return _CODECS[word]
-    return "h264" if bytes(picture.data[:4]).startswith(_START_CODES) else None
+    start_codes = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
+    return "h264" if bytes(picture.data[:4]).startswith(start_codes) else None
 
 
 def picture_in(message: Any) -> LoggedPicture:
@@ -118,7 +116,7 @@ def picture_in(message: Any) -> LoggedPicture:
         step, order = int(getattr(message, "step", 0)), getattr(message, "is_bigendian", False)
         data = _checked(_BUFFERS, message.data)
         return RawPicture(stamp_ns, *size, encoding, step, bool(order), data, frame_id)
-    except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
+    except (AttributeError, IndexError, TypeError, ValueError, LogError) as error:
         raise BadMessage("it lacks the fields of an image") from error
 
 
@@ -162,9 +160,9 @@ def nanoseconds(stamp: Any) -> int:
     """Return the nanoseconds of a stamp in any of its forms, exactly."""
     if isinstance(stamp, str):
         return parse_time(stamp)
-    seconds = next(getattr(stamp, name) for name in _SECONDS if hasattr(stamp, name))
-    rest = next((getattr(stamp, name) for name in _NANOSECONDS if hasattr(stamp, name)), 0)
-    return int(seconds) * 1_000_000_000 + int(rest)
+    units = ("sec", "secs", "seconds"), ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
+    seconds, nanos = ([getattr(stamp, n) for n in names if hasattr(stamp, n)] for names in units)
+    return int(seconds[0]) * 1_000_000_000 + int(nanos[0] if nanos else 0)
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,19 @@ def rows_of(picture: RawPicture, limits: Limits) -> Array:
     return np.ascontiguousarray(array, dtype.newbyteorder("="))
 
 
-def _raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None) -> Rgb:
+def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
+    """Decode a picture to ``(H, W, 3)`` uint8 RGB; grey fills all channels.
+
+    ``white`` is the white sample of pictures with more than eight bits: by default the greatest of
+    16 bits, or 1 for fractions. A `BadMessage` if the picture is damaged or cannot be decoded.
+    """
+    if isinstance(picture, DecodedPicture):
+        return picture.pixels
+    if isinstance(picture, CompressedPicture):
+        if _is_depth(picture):
+            raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
+        with _bad_message():
+            return decoding.to_rgb(picture.data, limits, white)
     import cv2
 
     samples, layout = eight_bits(rows_of(picture, limits), white), format_of(picture)
@@ -138,22 +150,6 @@ def _raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None) -> Rgb
         size = f"{picture.width}x{picture.height}"
         raise BadMessage(f"an image of {size} in {picture.encoding}: {error.err}") from error
     return np.ascontiguousarray(rgb[:, :: 1 + (layout.rows == 3)], np.uint8)
-
-
-def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
-    """Decode a picture to ``(H, W, 3)`` uint8 RGB; grey fills all channels.
-
-    ``white`` is the white sample of pictures with more than eight bits: by default the greatest of
-    16 bits, or 1 for fractions. A `BadMessage` if the picture is damaged or cannot be decoded.
-    """
-    if isinstance(picture, RawPicture):
-        return _raw_to_rgb(picture, limits, white)
-    if isinstance(picture, DecodedPicture):
-        return picture.pixels
-    if _is_depth(picture):
-        raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
-    with _bad_message():
-        return decoding.to_rgb(picture.data, limits, white)
 
 
 def deep_samples(picture: Picture, limits: Limits) -> Array | None:

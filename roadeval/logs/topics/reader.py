@@ -36,7 +36,6 @@ CACHE: Final = 16 << 20
 its chunk, which holds mostly other topics, is no longer in memory then."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
-CLOUDS: Final = ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
 
 Size = tuple[int, int]
 
@@ -83,7 +82,7 @@ class TopicInfo:
     @property
     def is_cloud(self) -> bool:
         """Whether its messages carry points in space."""
-        return self.schema in CLOUDS
+        return self.schema in ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
 
 
 def describe_topic(reader: TopicReader) -> TopicInfo:

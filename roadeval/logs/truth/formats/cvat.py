@@ -10,8 +10,6 @@ from xml.etree.ElementTree import Element
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth import drawn
 
-_NO_AREAS: Final = ("polyline", "points", "tag", "skeleton")
-
 
 def _read_cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if content.find("track") is not None:
@@ -22,8 +20,9 @@ def _read_cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[d
 
 def _shapes(elements: Iterable[Element]) -> Iterator[drawn.Shape]:
     # Shapes of equal height stay in the order of the file. Datumaro writes shapes ``outside``, too.
+    without_area = ("polyline", "points", "tag", "skeleton")
     for element in sorted(elements, key=lambda shape: float(shape.get("z_order", 0))):
-        if element.tag not in _NO_AREAS and element.get("outside") != "1":
+        if element.tag not in without_area and element.get("outside") != "1":
             yield _shape(element)
 
 

@@ -12,14 +12,14 @@ from roadeval.images.decoding import to_rgb
 from roadeval.images.formats import Limits
 from roadeval.logs.truth import drawn
 
-_LINES: Final = ("point", "points", "line", "linestrip")
 _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "quadrilateral")
 
 
 def _read_labelme(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
 ) -> Iterator[drawn.DrawnLabel]:
-    areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in _LINES)
+    lines = ("point", "points", "line", "linestrip")
+    areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in lines)
     size = drawn.size_in(content, "imageWidth", "imageHeight")
     yield drawn.DrawnLabel(str(path), size, map(_shape, areas))
 
