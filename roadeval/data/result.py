@@ -196,10 +196,7 @@ class Doubt:
 
 @dataclass(frozen=True, eq=False)
 class FrameMetres:
-    """The measures of a frame's final mask in metres, for S poses of the camera.
-
-    The first pose is the calibrated one.
-    """
+    """Measures of a final mask in metres, for S poses of the camera; the first is calibrated."""
 
     measures: Sequence[tuple[str, int]]
     """M names, and the metres ahead of each measure; 0 if it has none."""

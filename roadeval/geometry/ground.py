@@ -64,10 +64,7 @@ class Ground:
         return replace(self, width=width, height=height, matrix=_flat(matrix))
 
     def pixels(self, places: Matrix) -> Matrix:
-        """Return the pixels of places, ``(n, 2)``; NaN if no ray from a place meets the lens.
-
-        Pixels may lie outside the image.
-        """
+        """Return the pixels of places, ``(n, 2)``, also outside the image; NaN if not seen."""
         rays = _apply(self.plane, places)
         if self.distortion:
             # A folding polynomial bends rays from far outside the picture back into it.
@@ -160,10 +157,7 @@ def _growth(slope: Floats, model: str, distortion: Sequence[float]) -> Floats:
 
 
 def _distort(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
-    """Apply a model of OpenCV to rays in units of the focal length, ``(n, 2)``.
-
-    ``distortion`` are all coefficients of the model.
-    """
+    """Apply a model with all its coefficients to rays, ``(n, 2)`` in focal lengths."""
     slope = np.hypot(*rays.T)
     distorted = rays * _growth(slope, model, distortion)[:, None]
     if model in FISHEYE:

@@ -39,10 +39,7 @@ class Plan:
         return pixels_of(self.ground, places.reshape(-1, 2)).reshape(places.shape[:2])
 
     def picture(self, image: npt.NDArray[Any], nothing: int = 0) -> npt.NDArray[Any]:
-        """Return an ``(H, W, ...)`` image as seen from above, with ``nothing`` outside of it.
-
-        Cells take the nearest pixel.
-        """
+        """Return an image as seen from above, by the nearest pixels; ``nothing`` outside it."""
         picture = image.reshape(-1, *image.shape[2:]).take(self.cells, axis=0)
         picture[self.cells == OUTSIDE] = nothing
         return picture

@@ -55,10 +55,7 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
 
 
 def deep_samples(data: File, limits: Limits) -> Array | None:
-    """Return the samples of an image with more than eight bits; None for any other.
-
-    Errors as in `to_rgb`.
-    """
+    """Return samples of more than eight bits; None for other images. Errors as in `to_rgb`."""
     image = _decode(data, limits)
     is_grey = not isinstance(image, np.ndarray) and image.mode in _SAMPLES
     samples = _samples(image) if is_grey else _deep_colours(data)
@@ -119,10 +116,7 @@ def _label_values(image: Any) -> Array:
 
 
 def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
-    """Return the ``(H, W)`` uint8 indices of a PNG file with a palette.
-
-    Errors as in `to_rgb`, and if it has no palette.
-    """
+    """Return the ``(H, W)`` uint8 indices of a PNG; an `ImageError` if it has no palette."""
     image = _decode(data, limits)
     if isinstance(image, np.ndarray) or image.mode != "P":
         raise ImageError("an image without a palette")

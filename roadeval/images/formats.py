@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+Size = tuple[int, int]
+"""Width and height in pixels."""
 MAX_PIXELS: Final = 1 << 25
 """Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
 
 
 class ImageError(ValueError):
-    """An image that is damaged, of an unknown format, or too large.
-
-    The message continues "frame 7: ...".
-    """
+    """An image that is damaged, of an unknown format, or too large; it continues "frame 7: "."""
 
 
 @dataclass(frozen=True)

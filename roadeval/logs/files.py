@@ -232,10 +232,7 @@ def prefer_ids(labels: Sequence[Path]) -> Sequence[Path]:
 
 
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
-    """Find for each label the image of the same name.
-
-    Names are compared unchanged, as `bare_name`, or without the ends that all labels share.
-    """
+    """Find the image of each label by its name, unchanged, `bare_name`, or without shared ends."""
     exact, loose = {file.stem: file for file in images}, {bare_name(file): file for file in images}
     names = without_hashes([*map(bare_name, labels)])
     ends = [len(part) for part in _shared([name[::-1] for name in names])]

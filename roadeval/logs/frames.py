@@ -182,10 +182,7 @@ def settle(
     *,
     of_rig: bool = False,
 ) -> Selection:
-    """Choose what to replay of a log's own topics; ``of_rig`` is that of `choose_truth`.
-
-    A `LogError` as in `roadeval.logs.log.Log.select`.
-    """
+    """Choose from a log's topics; see `choose_truth` for ``of_rig``, `Log.select` for errors."""
     settings = config.topics
     topics = [_with_frame_id(topic, readers[topic.name], settings.frame_id) for topic in topics]
     image, why = choose_image(topics, settings.image)
@@ -394,10 +391,7 @@ class LoggedFrame:
         return TRUTH in self.labels
 
     def decode(self) -> Frame:
-        """Decode image and labels, in any thread; most of it runs without the interpreter lock.
-
-        A `FrameError` if the image or a label of it cannot be decoded.
-        """
+        """Decode image and labels, in any thread; a `FrameError` if one cannot be decoded."""
         try:
             return self._decode()
         except (BadMessage, FrameError) as error:
@@ -610,10 +604,7 @@ def labelled_numbers(
 
 
 def merge_streams(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
-    """Yield the frames of several streams by log time, each with the number of its stream.
-
-    The log is read once for all of them.
-    """
+    """Yield the frames of several streams by log time, each with the number of its stream."""
     times = np.concatenate([stream.log_times for stream in streams])
     numbers = np.repeat(np.arange(len(streams)), [*map(len, streams)])
     for number in numbers[np.argsort(times, kind="stable")].tolist():

@@ -317,7 +317,7 @@ class Log:
         return FrameStream(selection, last - first, numbers, labelled=labelled)
 
     def close(self) -> None:
-        """Close the log's files, and those of logs beside it."""
+        """Close the files of the log, and of logs beside it."""
         for container in self.containers:
             container.close()
         for other in self.beside:
@@ -332,7 +332,7 @@ class Log:
 
 @dataclass(frozen=True)
 class LogDescription:
-    """The content of a log, its damage, and what a replay would pick."""
+    """The content of a log, its damage, and the choices of a replay."""
 
     path: str
     bytes: int

@@ -93,10 +93,7 @@ def codec_of(picture: Picture) -> str | None:
 
 
 def picture_in(message: Any) -> LoggedPicture:
-    """Return the picture of a decoded message, by the names of its fields.
-
-    A `BadMessage` if it lacks the fields of an image.
-    """
+    """Return the picture in the fields of a message; a `BadMessage` if it lacks some."""
     try:
         stamp_ns, header = 0, getattr(message, "header", message)
         if header is not message:

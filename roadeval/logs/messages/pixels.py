@@ -153,10 +153,7 @@ def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
 
 
 def deep_samples(picture: Picture, limits: Limits) -> Array | None:
-    """Return the samples of a picture with more than eight bits; None for any other.
-
-    A `BadMessage` as in `to_rgb`.
-    """
+    """Return samples of more than eight bits; None for other pictures. Errors as in `to_rgb`."""
     if isinstance(picture, RawPicture):
         return rows_of(picture, limits) if format_of(picture).dtype != "u1" else None
     file = _file_in(picture)
@@ -184,10 +181,7 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
 
 
 def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
-    """Return width and height by a picture's head; None for video, which has no head.
-
-    A `BadMessage` if the head cannot be read.
-    """
+    """Return width and height by a picture's head; None for video. A `BadMessage` if damaged."""
     if isinstance(picture, RawPicture):
         return picture.width, picture.height
     with _bad_message():
@@ -224,10 +218,7 @@ def _file_in(picture: CompressedPicture | DecodedPicture) -> Buffer | None:
 
 
 def file_of(picture: CompressedPicture) -> Buffer:
-    """Return the image file of a picture, which in ``compressedDepth`` is a PNG.
-
-    A `BadMessage` if it is another encoding of depth.
-    """
+    """Return a picture's image file; a `BadMessage` if it has depth that is no PNG."""
     if not _is_depth(picture):
         return picture.data
     if re.search("(?i)32fc1|rvl", picture.format):

@@ -1,4 +1,4 @@
-"""The calibration of a camera, and where it is mounted, from the messages of a log.
+"""The calibration of a camera and its mounting, from the messages of a log.
 
 These are the first usable message of ``sensor_msgs/CameraInfo`` or Foxglove's
 ``CameraCalibration``, and static transforms in ROS's ``tf2_msgs/TFMessage`` or Foxglove's
@@ -16,10 +16,11 @@ import numpy as np
 
 from roadeval.data import Calibration, Mounting
 from roadeval.data.arrays import Vector
+from roadeval.images.formats import Size
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.topics.choose import words
-from roadeval.logs.topics.reader import Size, TopicInfo, TopicReader
+from roadeval.logs.topics.reader import TopicInfo, TopicReader
 
 OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
 """The rotation from a camera's axes to those of a vehicle: x ahead, y left, z up (REP 103)."""

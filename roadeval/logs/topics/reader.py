@@ -13,7 +13,7 @@ import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.images.decoding import orientation_of
-from roadeval.images.formats import Limits
+from roadeval.images.formats import Limits, Size
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError
@@ -37,8 +37,6 @@ its chunk, which holds mostly other topics, is no longer in memory then."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
 
-Size = tuple[int, int]
-
 
 @dataclass(frozen=True)
 class TopicInfo:
@@ -61,8 +59,7 @@ class TopicInfo:
     """Log times around each step of more than 2.5 median periods, for images only."""
     format: str = ""
     """Pixel encoding or file format of the first readable image, as the fields below."""
-    size: tuple[int, int] | None = None
-    """Width and height."""
+    size: Size | None = None
     channels: int | None = None
     """1 for an image of single values, 3 for one of colours."""
     lossy: str = ""
@@ -95,7 +92,7 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
     times = reader.log_times
     period = median_period(times)
     rate = NS / period if period > 0 else None
-    # A topic that is not read tells only the number of messages and their time range.
+    # If a topic is not read, only the number of its messages and their time range are known.
     if rate is None and count > 1 and first is not None and last is not None and last > first:
         rate = (count - 1) * NS / (last - first)
     before = np.flatnonzero(np.diff(times) > 2.5 * period) if period > 0 else ()
@@ -247,7 +244,7 @@ class TopicReader:
             if source.container.is_bad(chunk):
                 raise LostMessageError(f"{self.name} message {position}: {error}") from error
             return None
-        # Times beyond those of int64 are negative in the table.
+        # Times beyond int64 are negative in the table.
         same_time = message.log_time == int(self.log_times[position]) % 2**64
         return message if same_time and message.channel_id == source.channel.id else None
 
@@ -274,7 +271,7 @@ class TopicReader:
             raise self._error(position, str(error)) from error
 
     def fields(self, position: int) -> Any:
-        """Read a message whatever it carries; a `FrameError` or `BadMessage` if that fails."""
+        """Read a message of any kind; a `FrameError` or `BadMessage` if that fails."""
         return self._decoder(position).fields(self.message(position).data)
 
     def stamp(self, position: int) -> int:

@@ -14,13 +14,13 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 import numpy as np
 
-from roadeval.images.formats import ImageError, Limits
+from roadeval.images.formats import ImageError, Limits, Size
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import ClassRoles, DrawnLabel, LabelFormat, Size, settle_shapes
+from roadeval.logs.truth.drawn import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.logs.truth.names import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
 from roadeval.runtime.discovery import found_in

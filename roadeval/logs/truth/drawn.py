@@ -22,13 +22,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.images.formats import Limits
+from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.files import first_names
 
 Mask = npt.NDArray[np.bool_]
-Size = tuple[int, int]
-"""Width and height in pixels."""
 _CORNERS: Final = 90
 """Points of an ellipse."""
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Rgb, Truth
 from roadeval.data.words import counted
-from roadeval.images.formats import Limits
+from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
@@ -141,7 +141,7 @@ class ClassMap:
 
 @dataclass(frozen=True)
 class Confidence:
-    """Confidence maps: road is what has at least the ``threshold``, from 0 to 1."""
+    """Confidence maps: road has at least the ``threshold``, from 0 to 1."""
 
     threshold: float
     notes: tuple[str, ...] = ()
@@ -446,9 +446,6 @@ def label_files(settings: LabelPlace) -> list[Path]:
     paths += [] if settings.images is None else [Path(settings.images)]
     files = [f for path in paths for f in (sorted(path.rglob("*")) if path.is_dir() else [path])]
     return [*filter(is_shown, files)]
-
-
-Size = tuple[int, int]
 
 
 def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bool) -> str:

@@ -265,7 +265,7 @@ class Partners:
 
     @cached_property
     def _all_equal(self) -> dict[int, int | None]:
-        """The label of each image that has the stamp of a label, wherever both lie."""
+        """The label of each image that has the same stamp, at whatever distance."""
         images, labels = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
         for stamps, places in ((self._pairing.images, images), (self._pairing.labels, labels)):
             for place in range(len(stamps)):

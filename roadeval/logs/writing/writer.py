@@ -99,10 +99,7 @@ class LogWriter:
         log_time_ns: int | None = None,
         frame_id: str = FRAME_ID,
     ) -> None:
-        """Write a ``(H, W)`` mask, or an RGB or RGBA image, uint8, as a PNG.
-
-        A `LogError` if the disk is full.
-        """
+        """Write a ``(H, W)`` mask, or an RGB or RGBA image, as a PNG; errors as in `image`."""
         png = png_of(mask)
         self.image(topic, stamp_ns, png, "png", log_time_ns=log_time_ns, frame_id=frame_id)
 
