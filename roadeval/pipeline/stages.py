@@ -24,16 +24,14 @@ from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
-from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.discovery import by_name, collect
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import visible
 
 GROUP: Final = "roadeval.stages"
 """The group of entry points by which a package adds stages."""
 
-STAGES: Final[Mapping[str, Stage]] = by_name(
-    (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
-)
+STAGES: Final[Mapping[str, Stage]] = by_name((*collect(beyond, "STAGE"), *collect(paper, "STAGE")))
 """The stages of this package, one per file of their folders."""
 
 

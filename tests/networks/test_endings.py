@@ -10,7 +10,7 @@ from onnx import TensorProto, helper
 from PIL import Image
 
 from roadeval.networks import NetSettings, Network, NetworkError, onnx_file
-from roadeval.networks.network import placed
+from roadeval.networks.network import fit_image
 from tests.networks.making import IMAGE, ROAD, SIZE, network, written
 
 RNG = np.random.default_rng(3)
@@ -195,7 +195,7 @@ def test_an_antialiased_image_is_pillows(size):
     settings = NetSettings(file="n", size=size, resize="stretch", antialias=True)
     image = RNG.integers(0, 256, (47, 61, 3), np.uint8)
     expected = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR))
-    assert np.abs(placed(image, settings).astype(int) - expected).max() <= 1
+    assert np.abs(fit_image(image, settings).astype(int) - expected).max() <= 1
 
 
 @pytest.mark.parametrize("told", ["task", "boxes", "queries", "their lengths"])

@@ -49,7 +49,7 @@ from roadeval.results.rows import drive_row
 from roadeval.results.schema import FAILED
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, own_names, put, sha256_of
+from roadeval.runtime.files import alone, find_partial, put, sha256_of
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import save_model
@@ -227,7 +227,7 @@ def _remove(task: DriveTask, *folders: str) -> None:
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
     }
-    partial = own_names(recording, hidden=False) if recording.parent.exists() else []
+    partial = find_partial(recording, hidden=False) if recording.parent.exists() else []
     for path in (*(paths[each] for each in folders), *(partial if RECORDINGS in folders else ())):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)

@@ -23,7 +23,7 @@ from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import Drawing, LabelFormat, Meant, Size, settled
 from roadeval.logs.truth.names import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
 
@@ -92,7 +92,7 @@ def _labels_of(
 def _formats() -> dict[str, list[LabelFormat]]:
     """Return the formats by the endings of their files."""
     by_ending: dict[str, list[LabelFormat]] = {}
-    for format_ in chain(*found_in(formats, "FORMATS")):
+    for format_ in chain(*collect(formats, "FORMATS")):
         by_ending.setdefault(format_.ending, []).append(format_)
     return by_ending
 
