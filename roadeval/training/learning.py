@@ -215,8 +215,8 @@ def from_file(path: Path, pipelines: Pipelines) -> tuple[Model, Schedule]:
 
 
 Frames = Callable[..., Iterable[LoggedFrame]]
-"""A function that returns the frames of a range in order, from the first at each call. Asked for
-some numbers, or for labelled frames, it may leave out all others."""
+"""A function that returns the frames of a range in order, from the first at each call. If numbers
+of frames, or labelled frames, are asked for, it may leave out all others."""
 
 
 def from_log(

@@ -1,7 +1,7 @@
 """The network beside the trees, and the mean of both."""
 
 import warnings
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -116,17 +116,3 @@ def test_the_network_has_less_to_say_in_the_shade(light, weight):
 
 def test_without_a_feature_that_tells_light_the_weight_is_that_in_the_light():
     assert network_weight(np.zeros((3, 1), np.float32), TreesSettings(features=("place",))) == 2 / 3
-
-
-@pytest.mark.parametrize(
-    ("changed", "why"),
-    [
-        ({"ranks": np.zeros((4, CODES - 1), np.float32)}, "ranks has the shape"),
-        ({"planes": np.full((64, 4), np.nan, np.float32)}, "holds a number outside"),
-        ({"bias": np.zeros(63, np.float32)}, "bias has the shape"),
-        ({"shift": np.zeros(2, np.float32)}, "shift has the shape"),
-    ],
-)
-def test_networks_that_no_training_gives_are_refused(network, changed, why):
-    with pytest.raises(ValueError, match=why):
-        replace(network, **changed)
