@@ -349,17 +349,10 @@ def tree_sum(
 
     A tree's leaves are numbered from the left. A node with a feature above the threshold rules out
     the leaves on its left; the first leaf that no node has ruled out is the pixel's [1]_.
-
-    Parameters
-    ----------
-    features
-        ``(F, n)`` float32: the features of n pixels.
-    feature, threshold, leaves
-        ``(T, N)`` int32, float32 and uint32, for N nodes of T trees: a feature's place, the number
-        that it is compared with, and a bit for each leaf that remains if it is above that; the
-        highest bit is always set.
-    values
-        ``(T, LEAVES)`` float32: the number that each leaf adds.
+    ``features`` are ``(F, n)`` float32, for n pixels. ``feature``, ``threshold`` and ``leaves`` are
+    ``(T, N)`` int32, float32 and uint32, for N nodes of T trees: a feature's place, the number that
+    it is compared with, and a bit for each leaf that remains if it is above that; the highest bit
+    is always set. ``values`` are ``(T, LEAVES)`` float32: the number that each leaf adds.
 
     References
     ----------

@@ -12,27 +12,12 @@ from typing import Any, Final, Literal, Self
 import cv2
 import numpy as np
 
-from roadeval.data import CERTAIN, Mask, Probability, Rgb
+from roadeval.data import CERTAIN, Output, Packed, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.text import visible
 from roadeval.runtime.threads import ordered
-
-
-@dataclass(frozen=True, eq=False)
-class Road:
-    """The road of a frame by a network."""
-
-    mask: Mask
-    """``(H, W)`` uint8, 1 road."""
-    codes: Probability
-    """Probability of road, ``(H, W)`` uint16 codes 0..65535 that span 0..1."""
-    graded: bool
-    """Whether the mask is a threshold on the codes; otherwise the network gives only classes, and
-    the codes are 0 and 65535."""
-    by_class: tuple[Probability, ...] = ()
-    """The codes of each class of road, if there are several and they are graded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +39,14 @@ class Network:
         settings = complete_settings(settings, file)
         return cls(settings, file, tuple(sample.shape for sample in samples_of(settings, file)))
 
-    def road(self, image: Rgb) -> Road:
+    def road(self, image: Rgb) -> Output:
         """Find the road in an ``(H, W, 3)`` uint8 RGB image.
 
         Logits and probabilities of a class are interpolated linearly to the frame's size; numbers
         of classes are resized to the nearest pixel. With several outputs the probability of road is
-        the greatest of theirs. A `NetworkError` if the network fails on the image, or gives NaN or
-        another shape than for other images.
+        the greatest of theirs. The output has no probabilities if the network gives only classes. A
+        `NetworkError` if the network fails on the image, or gives NaN or another shape than for
+        other images.
         """
         settings = self.settings
         frame = image.shape[1], image.shape[0]
@@ -73,9 +59,11 @@ class Network:
         codes = np.maximum.reduce([total for total, _ in pairs])
         limit = round((0.5 if settings.threshold is None else settings.threshold) * CERTAIN)
         by_class = tuple(chain(*zip(*(single for _, single in pairs), strict=True)))
-        graded = settings.activation != "classes"
-        mask = (codes > limit).astype(np.uint8)
-        return Road(mask, codes, graded, by_class if len(by_class) > 1 else ())
+        return Output(
+            mask=Packed.of(codes > limit),
+            probability=None if settings.activation == "classes" else codes,
+            by_class=by_class if len(by_class) > 1 else (),
+        )
 
     def facts(self) -> Mapping[str, Any]:
         """Return facts about the network for results, beside its settings."""

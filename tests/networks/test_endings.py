@@ -120,7 +120,7 @@ def opened_here_alone(monkeypatch):
 
 def road_of(path, ending, frame=FRAME, **settings):
     found = Network.of(NetSettings(file=str(ended(path, ending)), **settings))
-    return found, found.road(frame).mask
+    return found, found.road(frame).mask.pixels()
 
 
 @pytest.mark.parametrize("ending", [*PROBABILITIES, *LOGITS, *MAPS])
@@ -171,13 +171,15 @@ def test_of_a_single_class_ultralytics_writes_road_as_1(road, tmp_path):
     """``pred.gt(0)`` in ``SemanticSegmentationPredictor.postprocess``, and in its export."""
     path = ended(tmp_path / "n.onnx", f"{ONE}; Greater zero; Cast to={TensorProto.UINT8}")
     found = Network.of(NetSettings(file=str(by_ultralytics(path, {0: "road"})), road=road))
-    assert np.array_equal(found.road(FRAME).mask, EXPECTED)
+    assert np.array_equal(found.road(FRAME).mask.pixels(), EXPECTED)
     assert (found.settings.road, found.settings.resize) == ((1,), "letterbox")
 
 
 def test_of_several_classes_ultralytics_names_say_which_is_road(tmp_path):
     path = by_ultralytics(ended(tmp_path / "n.onnx", MAP), {0: "car", 1: "road"})
-    assert np.array_equal(Network.of(NetSettings(file=str(path))).road(FRAME).mask, EXPECTED)
+    assert np.array_equal(
+        Network.of(NetSettings(file=str(path))).road(FRAME).mask.pixels(), EXPECTED
+    )
 
 
 def test_class_maps_of_ultralytics_come_back_as_its_own_do(tmp_path):
@@ -185,9 +187,9 @@ def test_class_maps_of_ultralytics_come_back_as_its_own_do(tmp_path):
     path = by_ultralytics(ended(tmp_path / "n.onnx", MAP), {0: "car", 1: "road"})
     frame = cv2.resize(FRAME, (40, 30), interpolation=cv2.INTER_NEAREST)
     found = Network.of(NetSettings(file=str(path)))
-    small = found.road(cv2.resize(frame, SIZE)).mask
+    small = found.road(cv2.resize(frame, SIZE)).mask.pixels()
     rows, columns = (np.arange(n) * m // n for n, m in zip((30, 40), (12, 16), strict=True))
-    assert np.array_equal(found.road(frame).mask, small[np.ix_(rows, columns)])
+    assert np.array_equal(found.road(frame).mask.pixels(), small[np.ix_(rows, columns)])
 
 
 @pytest.mark.parametrize("size", [(37, 29), (16, 12), (9, 31), (80, 60)])
