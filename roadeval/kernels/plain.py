@@ -1,6 +1,6 @@
 """The kernels as NumPy and OpenCV expressions: their definition, and a fallback without a compiler.
 
-The sections are those of the C files in the folder ``c``.
+Each section is a C file in the folder ``c``.
 """
 
 from __future__ import annotations

@@ -161,7 +161,7 @@ Size = tuple[int, int]
 
 
 def inside(frame: Size, settings: NetSettings) -> tuple[slice, slice]:
-    """Return the rows and columns of the input where a frame lies: in the middle."""
+    """Return the rows and columns of a frame in the input: they are in the middle."""
     assert settings.size is not None
     width, height = settings.size
     if settings.resize == "stretch":

@@ -1,1 +1,1 @@
-"""Stages and chains: pure functions on arrays. `paper` is what the paper has, `beyond` the rest."""
+"""Stages and chains: pure functions on arrays. `paper` has the paper's stages, `beyond` all others."""

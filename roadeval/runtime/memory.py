@@ -1,4 +1,4 @@
-"""Memory: freed memory returned to the system, and a message where there is not enough."""
+"""Memory: freed memory returned to the system, and a message if there is not enough."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def reuse() -> None:
 
 
 def resident() -> int:
-    """Return the bytes of memory that the process holds; 0 where the system does not say."""
+    """Return the bytes of memory that the process holds; 0 if the system does not say."""
     if sys.platform != "linux":
         return 0
     return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE

@@ -223,7 +223,7 @@ class TreesSettings:
     the shade. Default: 1 if images of the frame's size taught the trees, which are taken for the
     camera's own; 4 if other cameras taught them: there it may correct much."""
     threshold: Share = 0.5
-    """A pixel is road where it is more probable than this."""
+    """A pixel is road if its probability of road is above this."""
 
     @field_validator("features")
     @classmethod
