@@ -1,1 +1,1 @@
-"""Stages and chains: pure functions on arrays. `paper` has the paper's stages, `beyond` all others."""
+"""Stages and chains: pure functions on arrays, of the paper in `paper`, all others in `beyond`."""

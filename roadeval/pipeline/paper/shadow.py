@@ -260,7 +260,8 @@ def compensation(
     ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 if sigma is 0),
     after which the component has its ring's mean and deviation. ``printed`` gives
     ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 if the ring's variance is 0),
-    and flattens the region, since its ratio is upside down. Components without a ring stay unchanged.
+    and flattens the region, since its ratio is upside down. Components without a ring stay
+    unchanged.
     """
     above, below = ring.deviation, inside.deviation
     if settings.statistic == "printed":
