@@ -209,7 +209,7 @@ import atexit, os, sys
 from pathlib import Path
 
 def end():
-    lines = [each.split() for name in ("io", "status") for each in Path("/proc/self", name).open()]
+    lines = [line.split() for name in ("io", "status") for line in Path("/proc/self", name).open()]
     numbers = {words[0]: words[1] for words in lines if len(words) > 1}
     used = os.times()
     Path(os.environ["COST"]).write_text(f"{numbers['rchar:']} {sum(used[:2])} {numbers['VmHWM:']}")
@@ -224,7 +224,7 @@ from mcap_ros2.decoder import DecoderFactory
 topics = ["/cameras/front/image/compressed", "/labels/front/semantic"]
 for path in sys.argv[2:]:
     with open(path, "rb") as file:
-        for place, found in enumerate(
+        for place, _ in enumerate(
             make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics)
         ):
             if place + 1 == int(sys.argv[1]):
@@ -238,7 +238,7 @@ for path in sys.argv[1:]:
 """
 
 
-def measured(code: str, *words: object) -> dict[str, Any]:
+def measure(code: str, *words: object) -> dict[str, Any]:
     """Run a program; return what it has read, in bytes, and what it took."""
     first, last, start = "", "", perf_counter()
     with (
@@ -290,20 +290,21 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
         "pdf": (_ROADEVAL, "report", out, "-o", folder / "report.pdf"),
         "page": (_ROADEVAL, "report", out, "-o", folder / "report.html"),
     }
-    size, own = sum(file.stat().st_size for file in files), measured(_ROADEVAL, "--help")["read"]
+    size = sum(file.stat().st_size for file in files)
+    start_up = measure(_ROADEVAL, "--help")["read"]
     if "fifty" in parts:
         train = "train", drive, "--image-topic", "/cameras/front/image/compressed"
-        measured(_ROADEVAL, *train, "--train-frames", 3, "-o", folder / "front.model")
+        measure(_ROADEVAL, *train, "--train-frames", 3, "-o", folder / "front.model")
     for name in parts:
-        found = measured(*every[name])
-        read = max(found.pop("read") - own, 0)
+        costs = measure(*every[name])
+        read = max(costs.pop("read") - start_up, 0)
         saved = folder / "rig.rrd" if name == "rig" else out
         made = saved.stat().st_size if "replay" in every[name] else 0
         yield {
             "what": name,
             "read, MB": f"{read / 1e6:.0f}",
             "of the log": f"{read / size:.3f}",
-            **found,
+            **costs,
             "recording, MB": f"{made / 1e6:.0f}" if made else "",
         }
 
@@ -319,7 +320,9 @@ def main() -> None:
     parser.add_argument("--drive", type=Path, default=Path("recordings/demo.mcap"))
     parser.add_argument("--gigabytes", type=float, default=1.0)
     parser.add_argument("--files", type=int, default=1, help="of the log")
-    parser.add_argument("--folder", type=Path, help="for the log; it is kept, and used again")
+    parser.add_argument(
+        "--folder", type=Path, help="folder of the log, which stays and is used again"
+    )
     parser.add_argument("--parts", choices=PARTS, nargs="+", default=PARTS)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:

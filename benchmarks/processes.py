@@ -1,4 +1,4 @@
-"""What only a process of its own shows: peak memory, the start, and what a command costs in all."""
+"""Costs of a process of its own: peak memory, the start, and all of a command."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, li
     }
     for command in commands.values():
         _cost(*command)
-    return {name: [_cost(*each) for _ in range(runs)] for name, each in commands.items()}
+    return {name: [_cost(*words) for _ in range(runs)] for name, words in commands.items()}
 
 
 def seconds(drive: Path, folder: Path) -> tuple[float, float]:

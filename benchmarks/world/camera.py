@@ -112,12 +112,12 @@ class Camera:
         depth = self.depth(corners)
         if depth.min() >= NEAR:
             return self.project(corners)
-        kept: list[Matrix] = []
+        corners: list[Matrix] = []
         for here, there, d0, d1 in zip(
             corners, np.roll(corners, -1, 0), depth, np.roll(depth, -1), strict=True
         ):
             if d0 >= NEAR:
-                kept.append(here)
+                corners.append(here)
             if (d0 >= NEAR) != (d1 >= NEAR):
-                kept.append(here + (there - here) * (NEAR - d0) / (d1 - d0))
-        return self.project(np.array(kept)) if kept else np.empty((0, 2))
+                corners.append(here + (there - here) * (NEAR - d0) / (d1 - d0))
+        return self.project(np.array(corners)) if corners else np.empty((0, 2))

@@ -183,9 +183,9 @@ class SunMap:
         column, row = cells.astype(np.float32).T.reshape(2, *points.shape[:2])
         share = np.ones(points.shape[:2], np.float32)
         for layer, bottom in zip(self.layers, HEIGHTS[:-1], strict=True):
-            found = cv2.remap(
+            light = cv2.remap(
                 layer, column, row, cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_CONSTANT, borderValue=255,
             )  # fmt: skip
-            share *= np.where(points[..., 1] <= bottom, found / np.float32(255), 1.0)
+            share *= np.where(points[..., 1] <= bottom, light / np.float32(255), 1.0)
         return share

@@ -98,9 +98,11 @@ class Sky:
         height = np.maximum(rays[..., 1], 0.03)
         across = rays[..., 0] / height * np.float32(CLOUD_SCALE)
         along = (rays[..., 2] / height + np.float32(drift)) * np.float32(CLOUD_SCALE)
-        found = cv2.remap(self.clouds, across, along, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-        cover = smoothstep(found, 0.35, 1.5) * smoothstep(climb, 0.03, 0.14)
-        return np.asarray(cover, np.float32), smoothstep(-found, -3.0, -0.6)
+        density = cv2.remap(
+            self.clouds, across, along, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP
+        )
+        cover = smoothstep(density, 0.35, 1.5) * smoothstep(climb, 0.03, 0.14)
+        return np.asarray(cover, np.float32), smoothstep(-density, -3.0, -0.6)
 
 
 def _below(climb: Field, top: Field) -> Field:

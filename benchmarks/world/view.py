@@ -61,8 +61,8 @@ def see(scene: Scene, now: Moment) -> Film:
 
 def _rows(where: Flags) -> slice:
     """Return the rows of ``(H, W)`` in which anything is true."""
-    found = np.flatnonzero(where.any(1))
-    return slice(int(found[0]), int(found[-1]) + 1)
+    rows = np.flatnonzero(where.any(1))
+    return slice(int(rows[0]), int(rows[-1]) + 1)
 
 
 def _lay_ground(film: Film, rays: Field, down: Flags, scene: Scene, now: Moment) -> None:
