@@ -48,7 +48,7 @@ PARTS = ("replay", "stages", "plain", "process")
 
 
 def main() -> None:
-    """Measure the parts of the options, print the tables and write the JSON."""
+    """Measure the chosen parts, print the tables and write the JSON."""
     options = parse_arguments()
     source = Source(options.drive, tuple(options.road_label), tuple(options.ignore_label))
     frames = source.frames(options.frames)

@@ -86,7 +86,7 @@ def _effects(
 
 
 def judge(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[float]:
-    """Make a fleet: whether Student's interval and ours hold, whether ours is sure, and its width."""
+    """Make a fleet: whether Student's interval and ours hold, ours is sure, and ours' width."""
     effects = fleet(rng, draw, layout, groups)
     means, ours = group_means(effects) / SCALE, over_drives(effects, CONFIDENCE)
     half = special.stdtrit(groups - 1, 1 - TAIL) * means.std(ddof=1) / math.sqrt(groups)

@@ -26,7 +26,7 @@ PUPILS: Final[tuple[tuple[str, str, str | None], ...]] = (
 """Who teaches, which drive is scored, and by what it is adapted to its first ten frames."""
 
 
-def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
+def measure(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
     """Return what each of `PUPILS` comes to, with each seed; the models are made once."""
     rows = []
     for teacher, pupil, adapt in PUPILS:
@@ -74,8 +74,8 @@ def model_of(teacher: str, seed: int, sources: Sources, idd_lite: Path | None = 
 
 def summary(drive: Drive, tables: Mapping[str, Any], sources: Sources) -> dict[str, Any]:
     """Replay a drive with `robust` and some more settings; return its summary."""
-    given = {"preset": "robust", "labels": drive.labels, "output": {"record": "none"}, **tables}
+    settings = {"preset": "robust", "labels": drive.labels, "output": {"record": "none"}, **tables}
     reports = sources.work / f"{drive.name}.taught"
     return roadeval.replay(
-        drive.find(sources, drive.name), roadeval.configure(given), reports=reports
+        drive.find(sources, drive.name), roadeval.configure(settings), reports=reports
     ).summary

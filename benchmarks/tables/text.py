@@ -37,7 +37,7 @@ NOT_MEASURED: Final = (
     "| 4.2, step 5",
     "| 4.4, order",
 )
-"""What looks like a measured number in the texts and is none."""
+"""Texts that look like a measured number and are none."""
 
 
 def load() -> dict[str, Any]:
@@ -65,12 +65,12 @@ def between_marks(name: str, numbers: Mapping[str, Any]) -> str:
 
 
 def faults(text: str, numbers: Mapping[str, Any]) -> Iterator[str]:
-    """Yield, a line each, where a text says something else than the numbers, or without them."""
+    """Yield, a line each, the places where a text differs from the numbers, or has none."""
     marks = text.count("<!-- table ")
-    found = [*_BLOCK.finditer(text)]
-    if marks != len(found):
-        yield f"{marks} tables begin, and {len(found)} are whole: each ends with a line {END}"
-    for match in found:
+    blocks = [*_BLOCK.finditer(text)]
+    if marks != len(blocks):
+        yield f"{marks} tables begin, and {len(blocks)} are whole: each ends with a line {END}"
+    for match in blocks:
         if match["name"] not in BLOCKS:
             yield f"table {match['name']}: unknown, one of {', '.join(BLOCKS)}"
         elif match[0] != between_marks(match["name"], numbers):
@@ -80,9 +80,9 @@ def faults(text: str, numbers: Mapping[str, Any]) -> Iterator[str]:
 
 
 def loose(text: str) -> list[str]:
-    """Return what looks like measured numbers outside tables between marks and outside code."""
+    """Return texts like measured numbers outside tables between marks and outside code."""
     for part in (_BLOCK, _CODE):
         text = part.sub("", text)
-    for known in NOT_MEASURED:
-        text = text.replace(known, "")
+    for phrase in NOT_MEASURED:
+        text = text.replace(phrase, "")
     return [match[0] for match in _MEASURED.finditer(text)]
