@@ -1,4 +1,4 @@
-"""Many drives: one process against several, and what thousands of hours of video would take.
+"""Many drives: one process against several, and the time for thousands of hours of video.
 
     python -m benchmarks.fleet
 
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def _frame_seconds(drive: Path, model: Path, folder: Path) -> tuple[float, int]:
-    """Return what a frame takes in one thread, in the middle of three drives, and their number."""
+    """Return the seconds of a frame in one thread, the median of three drives, and their frames."""
     config = roadeval.configure(
         {
             "training": {"model": str(model)},
@@ -84,7 +84,7 @@ def _show(walls: dict[int, float], again: float, frame_s: float, frames: int) ->
 
 
 def _extrapolate(folder: Path, walls: dict[int, float], frame_s: float) -> None:
-    """Print what `HOURS` of video would take, in drives of `DRIVE_HOURS`."""
+    """Print the time and space for `HOURS` of video, in drives of `DRIVE_HOURS`."""
     fleet = roadeval.Result(folder)
     drives, frames = len(fleet.drives), int(fleet.drives["read"].sum())
     per_drive = (walls[1] - frames * frame_s) / drives

@@ -30,7 +30,7 @@ GROUPS: Final = (6, 10, 30, 200)
 POWER: Final = (0.5, 1)
 """True means to find, in standard deviations of a drive's effect."""
 SCALE: Final = 0.02
-"""That standard deviation, as a rate."""
+"""Standard deviation of an effect, as a rate."""
 
 
 # --- Made-up fleets -------------------------------------------------------------------------------
@@ -44,11 +44,10 @@ EFFECTS: Final[dict[str, Draw]] = {
 
 @dataclass(frozen=True)
 class Layout:
-    """What drives are like, their effects aside.
+    """Properties of drives, without their effects.
 
     ``least`` and ``most`` are the drives' own standard errors, in standard deviations of an effect.
-    Groups have 1 to ``drives`` drives, which share half of the variance where that is more than
-    one.
+    Groups have 1 to ``drives`` drives, which share half of the variance if there are several.
     """
 
     name: str

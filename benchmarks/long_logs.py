@@ -1,10 +1,10 @@
-"""What is read of a long log, and what a run of it costs: bytes, time, memory, the recording.
+"""Costs of a run on a long log: bytes read, time, memory, the recording.
 
 python -m benchmarks.long_logs [--gigabytes 1] [--files 1] [--folder FOLDER] [--parts info ...]
 
 It writes a log as a robot's recorder does, by the `mcap` libraries, and runs commands on it. Bytes
-are those that a process asks of the system (``rchar`` in ``/proc/self/io``), less what ``--help``
-reads of the program itself; on Linux alone.
+are those that a process reads from the system (``rchar`` in ``/proc/self/io``), less those of
+``--help``, which reads the program itself; only on Linux.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _of(name: str, text: str) -> str:
 
 
 BYTES: Final = "robot_msgs/msg/Bytes"
-"""The type of what roadeval does not look into: of a lidar, of an IMU."""
+"""Types of messages that roadeval does not read: of a lidar, of an IMU."""
 MESSAGES: Final = {
     "sensor_msgs/msg/CompressedImage": COMPRESSED,
     BYTES: f"std_msgs/Header header\nuint8[] data\n{NESTED}",
@@ -115,7 +115,7 @@ class Recorder:
         self._file.close()
 
     def close(self) -> None:
-        """End the last file, and write what a folder of them begins with."""
+        """End the last file, and write the metadata of a folder of files."""
         self._end()
         paths = "".join(f"    - {name}\n" for name in self._names)
         (self._folder / "metadata.yaml").write_text(
@@ -125,7 +125,7 @@ class Recorder:
 
 
 def write(folder: Path, source: Source, gigabytes: float, files: int = 1) -> Path:
-    """Write a log of about so many bytes; a folder of split files where there are several."""
+    """Write a log of about so many bytes; several files make a folder."""
     pictures = [_noisy(*resized(frame, *SIZE)) for frame in source.frames(40)]
     cloud = np.random.default_rng(0).integers(0, 256, CLOUD, np.uint8).tobytes()
     folder.mkdir(parents=True)
@@ -203,7 +203,7 @@ def _info(header: dict[str, Any]) -> dict[str, Any]:
 
 
 # The numbers of a process as it ends. The peak of memory in /proc begins anew with a new program,
-# unlike what the system counts for a finished child.
+# unlike the system's count for a finished child.
 _END: Final = """
 import atexit, os, sys
 from pathlib import Path
@@ -239,7 +239,7 @@ for path in sys.argv[1:]:
 
 
 def measure(code: str, *words: object) -> dict[str, Any]:
-    """Run a program; return what it has read, in bytes, and what it took."""
+    """Run a program; return the bytes that it has read, and its time and memory."""
     first, last, start = "", "", perf_counter()
     with (
         tempfile.NamedTemporaryFile("r") as cost,

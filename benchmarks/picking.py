@@ -1,7 +1,7 @@
 """The worth of picked labels: ``python -m benchmarks.picking --drives FOLDER --idd FOLDER``.
 
 The truth of drives is held back, frames are picked as `roadeval pick` does, and the number for the
-whole drive is held against the true one, 200 times with another draw. The table is that of
+whole drive is compared with the true one, 200 times with another draw. The table is that of
 ``docs/how-to/pick.md``. ``--drives`` holds the two drives of CamVid, ``--idd`` is ``idd20k_lite``,
 of whose train part half of the drives teach, and the frames of the others are taken as one drive;
 synthetic drives are rendered.

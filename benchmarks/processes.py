@@ -12,8 +12,8 @@ from benchmarks.timing import Cost
 
 ROADEVAL = Path(sys.executable).with_name("roadeval")
 
-# What the system counts for a finished child includes the parent's memory at its birth, and this
-# parent is large. The peak in /proc begins anew with a new program.
+# The system's count for a finished child includes the parent's memory at its birth, and this parent
+# is large. The peak in /proc begins anew with a new program.
 _PEAK = """
 import sys
 from pathlib import Path
@@ -34,7 +34,7 @@ def peak_mib(drive: Path, folder: Path, *words: str) -> float:
 
 
 def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, list[Cost]]:
-    """Return what each command costs, again and again, by what it does.
+    """Return the costs of several runs of each command, by its purpose.
 
     CPU is that of all its processes. A round before all warms the disk's cache, and leaves the
     recordings that the others read.
@@ -78,7 +78,7 @@ def _replay(drive: Path, folder: Path) -> list[str]:
 
 
 def _cost(*words: str) -> Cost:
-    """Run a command; what it prints goes nowhere."""
+    """Run a command without its output."""
     command, start = [str(ROADEVAL), *words], perf_counter()
     quiet = [(os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)]
     pid = os.posix_spawn(command[0], command, os.environ, file_actions=quiet)

@@ -70,7 +70,7 @@ def lines_of(result: FrameResult) -> dict[str, str]:
 
 
 def hold(drive: Path, config: RunConfig) -> Held:
-    """Run the pipeline once, before any clock runs, and keep what the floor needs."""
+    """Run the pipeline once, before any clock runs, and return the work of the floor."""
     with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         results, sizes = [], []

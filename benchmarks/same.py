@@ -50,7 +50,7 @@ def main() -> int:
 
 
 def differences(old: Path, new: Path) -> Iterator[str]:
-    """Yield what differs between two runs, each given by its results folder."""
+    """Yield the differences of two runs, by their results folders."""
     for table in TABLES:
         yield from _file(old, new, f"{table}.csv")
     for figure in sorted(path.name for path in old.glob("*.png")):
@@ -76,7 +76,7 @@ def results_of(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _counts(frames: dict[str, Any]) -> dict[str, Any]:
-    """Return the account of the frames, its reasons in order whatever their wording."""
+    """Return the account of the frames, with its reasons in order but without their wording."""
     return {**frames, "skipped": list(frames["skipped"].values())}
 
 

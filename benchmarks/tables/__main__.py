@@ -1,4 +1,4 @@
-"""The tables in the documents, and whether they say what was measured.
+"""The tables in the documents, and a check that they have the measured numbers.
 
 python -m benchmarks.tables             checks all texts against benchmarks/tables/numbers.json
 python -m benchmarks.tables --write     writes the tables of all anew
@@ -46,7 +46,7 @@ WITH_A_PATH: Mapping[str, Callable[[Sources, Path], Any]] = {
     "reach_weights": reach_weights.measure,
     TUNED: tuned.measure,
 }
-"""Of the folder of IDD Lite, or of a network."""
+"""Names of the folder of IDD Lite and of a network in messages."""
 WHAT = {"idd": f"folder idd20k_lite of {idd.SOURCE}", "net": "ONNX file of a road network"}
 WITHOUT_FILES: Mapping[str, Callable[[], Any]] = {
     "synthetic_shadow": synthetic_shadow.measure,

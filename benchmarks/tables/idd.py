@@ -52,7 +52,7 @@ def measure(folder: Path, seeds: int) -> dict[str, Any]:
     folder
         ``idd20k_lite`` as downloaded.
     seeds
-        Of the training: 0 and those after it.
+        Number of seeds of the training, from 0.
     """
     folds = both_ways(folder)
     blind = np.concatenate([count_blind(*fold) for fold in folds])

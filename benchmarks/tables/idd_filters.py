@@ -1,6 +1,6 @@
 """The effects of the shadow filters on drives that nothing was trained on.
 
-A filter is judged by ERR and by dark road missed together, and by what it does to frames without
+A filter is judged by ERR and by dark road missed together, and by its effect on frames without
 dark road.
 """
 

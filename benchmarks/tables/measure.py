@@ -21,7 +21,7 @@ class Replay:
     """A replay of drives."""
 
     tables: Mapping[str, Any]
-    """Its configuration, without what the drive's truth needs."""
+    """Its configuration, without the labels of the drive's truth."""
     options: str = ""
     """The same for the terminal; empty where that takes files, too."""
     seeds: int = SEEDS
@@ -35,7 +35,7 @@ STRANGERS: Final = {
     **{name: DRIVES[name] for name in ("synthetic_0", "camvid_0016E5_15hz")},
     COMMA10K.name: COMMA10K,
 }
-"""Those others: other cameras, and other journeys of the same one."""
+"""Drives of other cameras, and of other journeys of the same one."""
 
 DEVELOPED: Final = tuple(
     name for name, drive in DRIVES.items() if drive.tuned or name.startswith("synthetic")

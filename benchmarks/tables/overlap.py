@@ -38,7 +38,7 @@ READ: Final = (
     "cityscapesScripts 2.3.0, mmsegmentation 1.2.2, torchmetrics 1.9.0, FiftyOne 1.22.1 and "
     "Ultralytics 8.4.190"
 )
-"""Whose source was read for `Overlap.reported_by`; KITTI's is its devkit of 2013."""
+"""Sources that were read for `Overlap.reported_by`; KITTI's is its devkit of 2013."""
 Array = NDArray[Any]
 
 

@@ -15,7 +15,7 @@ from roadeval.runtime.threads import one_thread_each
 from roadeval.training.learning import fit
 
 TIMED: Final = 30
-"""Frames, after those that train."""
+"""Number of frames, after the training frames."""
 ROUNDS: Final = 3
 TAUGHT: Final = 10
 """Frames, the first ones."""

@@ -1,4 +1,4 @@
-"""The tables in the texts: between marks, made of the numbers, and held against them."""
+"""The tables in the texts: between marks, made of the numbers, and compared with them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CODE: Final = re.compile(r"^```.*?^```$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 _MEASURED: Final = re.compile(
     r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?\s?(?:%|pp\b|points?\b|ms\b|[kMG]i?B\b)|\d+\.\d+"
 )
-"""A number with a unit of what is measured here, or one with decimals."""
+"""A number with decimals, or with a unit of these measurements."""
 NOT_MEASURED: Final = (
     "Python 3.11",
     "95 % interval",
@@ -47,7 +47,7 @@ def load() -> dict[str, Any]:
 
 
 def written(text: str, numbers: Mapping[str, Any]) -> str:
-    """Return a text with every table between marks made anew; unknown names stay as they are."""
+    """Return a text with every table between marks made anew; unknown names stay unchanged."""
 
     def anew(match: re.Match[str]) -> str:
         block = BLOCKS.get(match["name"])

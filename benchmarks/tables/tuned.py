@@ -25,7 +25,7 @@ from roadeval.config.variants import network_variant
 from roadeval.data import FINAL_STAGE
 
 NAMES: Final = {"robust": "unfiltered", "network": "net", "threshold": "at", "tuned": "net_tuned"}
-"""What is compared, and its variant."""
+"""The compared methods, and their variants."""
 
 
 def measure(sources: Sources, network: Path) -> dict[str, Any]:

@@ -21,7 +21,7 @@ LEAST: Final = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the camera is (metres) and where it looks (radians).
+    """Place of the camera (metres) and its direction (radians).
 
     Positive yaw looks right, positive pitch up, positive roll leans right.
     """
@@ -97,7 +97,7 @@ class Camera:
     def catches(self, corners: Matrix) -> Flags:
         """Return which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
 
-        Left out is what lies behind, to either side, or is too low in the image.
+        Points behind it, to either side, or too low in the image are left out.
         """
         right, _, forward = self.axes
         depth = (corners - self.position) @ forward

@@ -76,7 +76,7 @@ class Sensor:
         return np.asarray(self._response[codes])
 
     def _metered(self, radiance: Field) -> float:
-        """Move the exposure towards what the lower two thirds of the scene ask for."""
+        """Move the exposure towards that of the lower two thirds of the scene."""
         metered = radiance[len(radiance) // 3 :: 4, ::4, 1]
         exposure = MIDDLE / float(np.exp(np.log(metered + 1e-3).mean()))
         if self._exposure is None:

@@ -1,4 +1,4 @@
-"""One view of the scene: from a pose and the light of a moment to what the camera sees."""
+"""One view of the scene: from a pose and the light of a moment to the image."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Moment:
 
 
 def see(scene: Scene, now: Moment) -> Film:
-    """Render what the camera sees: sky, ground, then panels from far to near."""
+    """Render the image: sky, ground, then panels from far to near."""
     rays = now.camera.rays()
     film = Film(
         np.zeros(rays.shape, np.float32),
