@@ -136,9 +136,9 @@ def scores(values: dict[str, np.ndarray], planes: np.ndarray) -> np.ndarray:
 def balanced(image: np.ndarray, classes: int = 2) -> dict[str, np.ndarray]:
     """Weights by which half of an image of the input's size is road, the last class."""
     values = weights(classes)
-    found = scores(values, image.transpose(2, 0, 1) / 255)
-    others = found[:-1].max(axis=0) if classes > 1 else 0
-    values["b2"][-1] -= np.float32(np.median(found[-1] - others))
+    logits = scores(values, image.transpose(2, 0, 1) / 255)
+    others = logits[:-1].max(axis=0) if classes > 1 else 0
+    values["b2"][-1] -= np.float32(np.median(logits[-1] - others))
     return values
 
 

@@ -46,9 +46,9 @@ def test_a_threshold_is_heeded_whatever_decides(classes, decide, tmp_path):
     path = network(tmp_path / "n.onnx", classes=classes, values=balanced(IMAGE, classes))
     if classes == 1 and decide == "argmax":
         return
-    found = opened(path, threshold=0.7, decide=decide, road=(classes - 1,))
-    road = found.road(FRAME)
-    assert found.settings.decide == (decide or "threshold")
+    reader = opened(path, threshold=0.7, decide=decide, road=(classes - 1,))
+    road = reader.road(FRAME)
+    assert reader.settings.decide == (decide or "threshold")
     assert np.array_equal(road.mask.pixels(), road.probability > round(0.7 * CERTAIN))
 
 
@@ -61,8 +61,8 @@ def test_of_three_classes_road_is_where_it_beats_the_others(tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values)
     road = opened(path, road=(2,)).road(IMAGE)
-    found = framed(scores(values, IMAGE.transpose(2, 0, 1) / 255))
-    assert np.array_equal(road.mask.pixels(), found.argmax(axis=0) == 2)
+    logits = framed(scores(values, IMAGE.transpose(2, 0, 1) / 255))
+    assert np.array_equal(road.mask.pixels(), logits.argmax(axis=0) == 2)
 
 
 @pytest.mark.parametrize("last", [None, "Softmax"])
@@ -70,9 +70,9 @@ def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values, last=last)
     road = opened(path, road=(0, 2), decide="threshold").road(IMAGE)
-    found = scores(values, IMAGE.transpose(2, 0, 1) / 255)
+    logits = scores(values, IMAGE.transpose(2, 0, 1) / 255)
     # Logits are interpolated where there are any.
-    shares = framed(softmax(found)) if last else softmax(framed(found))
+    shares = framed(softmax(logits)) if last else softmax(framed(logits))
     assert np.abs(road.probability / CERTAIN - shares[0] - shares[2]).max() < 1e-4
     for codes, number in zip(road.by_class, (0, 2), strict=True):
         assert np.abs(codes / CERTAIN - shares[number]).max() < 1e-4
@@ -132,11 +132,11 @@ def test_of_several_outputs_road_is_what_one_of_them_calls_road(tmp_path):
 
 
 def test_threads_disturb_each_other_in_nothing(tmp_path):
-    found = opened(network(tmp_path / "n.onnx", values=balanced(IMAGE)))
+    reader = opened(network(tmp_path / "n.onnx", values=balanced(IMAGE)))
     frames = [np.roll(FRAME, shift, axis=1) for shift in range(24)]
-    alone = [found.road(frame).probability for frame in frames]
+    alone = [reader.road(frame).probability for frame in frames]
     with ThreadPoolExecutor(8) as pool:
-        together = [road.probability for road in pool.map(found.road, frames)]
+        together = [road.probability for road in pool.map(reader.road, frames)]
     assert all(map(np.array_equal, alone, together))
 
 
@@ -157,10 +157,10 @@ def test_numbers_that_are_none_are_an_error_of_a_network_with_a_softmax_inside(t
         helper.make_node("Softmax", ["unclean"], [ROAD], axis=1),
     ]
     path = _depending(tmp_path / "n.onnx", *nodes, high=np.float32(0.9), nan=np.float32(np.nan))
-    found = opened(path)
-    assert found.settings.activation == "none"
+    reader = opened(path)
+    assert reader.settings.activation == "none"
     with pytest.raises(NetworkError, match="NaN"):
-        found.road(FRAME)
+        reader.road(FRAME)
 
 
 def test_a_shape_that_depends_on_the_image_is_an_error(tmp_path):
