@@ -10,7 +10,7 @@ compiled = pytest.importorskip(
 )
 ALL = 0xFFFFFFFF
 GREATEST = 1e15
-"""What no feature is above: a node that is not there."""
+"""Threshold of an unused node: no feature is above it."""
 
 
 def forest(*trees):

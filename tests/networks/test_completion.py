@@ -1,4 +1,4 @@
-"""What is read from a network's file, and what is asked for."""
+"""Settings read from a network's file, and errors that ask for settings."""
 
 import pytest
 from onnx import TensorProto

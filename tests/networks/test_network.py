@@ -13,7 +13,7 @@ from tests.networks.making import IMAGE as MADE
 from tests.networks.making import ROAD, SIZE, balanced, network, scores, without_end, written
 
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
-"""Of the input's size."""
+"""An image of the input's size."""
 FRAME = cv2.resize(IMAGE, (48, 30), interpolation=cv2.INTER_CUBIC)
 
 

@@ -1,4 +1,4 @@
-"""What an ONNX file tells of itself, and files that cannot be used."""
+"""Facts read from an ONNX file, and files that cannot be used."""
 
 import hashlib
 

@@ -1,4 +1,4 @@
-"""What a stage of somebody else may hand out, and what costs its frame."""
+"""Outputs that a stage from outside may return, and those that cost its frame."""
 
 import numpy as np
 import pytest

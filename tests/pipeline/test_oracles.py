@@ -1,4 +1,4 @@
-"""What a chain makes of an image once one of its stages is replaced by the truth."""
+"""Masks of a chain with one of its stages replaced by the truth."""
 
 import numpy as np
 import pytest

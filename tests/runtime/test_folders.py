@@ -9,7 +9,7 @@ from roadeval.runtime.files import Content, NewFolder
 
 
 def names(seal):
-    """What the seal lists, or else the names that are always of a content."""
+    """Return the names that the seal lists, or else those that always belong to a content."""
     try:
         return frozenset(json.loads(seal.read_text()))
     except OSError:

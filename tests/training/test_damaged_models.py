@@ -50,7 +50,7 @@ DAMAGES = {
 HARMLESS = {("huge", "threshold"), ("missing", "prior"), ("a column less", "prior")}
 """A threshold may be of any size, and a prior too, or there is none."""
 NEIGHBOURS = {"lowest": "scale"}
-"""What is named in place of an array: its length says how long this one must be."""
+"""The array that an error names in place of another: its length decides that of the other."""
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from roadeval.pipeline.stage import TrainingSet, View
 HEIGHT, WIDTH = 120, 160
 ROAD = np.array([120, 120, 120])
 SHADE = np.array([0.38, 0.40, 0.44])
-"""What is left of red, green and blue where the sky alone gives light."""
+"""Shares of red, green and blue under the light of the sky alone."""
 SPOT = np.s_[70:105, 50:110]
 """Where the pictures have their dark spot: on the road before the vehicle."""
 BELOW = np.where(np.arange(GRID[0]) < 4, 0.01, 0.9)[:, None] * np.ones(GRID)
@@ -264,7 +264,7 @@ def test_a_wide_image_is_judged_as_the_reduced_one_and_compensated_at_its_own_si
 
 
 def brightened_by_truth(image, shadow):
-    """What the filter makes of an image once it knows what is shadow."""
+    """Return the image that the filter makes with the true shadow."""
     return gated.oracle(GatedSettings(), model(), View.of(image), shadow).image
 
 

@@ -115,7 +115,7 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
 
 
 def opinion_of(road):
-    """What a method says that knows the left side alone, by its mask and by two planes."""
+    """Return the output of a method that knows the left side alone: its mask and two planes."""
     codes = np.where(road, 60000, 3000).astype(np.uint16)
     return Output(mask=Packed.of(road), by_class=(codes, 65535 - codes))
 
@@ -181,7 +181,7 @@ def test_trees_for_other_features_are_a_misfit(learnt):
 
 VIEW = View.of(picture(9)[0])
 WIDE = View.of(picture(9, height=36, width=48)[0])
-"""Of another camera than `VIEW`, by its size."""
+"""A view of another camera than that of `VIEW`, by its size."""
 
 
 @pytest.mark.parametrize(("view", "weight"), [(VIEW, 1.0), (WIDE, 4.0)])

@@ -15,7 +15,7 @@ from tests.pipeline.images import masks
 
 
 def seen(road):
-    """What post-processing sees after a stage with this mask."""
+    """Return the view of post-processing after a stage with this mask."""
     view = View.of(np.zeros((*road.shape, 3), np.uint8))
     return view.after(Output(mask=Packed.of(road)))
 

@@ -52,7 +52,7 @@ def case(request):
 
 
 def road(stage, colours):
-    """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
+    """Return the mask of ``(n, 3)`` colours, as an image of one row."""
     return stage(View.of(colours[None])).mask.pixels()[0]
 
 
