@@ -50,7 +50,7 @@ from roadeval.results.schema import FAILED
 from roadeval.results.verdict import focus_of
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, own_names, put, sha256_of
+from roadeval.runtime.files import alone, find_partial, put, sha256_of
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import save_model
@@ -230,7 +230,7 @@ def _remove(task: DriveTask, *folders: str) -> None:
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
     }
-    partial = own_names(recording, hidden=False) if recording.parent.exists() else []
+    partial = find_partial(recording, hidden=False) if recording.parent.exists() else []
     chosen = [paths[name] for name in folders]
     for path in (*chosen, *(partial if RECORDINGS in folders else ())):
         if path.is_dir():
