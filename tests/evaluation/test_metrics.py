@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn import metrics as theirs
 
@@ -41,6 +41,7 @@ def test_overlap_is_undefined_where_there_is_nothing_to_overlap() -> None:
     assert all(math.isnan(metric.function(nothing)) for metric in OVERLAP.values())
 
 
+@settings(max_examples=40)
 @given(*[st.integers(1, 40)] * 4)
 def test_rates_equal_scikit_learns(tp: int, tn: int, fp: int, fn: int) -> None:
     truth = np.repeat([1, 0, 0, 1], [tp, tn, fp, fn])

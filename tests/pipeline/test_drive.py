@@ -17,7 +17,7 @@ from tests.pipeline import reference
 from tests.pipeline.making import SETTINGS
 
 DEMO = Path(__file__).resolve().parents[2] / "recordings" / "demo.mcap"
-TRAINING, CHECKED = (0, 3, 6, 9), (12, 34, 56, 78)
+TRAINING, CHECKED = (0, 3, 6, 9), (12, 78)
 OTHER, ROAD, IGNORED = 0, 1, 2
 
 
@@ -98,7 +98,7 @@ def test_every_layer_equals_the_plain_pipeline(drive, preset, filtered):
     # which is least where its colours lie nearly on a line.
     rounding = 255 * np.finfo(np.float32).eps
     off = rounding / np.sqrt(np.linalg.eigvalsh(model.road.covariance_)[0] + 1.0)
-    for number in CHECKED if not printed else CHECKED[:2]:
+    for number in CHECKED:
         expected = reference.layers(images[number], model, filtered=filtered, printed=printed)
         layers = {
             layer.spec.name: layer.array

@@ -124,16 +124,16 @@ def drawn_set(seed):
 
 
 def test_of_random_sets_no_label_is_paired_with_a_wrong_frame():
-    """2,000 sets of names, bases and gaps: the right frames, or a refusal that says what to do."""
+    """1,000 sets of names, bases and gaps: the right frames, or a refusal that says what to do."""
     taken = 0
-    for seed in range(2000):
+    for seed in range(1000):
         expected, frames, first = drawn_set(seed)
         for settings in ({}, {"first": first}):
             with suppress(LogError):
                 found = frames_of(expected, frames, **settings)
                 assert found == expected, seed
                 taken += 1
-    assert taken > 1000
+    assert taken > 500
 
 
 # --- Cameras --------------------------------------------------------------------------------------
