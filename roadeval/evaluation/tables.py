@@ -55,6 +55,12 @@ def only(table: pd.DataFrame, **values: Any) -> pd.DataFrame:
     return table[chosen]
 
 
+def keys_of(table: pd.DataFrame) -> tuple[list[tuple[str, str]], Sums]:
+    """Return the drives and cameras of a table, each once, and each row's place in them."""
+    keys = table[KEY].drop_duplicates().astype("str")
+    return [*keys.itertuples(index=False, name=None)], grouped(table, KEY).ngroup().to_numpy()
+
+
 def values_of(table: pd.DataFrame, column: str) -> list[Any]:
     """Return the values of a column, each once, in the order in which they first occur."""
     values: list[Any] = table[column].unique().tolist()

@@ -9,7 +9,7 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from roadeval.data.words import listing, percent, plain_points, setting
-from roadeval.evaluation.comparison.compare import FALSE, Change, Comparison
+from roadeval.evaluation.comparison.compare import FALSE, Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
 from roadeval.results.sentences import is_significant, sentence
@@ -62,7 +62,7 @@ def verdict(comparison: Comparison) -> str:
     return " ".join([*parts, *unchanged(comparison, [c for c in finals if c not in changed])])
 
 
-def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
+def unchanged(comparison: Comparison, masks: Iterable[MaskChange]) -> Iterator[str]:
     """Yield the masks that are as they were, a sentence a result."""
     base = comparison.results[0].label
     for result, rows in groupby(masks, lambda row: row.result):
@@ -71,7 +71,7 @@ def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
         yield f"{listing([*names])}{of}: every frame as in {base}."
 
 
-def _sentence(change: Change, base: str, *, several: bool) -> str:
+def _sentence(change: MaskChange, base: str, *, several: bool) -> str:
     what, rate = f"{change.result} instead of {base}", f"{TESTED} of {change.stage}"
     said = sentence(change.difference[TESTED], what, rate, (change.base, change.new))
     if change.result == change.variant or not several:

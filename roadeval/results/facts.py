@@ -127,7 +127,7 @@ class LogFacts:
     digest: str
 
 
-class Document:
+class FactsFile:
     """A JSON document of facts, with its format and a checksum."""
 
     FORMAT: ClassVar[Mapping[str, Any]]
@@ -217,7 +217,7 @@ class Document:
 
 
 @dataclass(frozen=True)
-class Facts(Document):
+class Facts(FactsFile):
     """The facts of one drive: the content of ``summary.json``."""
 
     verdict: str
@@ -375,7 +375,7 @@ class StratumFacts:
 
 
 @dataclass(frozen=True)
-class FleetFacts(Document):
+class FleetFacts(FactsFile):
     """The facts of many drives: the content of ``fleet.json``."""
 
     verdict: str

@@ -31,8 +31,8 @@ from roadeval.evaluation.tables import is_final, joined, only
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
-    Document,
     Facts,
+    FactsFile,
     FleetFacts,
     Member,
     check_format,
@@ -101,7 +101,7 @@ def inside(path: Path, folder: Path) -> Path:
 
 
 @dataclass(frozen=True)
-class Made(Document):
+class Made(FactsFile):
     """How the results of a drive were made; its numbers are in the results themselves."""
 
     drive: str

@@ -195,46 +195,47 @@ def read_parquet(paths: Sequence[Path], name: str) -> pd.DataFrame:
     import pandas as pd
     import pyarrow as pa
 
-    schema = TABLES[name].arrow()
-    parts = [_checked(path, name) for path in paths] or [schema.empty_table()]
-    table = pa.concat_tables(parts)
-    rows: pd.DataFrame = table.unify_dictionaries().to_pandas(
-        types_mapper={pa.int64(): pd.Int64Dtype()}.get
-    )
+    try:
+        table = _joined(paths, name)
+    except FileNotFoundError as error:
+        raise ResultsError(f"{error.filename}: is not there; {AGAIN}") from None
+    except (OSError, ValueError, pa.ArrowException) as error:
+        for path in paths if len(paths) > 1 else ():
+            read_parquet([path], name)  # the damaged one is named
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
+    rows: pd.DataFrame = table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
     counts = [n for n in rows if rows[n].dtype == "Int64" and not rows[n].hasnans]
     return rows.astype(dict.fromkeys(counts, np.int64))
 
 
-def _checked(path: Path, name: str) -> pa.Table:
-    """Read a file of a table, words as dictionaries."""
+def _joined(paths: Sequence[Path], name: str) -> pa.Table:
+    """Read files of a table one below the other, words as dictionaries, and check them."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    schema = TABLES[name].arrow()
-    try:
+    schema, parts = TABLES[name].arrow(), []
+    for path in paths:
         check_input(path)
         metadata = parquet.read_metadata(path)
         _check_size(metadata, path.stat().st_size)
-        there = {*metadata.schema.names}
-        words = [f.name for f in schema if f.name in there and f.type == pa.string()]
+        words = [f.name for f in schema if f.type == pa.string()]
         # As one file: of a path with "drive=" in it a column would be made.
         with parquet.ParquetFile(
             path, metadata=metadata, read_dictionary=words, page_checksum_verification=True
         ) as file:
-            table = file.read()
-        _check_columns(table, name)
-        for chunk in (chunk for word in words for chunk in table[word].chunks):
+            parts.append(file.read(use_threads=False))
+    table = pa.concat_tables(parts or [schema.empty_table()]).unify_dictionaries()
+    _check_columns(table, name)
+    for word in (word for word in schema.names if pa.types.is_dictionary(table[word].type)):
+        for chunk in table[word].chunks[:1]:  # all have the same words
             texts = chunk.dictionary.to_pylist()
             if any(len(text) > LONG for text in texts):  # many rows may have one
-                check_texts(texts[row] for row in chunk.indices.drop_null().to_pylist())
-        for drive in table["drive"].unique().to_pylist():  # files are called after drives
-            if drive is None or not is_plain(drive):
-                raise ValueError(f"a drive is called {str(drive)[:NAMED]!r}, which is no name")
-    except FileNotFoundError:
-        raise ResultsError(f"{path}: is not there; {AGAIN}") from None
-    except (OSError, ValueError, pa.ArrowException) as error:
-        reason = str(error).partition("\n")[0]
-        raise ResultsError(f"{path}: damaged ({reason}); {AGAIN}") from error
+                rows = table[word].combine_chunks().indices.drop_null().to_pylist()
+                check_texts(texts[row] for row in rows)
+    for drive in table["drive"].unique().to_pylist():  # files are called after drives
+        if drive is None or not is_plain(drive):
+            raise ValueError(f"a drive is called {str(drive)[:NAMED]!r}, which is no name")
     columns = table.column_names if name == "drives" else ()
     tags = [column for column in columns if column.startswith(TAG)]
     return table.select([*schema.names, *tags])

@@ -17,6 +17,7 @@ from itertools import chain, product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import BASELINE, UNFILTERED
 from roadeval.data.words import setting
@@ -47,6 +48,7 @@ from roadeval.evaluation.tables import (
     MASK,
     grouped,
     is_final,
+    keys_of,
     only,
     rates_of,
     values_of,
@@ -85,7 +87,7 @@ class ComparedResult:
 
 
 @dataclass(frozen=True)
-class Change:
+class MaskChange:
     """What changed in a mask of a new result: one stage of one variant."""
 
     result: str
@@ -159,9 +161,9 @@ class Comparison:
     """The base first."""
     changed_settings: Mapping[str, Mapping[str, tuple[Any, Any]]]
     """By new result the settings that it does not share with the base: both values by name."""
-    changes: tuple[Change, ...]
+    changes: tuple[MaskChange, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
-    levels: tuple[Change, ...]
+    levels: tuple[MaskChange, ...]
     """The same on all of its own frames, without the base."""
     drives: tuple[DriveChange, ...]
     """Where several drives are compared: each, mask by mask, the surest first."""
@@ -176,7 +178,7 @@ class Comparison:
     settings: EvaluationSettings
     """The confidence of the intervals, and the frames that they need."""
 
-    def finals(self) -> list[Change]:
+    def finals(self) -> list[MaskChange]:
         """Return the final masks; without the baseline's, which says nothing of a method."""
         finals = [change for change in self.changes if change.final]
         return [change for change in finals if change.variant != BASELINE] or finals
@@ -267,7 +269,7 @@ def _result(side: Side, frames: int, relabelled: int = 0) -> ComparedResult:
     )
 
 
-def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
+def _corrected(changes: Sequence[MaskChange]) -> Iterator[MaskChange]:
     """Correct the changes of ERR of final masks, but for the baseline's, for how many they are."""
     family = [each.final and each.variant != BASELINE for each in changes]
     tested = [each.difference[TESTED] for each, own in zip(changes, family, strict=True) if own]
@@ -312,12 +314,13 @@ def _against(
         old_frames = base.table("frames", olds)
         sums["base"] += _frames(old_frames)
         common = common_masks(old_frames, frames)
-        there = {*zip(common["drive"], common["camera"], strict=True)}
+        there = {*keys_of(common)[0]}
         apart += [over.names[key] for key in olds.values() if key not in there]
         if not there:
             continue
         pairs = common
-        sums.update(_differing(*(_of_drives(each, there) for each in (old_frames, frames)), pairs))
+        old_frames, frames = (_of_drives(rows, there) for rows in (old_frames, frames))
+        sums.update(_differing(old_frames, frames, pairs))
         masks.append(by_drive(pairs, MASK))
         tested = only(pairs, final=True)
         tested = tested[tested["variant"] != BASELINE]
@@ -366,7 +369,8 @@ def _batches(drives: Sequence[ComparedDrive]) -> Iterator[list[tuple[str, str]]]
 
 
 def _of_drives(rows: pd.DataFrame, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
-    return rows[[key in keys for key in zip(rows["drive"], rows["camera"], strict=True)]]
+    keys_there, places = keys_of(rows)
+    return rows[np.array([key in keys for key in keys_there], bool)[places]]
 
 
 def by_drive(rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
@@ -411,14 +415,13 @@ class _Over:
         several = len({drive.drive for _, drive in matched}) > 1
         return cls(new.label, settings, groups | of_base, names, several)
 
-    def _group(self, rows: pd.DataFrame) -> list[str]:
-        return [self.groups[key] for key in zip(rows["drive"], rows["camera"], strict=True)]
+    def _group(self, rows: pd.DataFrame) -> npt.NDArray[np.object_]:
+        keys, places = keys_of(rows)
+        return np.array([self.groups[key] for key in keys], object)[places]
 
     def mean(self, rows: pd.DataFrame, names: Sequence[str]) -> list[float]:
         """Average drives as their differences are, so that these lie between two rates."""
-        means: list[float] = (
-            rows.groupby(np.array(self._group(rows)))[[*names]].mean().mean().tolist()
-        )
+        means: list[float] = rows.groupby(self._group(rows))[[*names]].mean().mean().tolist()
         return means
 
     def difference(self, rows: pd.DataFrame, rate: str, pairs: pd.DataFrame) -> Difference:
@@ -438,14 +441,16 @@ class _Over:
         rest = {str(name).removesuffix(end): float(value) for name, value in pooled.items()}
         return dict(zip(METRICS, means, strict=True)) | rest
 
-    def changes(self, rows: pd.DataFrame, pairs: pd.DataFrame | None = None) -> Iterator[Change]:
+    def changes(
+        self, rows: pd.DataFrame, pairs: pd.DataFrame | None = None
+    ) -> Iterator[MaskChange]:
         """Yield a row for each mask; without pairs its rates alone."""
         for (variant, stage), mask in grouped(rows, MASK):
             difference = {}
             if pairs is not None:
                 frames = pairs if self.several else only(pairs, variant=variant, stage=stage)
                 difference = {rate: self.difference(mask, rate, frames) for rate in COMPARED}
-            yield Change(
+            yield MaskChange(
                 result=self.label,
                 variant=variant,
                 stage=stage,
@@ -473,11 +478,12 @@ class _Over:
     def within_drives(self, pairs: pd.DataFrame) -> Iterator[DriveChange]:
         """Yield each of several drives' changes of final masks, not corrected for their number."""
         by_mask = grouped(pairs, [*KEY, *MASK])
-        means = by_mask[[f"{TESTED}_base", TESTED]].mean()
-        for (drive, camera, variant, stage), rows in by_mask if self.several else ():
-            base, new = means.loc[drive, camera, variant, stage].tolist()
+        means = by_mask[[f"{TESTED}_base", TESTED]].mean().T.to_dict("list")
+        for key, rows in by_mask if self.several else ():
+            drive, camera, variant, stage = key
             change = within(rows, TESTED, self.settings)
             about = self.label, variant, stage, self.names[drive, camera], len(rows)
+            base, new = means[key]
             yield DriveChange(*about, base, new, change, q=None, changed=False)
 
     def drives(self, changes: Sequence[DriveChange]) -> Iterator[DriveChange]:

@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
+from roadeval.evaluation.comparison.compare import ComparedResult, Comparison, MaskChange
 from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -106,7 +106,7 @@ class Condition:
         own, is_change = " ".join(text.split()), unit == "pp"
         return cls(own, stage, variant, rate, sign, float(number), is_change, bool(surely))
 
-    def judge(self, mask: Change) -> Judgement:
+    def judge(self, mask: MaskChange) -> Judgement:
         """Judge the condition on what was found of the mask that it names."""
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         difference = mask.difference.get(self.rate) if self.is_change else None
@@ -174,7 +174,7 @@ def judge(
 
 
 def _unjudged(
-    condition: Condition, mask: Change, results: Sequence[ComparedResult], least: int
+    condition: Condition, mask: MaskChange, results: Sequence[ComparedResult], least: int
 ) -> str:
     """Return why a condition cannot be judged on a mask; empty where it can."""
     if not condition.is_change:

@@ -18,6 +18,7 @@ from roadeval.evaluation.tables import (
     MASK,
     grouped,
     is_final,
+    keys_of,
     most_changed,
     only,
     paired,
@@ -153,13 +154,11 @@ def one_drive(sides: Sequence[Side]) -> list[Side] | None:
 
 def _renamed(rows: pd.DataFrame, keys: Mapping[tuple[str, str], tuple[str, str]]) -> pd.DataFrame:
     """Return rows of drives under other keys."""
-    words = {name: rows[name].astype(str) for name in KEY}
-    there = [*zip(words["drive"], words["camera"], strict=True)]
-    if unknown := {*there} - keys.keys():
+    keys_there, places = keys_of(rows)
+    if unknown := {*keys_there} - keys.keys():
         raise RoadevalError(f"a table has rows of {' '.join(min(unknown))}, which is not compared")
-    names = [keys[key] for key in there]
-    drive, camera = [*zip(*names, strict=True)] or ([], [])
-    return rows.assign(drive=[*drive], camera=[*camera])
+    names = np.array([keys[key] for key in keys_there] or np.zeros((0, 2)), object)[places]
+    return rows.assign(drive=names[:, 0], camera=names[:, 1])
 
 
 def common_masks(base: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:

@@ -35,7 +35,7 @@ from roadeval.runtime.discovery import found_in
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.evaluation.comparison.compare import Change
+    from roadeval.evaluation.comparison.compare import MaskChange
     from roadeval.results.facts import Totals
 
 
@@ -217,7 +217,7 @@ def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference
     )
 
 
-def changes(finals: Sequence[Change]) -> list[Chart]:
+def changes(finals: Sequence[MaskChange]) -> list[Chart]:
     """Return each result's changes of rates against the base, a chart a rate."""
     return [
         Chart(

@@ -8,7 +8,14 @@ import pytest
 from sklearn.neural_network import MLPClassifier
 
 from roadeval.pipeline.beyond.features import GROUPS, SHADE, SUN, names_of
-from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
+from roadeval.pipeline.beyond.hidden_layer import (
+    CODES,
+    PENALTY,
+    HiddenLayer,
+    codes_of,
+    descend,
+    train,
+)
 from roadeval.pipeline.beyond.trees import Blend, TreesSettings, grow, network_weight
 
 
@@ -58,6 +65,18 @@ def test_a_blend_is_the_weighted_mean(network):
     for weight in (0, 0.25, 1, np.linspace(0, 1, len(other), dtype=np.float32)):
         expected = trees + np.float32(weight) * (other - trees)
         np.testing.assert_allclose(blend.log_odds(seen, weight), expected, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("batch", [256, 700])
+def test_steps_of_one_length_are_those_of_scikit_learn_bit_for_bit(batch):
+    values, road = features_and_road(count=1000)
+    machine = MLPClassifier((8,), alpha=PENALTY, batch_size=batch, random_state=3)
+    passes = [(values, road), (-values, ~road), (values, road)]
+    for pixels, labels in passes:
+        machine.partial_fit(pixels, labels, classes=[False, True])
+    layers = descend(((*each, 0.001) for each in passes), 4, 8, batch, 3)
+    for ours, theirs in zip(layers, (*machine.coefs_, *machine.intercepts_), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
 
 
 def test_the_sum_is_that_of_scikit_learn():
