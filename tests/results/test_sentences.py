@@ -7,12 +7,19 @@ import pytest
 
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
+from roadeval.evaluation.comparison.conditions import Condition
 from roadeval.evaluation.stats.difference import Difference
+from roadeval.results import comparison
+from roadeval.results.comparison import (
+    changed_settings,
+    headline,
+    judged,
+)
 from roadeval.results.sentences import (
     notes,
     sentence,
 )
-from tests.evaluation.making import a_difference
+from tests.evaluation.making import a_change, a_comparison, a_difference
 
 HARM = a_difference(9.2, 7.1, 11, units=91)
 UNSURE = a_difference(-3.3, -20, 3.4, p=0.4, units=91)
@@ -97,3 +104,63 @@ def test_a_failure_is_noted_with_its_reason() -> None:
     assert tuple(notes({"net": missed}, None)) == ("net finds 5.0 % of the road.",)
     wrong = tuple(notes({"net": with_error(30)}, None))
     assert wrong == ("net gets 30.0 % of the pixels wrong.",)
+
+
+WORSE = a_difference(1.2, 0.5, 2)
+
+
+def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
+    same = a_difference(0, 0, 0)
+    rows = a_change(WORSE), a_change(same, "net"), a_change(same, "wide")
+    told = comparison.verdict(a_comparison(*rows))
+    assert told.count("these 12 frames") == 1
+    assert told.endswith("net and wide of new: every frame as in base.")
+    # ERR alone may stay where other rates change.
+    moved = replace(rows[1], difference={**rows[1].difference, "FPR": WORSE})
+    assert "net: on these 12 frames" in comparison.verdict(a_comparison(rows[0], moved))
+
+
+def test_changed_settings_are_told_of_each_result_and_some_of_many():
+    chains = ["svm"], ["trees", "post"]
+    settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}
+    changed = {"new": settings}
+    found = a_comparison(a_change(WORSE), changed_settings=changed)
+    assert changed_settings(found) == [
+        "Changed settings: preset paper to gated; chain svm to trees, post; svm.c 1 to 2."
+    ]
+    rows = a_change(WORSE), a_change(WORSE, result="newer")
+    several = a_comparison(*rows, changed_settings=changed)
+    assert changed_settings(several, 1) == [
+        "Changed settings in new: preset paper to gated; and 2 more."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("holds", "said"),
+    [
+        ([False], "passed, 1 limit kept"),
+        ([False, False], "passed, 2 limits kept"),
+        ([True], "failed, 1 of 1 limits exceeded"),
+        ([True, None, False], "failed, 1 of 3 limits exceeded and 1 of 3 limits not judged"),
+    ],
+)
+def test_the_headline_says_whether_limits_were_kept(holds, said):
+    assert headline(holds) == said
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("post.filtered.ERR > 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} holds"),
+        ("post.filtered.ERR < 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} does not hold"),
+        (
+            "post.filtered.ERR > 1pp surely",
+            "changed by +1.20 pp [+0.50, +2.00] (10.00 % to 11.20 %): {} does not hold",
+        ),
+        ("post.filtered.ERR > 11%", "is 11.20 %: {} holds"),
+    ],
+)
+def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):
+    judgement = Condition.parse(text).judge(a_change(WORSE))
+    assert judged(judgement) == f"post.filtered.ERR of new {told.format(text)}"
+    assert " over 8 drives" in judged(replace(judgement, drives=8))
