@@ -33,14 +33,14 @@ from roadeval.data import (
     as_tree,
 )
 from roadeval.evaluation import tables
-from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
+from roadeval.evaluation.metrics import COMPARED, TESTED
 from roadeval.evaluation.score.counts import CountedRows, EdgesAndFlicker, Name, episodes
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.metres import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
-from roadeval.evaluation.stats.difference import CameraRates, Difference, holm, within_drive
+from roadeval.evaluation.stats.difference import Difference, holm, within_drive
 from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, paired
 from roadeval.geometry.ground import Ground
 
@@ -64,17 +64,6 @@ class Effect:
     rates: Mapping[str, Difference]
 
 
-def within(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
-    """Return the difference of a rate within a drive; pairs are as of `tables.paired`."""
-    places, names = pairs["camera"].factorize()
-    columns = [pairs[name].to_numpy() for name in ("stamp_ns", rate, f"{rate}_base")]
-    cameras = [
-        CameraRates(*(column[places == camera] for column in columns))
-        for camera in range(len(names))
-    ]
-    return within_drive(cameras, settings, higher_is_better=METRICS[rate].higher_is_better)
-
-
 def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Effect]:
     """Compute the differences of a drive: of final masks, and of the filter stage by stage."""
     masks = masks_of(frames)
@@ -95,7 +84,7 @@ def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Ef
                     only(frames, variant=variant, stage=stage),
                     [*KEY, "frame", "stamp_ns"],
                 )
-                rates = {rate: within(pairs, rate, settings) for rate in COMPARED}
+                rates = {rate: within_drive(pairs, rate, settings) for rate in COMPARED}
                 family.append(Effect(base, variant, stage, final, rates))
         effects += corrected(family)
     return effects

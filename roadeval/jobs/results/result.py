@@ -428,7 +428,7 @@ def _members(fleet: FleetFolder) -> Iterator[ComparedDrive]:
             name=fleet.names[row["drive"]],
             digest=row["log_digest"] or None,
             frames=row["evaluated"] or 0,
-            asked=settings,
+            settings=settings,
             group=row["group"],
         )
 
