@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
-from roadeval.evaluation.score.scoreboard import Effect, corrected
+from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import over_drives, strata
 from roadeval.evaluation.tables import COUNTS, MASK, grouped, only, rates_of
@@ -60,7 +60,7 @@ def summarise(
             family.append(Effect(base, variant, stage, final=True, rates=rates))
             for tag, value, change in strata(only(mask, metric=TESTED), tags, settings.confidence):
                 parts.append(StratumFacts(base, variant, tag.removeprefix(TAG), value, change))
-        differences += corrected(family)
+        differences += correct_effects(family)
     totals = _totals(scores)
     return FleetFacts(
         verdict=" ".join([*_misfits(rows), verdict(totals, differences)]),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roadeval.evaluation.score.counts import episodes
+from roadeval.evaluation.score.scoreboard import episodes
 
 SECOND = 10**9
 
