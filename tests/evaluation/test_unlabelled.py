@@ -6,7 +6,13 @@ from scipy import stats
 
 from roadeval.data import Output, Packed, Role, StageResult, VariantResult
 from roadeval.evaluation.score.scoreboard import Scoreboard
-from roadeval.evaluation.score.unlabelled import Unlabelled, chosen, doubts_of, entropy, sign_of
+from roadeval.evaluation.score.unlabelled import (
+    Unlabelled,
+    choose_frames,
+    doubts_of,
+    entropy,
+    sign_of,
+)
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, pixels
 
@@ -76,7 +82,7 @@ def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
 
 def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():
     stamps = np.arange(900) * 10**9 // 30
-    random, ranked = chosen(stamps, np.linspace(1, 2, 900), 60, seed=0)
+    random, ranked = choose_frames(stamps, np.linspace(1, 2, 900), 60, seed=0)
     assert len(random) == len(ranked) == 30
     places = np.sort(np.concatenate([random, ranked]))
     beside = np.minimum(np.diff(places, prepend=-900), np.diff(places, append=1800))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from roadeval.config.run import RunConfig, run_toml
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.score.unlabelled import chosen, sign_of
+from roadeval.evaluation.score.unlabelled import choose_frames, sign_of
 from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
@@ -187,7 +187,7 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
         scores = np.array([now.get(float(stamp), np.nan) for stamp in known.stamps])
     taken = [known.places[stamp] for stamp in known.by_stamp]
     stamps = np.array(known.stamps, np.int64)
-    places = chosen(stamps, scores, wanted.count, known.seed, drawn=known.drawn, taken=taken)
+    places = choose_frames(stamps, scores, wanted.count, known.seed, drawn=known.drawn, taken=taken)
     random, ranked = (each.tolist() for each in places)
     frames = [known.frames[place] for place in {*random, *ranked} - {*taken}]
     if lacking := sorted({*frames} - {*drive.pictured}):
