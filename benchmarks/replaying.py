@@ -162,7 +162,7 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
             cost = meter.read()
             sums = run.board.summary()
             results.append(csv_lines(run.key, sum_rows(run.board, sums.windows)))
-            results.finish(summary.of(run, sums, [], results.tables), "")
+            results.finish(summary.make_facts(run, sums, [], results.tables), "")
         return cost
 
 

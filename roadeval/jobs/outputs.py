@@ -59,8 +59,8 @@ class Outputs:
             ours = certain and self.recording
             there = own_names(target_of(ours), hidden=False) if ours else []
             yield
-            for each in there:
-                remove(each)
+            for partial in there:
+                remove(partial)
 
 
 @contextmanager

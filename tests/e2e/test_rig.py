@@ -110,17 +110,6 @@ def test_a_camera_that_is_there_twice_narrows_no_interval(rig: Path, tmp_path: P
     )
 
 
-def test_each_camera_counts_the_same_in_a_mean(rig: Path):
-    summary = json.loads((rig / "reports" / "rig" / "summary.json").read_text())
-    rows = pd.read_csv(rig / "reports" / "rig" / "frames.csv")
-    own = rows[(rows["variant"] == "filtered") & (rows["stage"] == "post")]
-    total = summary["totals"]["filtered"]["post"]
-    assert total["ERR"] == pytest.approx(own.groupby("camera")["ERR"].mean().mean())
-    assert total["frames"] == len(own)
-    assert total["pooled_ERR"] == pytest.approx((own["FP"] + own["FN"]).sum() / own["N"].sum())
-    assert list(summary["cameras"]) == [*NAMES]
-
-
 def test_reports_show_all_cameras_and_each(rig: Path):
     (folder := rig / "made").mkdir()
     for name in ("all.pdf", "all.html"):

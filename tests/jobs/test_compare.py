@@ -48,7 +48,7 @@ def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     drive = write_log(tmp_path / "drive.mcap")
     for name, least in (("base", 100), ("new", 120)):
-        stages._somebodys.cache_clear()
+        stages.import_stage.cache_clear()
         sys.modules.pop("greyroad", None)
         code = f"def road(image):\n    return image.mean(axis=2) > {least}\n"
         (tmp_path / "greyroad.py").write_text(code)

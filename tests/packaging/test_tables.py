@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from benchmarks.tables import __main__ as script
 from benchmarks.tables import overlap
-from benchmarks.tables.__main__ import main
 from benchmarks.tables.drives import DRIVES
 from benchmarks.tables.measure import REPLAYS, SEEDS
 from benchmarks.tables.text import DOCUMENTS, between_marks, faults, load, loose
@@ -19,7 +19,7 @@ def arguments(monkeypatch):
 
     def call(*given):
         monkeypatch.setattr("sys.argv", ["tables", *given])
-        return main()
+        return script.main()
 
     return call
 
@@ -46,7 +46,7 @@ def test_a_changed_number_in_any_table_is_found(text):
 def test_the_numbers_follow_the_measurement(arguments, capsys, tmp_path, monkeypatch):
     numbers = load()
     numbers["idd"]["blind"]["ERR"] += 0.01
-    monkeypatch.setattr("benchmarks.tables.__main__.load", lambda: numbers)
+    monkeypatch.setattr(script, "load", lambda: numbers)
     assert arguments() == 1
     told = capsys.readouterr().err
     assert "presets.md: table drives: not what numbers.json gives; run with --write" in told

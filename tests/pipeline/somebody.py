@@ -46,18 +46,6 @@ def always_fails(image):
     raise KeyError("weights")
 
 
-def fails_early(image, moment):
-    if moment is not None and moment.number < 12:
-        return [][moment.number]
-    return lower_half(image)
-
-
-def fails_by_number(image, moment):
-    if moment is not None and moment.number < 5:
-        raise ValueError(f"frame {moment.number} has no horizon")
-    return lower_half(image)
-
-
 def wrong_size(image):
     return np.zeros((2, 2))
 

@@ -4,7 +4,6 @@ import numpy as np
 
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.colour_table import FEW, table_of
-from tests.pipeline.images import noise
 
 GREEN, BLUE = np.indices((256, 256))
 
@@ -39,18 +38,3 @@ def test_every_colour_is_decided_as_by_the_definition():
             KERNELS.look_up_colours(planes(colours), table)[0], decide(colours)
         )
     assert 0 < sum(asked) < FEW
-
-
-def test_what_is_certain_is_not_asked_for():
-    def fail(_colours):
-        raise AssertionError
-
-    colours = noise(1, 4000)[0]
-    found = KERNELS.look_up_colours(planes(colours), table_of((margin, 0.0), fail))
-    np.testing.assert_array_equal(found[0], decide(colours))
-    assert 0 < found.mean() < 1
-
-
-def test_a_machine_that_has_learnt_nothing_calls_nothing_road():
-    table = table_of((lambda red: np.zeros((256, 256)), 1.0), decide)
-    assert not KERNELS.look_up_colours(planes(noise(1, 4000)[0]), table).any()

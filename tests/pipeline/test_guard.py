@@ -5,7 +5,7 @@ import pytest
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Output, Packed, mask_spec
 from roadeval.pipeline.stage import Stage, StageError, View
-from roadeval.pipeline.stages import guarded
+from roadeval.pipeline.stages import guard
 
 CLASSES = tuple(LabelClass(i, str(i), (i, 0, 0, 255)) for i in range(3))
 MASK = mask_spec("mask", "Mask")
@@ -20,7 +20,7 @@ def run(spec, array):
         return lambda view: Output((Layer(spec, array),), mask=road)
 
     stage = Stage("own", "Own", int, bind, (spec,))
-    return guarded(stage).bind(0, None)(View.of(IMAGE))
+    return guard(stage).bind(0, None)(View.of(IMAGE))
 
 
 @pytest.mark.parametrize("held", [bool, np.int64])

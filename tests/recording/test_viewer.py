@@ -1,5 +1,8 @@
 """What the viewer needs from the machine, and what is said where it lacks that or is late."""
 
+import subprocess
+from itertools import count
+
 import pytest
 
 from roadeval.recording import viewer
@@ -13,7 +16,10 @@ def fake(tmp_path, monkeypatch):
     script.write_text('#!/bin/sh\necho "$@ CI=$CI"\nexit 3\n')
     script.chmod(0o700)
     monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
-    monkeypatch.setattr(viewer, "_program", lambda: str(script))
+    start = subprocess.Popen
+    monkeypatch.setattr(
+        subprocess, "Popen", lambda words, **options: start([script, *words[1:]], **options)
+    )
 
 
 def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine_alone(
@@ -39,13 +45,14 @@ def test_a_viewer_that_is_late_is_asked_again():
 @pytest.mark.parametrize(
     ("failure", "said"),
     [
-        (TimeoutError("Deadline expired"), "the viewer did not answer within 0 s"),
+        (TimeoutError("Deadline expired"), "the viewer did not answer within 120 s"),
         (ConnectionError("tcp connect error"), "the viewer has ended: tcp connect error"),
         (RuntimeError("no window"), "the viewer has ended: no window"),
     ],
 )
 def test_a_viewer_that_never_answers_or_has_ended_is_told_in_one_line(failure, said, monkeypatch):
-    monkeypatch.setattr(viewer, "_LOADING_S", 0.0)
+    clock = count(step=100)
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
 
     def ask():
         raise failure

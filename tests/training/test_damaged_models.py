@@ -94,7 +94,7 @@ def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
 @pytest.mark.parametrize(
     ("name", "damage", "why"),
     [
-        ("filtered/similarity/covariance", np.negative, "no covariance"),
+        ("filtered/similarity/covariance", np.negative, "positive semi-definite"),
         ("filtered/similarity/covariance", np.tril, "not symmetric"),
         ("gated/gated/place", lambda a: a + 1, "place holds a number outside 0 to 1"),
         ("filtered/svm/scale", np.zeros_like, "scale holds a number outside"),

@@ -121,9 +121,9 @@ class FramePicker:
             look_at = unlabelled.look_at if unlabelled else []
             there = [frame for frame in look_at if frame in self._result.pictured]
             return [*map(self._pictured, there[:WORST])]
-        own = only(self._finals, variant=self._variants[0])
-        rows = tables.worst(own, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
-        rows = rows[rows[TESTED] >= own[TESTED].mean()]
+        first_masks = only(self._finals, variant=self._variants[0])
+        rows = tables.worst(first_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
+        rows = rows[rows[TESTED] >= first_masks[TESTED].mean()]
         return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
@@ -147,11 +147,11 @@ class FramePicker:
         if (ground := facts.drive.ground) is None:
             return
         plan = Plan(ground, *facts.evaluation.plan, facts.evaluation.plan_width, CELL)
-        for each in made.images:
-            if each.image.shape[:2] == (ground.height, ground.width):
-                seen = None if each.array is None else plan.picture(each.array, IGNORE)
-                title = f"from above: {each.title.replace(': ', ', ')}"
-                yield LayerImage(title, plan.picture(each.image), each.spec, seen)
+        for layer in made.images:
+            if layer.image.shape[:2] == (ground.height, ground.width):
+                seen = None if layer.array is None else plan.picture(layer.array, IGNORE)
+                title = f"from above: {layer.title.replace(': ', ', ')}"
+                yield LayerImage(title, plan.picture(layer.image), layer.spec, seen)
 
     def _pictured(self, frame: int) -> NotableFrame:
         assert self._recording is not None
@@ -167,9 +167,9 @@ class FramePicker:
             assert seen is not None
             images, notes = [LayerImage("camera", seen.image(frame))], seen.notes(frame)
             return NotableFrame(frame, stamp_ns, "", {}, notes=notes, images=images, layers=layers)
-        first, own = self._variants[0], only(self._finals, frame=frame).set_index("variant")
+        first, masks = self._variants[0], only(self._finals, frame=frame).set_index("variant")
         return NotableFrame(
-            *(frame, stamp_ns, first, dict[Any, Any](own[[*SHORT]].to_dict("index"))),
+            *(frame, stamp_ns, first, dict[Any, Any](masks[[*SHORT]].to_dict("index"))),
             parts=self._parts.get(frame, {}),
             change=change,
             notes=result.notes(frame, first),
@@ -203,7 +203,9 @@ class FramePicker:
             ]
             arrays = ((spec, self._result.layer(variant.name, spec.name, frame)) for spec in specs)
             row = [LayerImage(s.name, image, s, array) for s, array in arrays if array is not None]
-            row[:1] = [replace(each, title=f"{variant.name}: {each.title}") for each in row[:1]]
+            row[:1] = [
+                replace(picture, title=f"{variant.name}: {picture.title}") for picture in row[:1]
+            ]
             yield row
 
 
@@ -220,7 +222,7 @@ def browsed(result: DriveResult) -> FrameBrowser:
         titles=names,
         charts=over_frames(frames, names),
         command=result.inspect("{}") if result.recording else "",
-        masks=[f"{each.name}: {each.stages[-1]}" for each in there],
+        masks=[f"{variant.name}: {variant.stages[-1]}" for variant in there],
     )
 
 
@@ -231,7 +233,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         doubts = [*rates_by_frame(result.table("unlabelled"), [*SIGNS])]
         seen = {frame for frame, _, _ in doubts}
         stamps = result.recording.stamps if result.recording else {}
-        doubts += [(each, stamps[each], {}) for each in result.pictured if each not in seen]
+        doubts += [(number, stamps[number], {}) for number in result.pictured if number not in seen]
         yield from (
             NotableFrame(frame, stamp, "", rates)
             for frame, stamp, rates in sorted(doubts, key=itemgetter(0))
@@ -239,12 +241,12 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         return
     for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
-        others = {name: each for name, each in rates.items() if name != BASELINE}
-        words, conditions = [*notes(others, blind)], [*_conditions(others, blind)]
+        others = {name: rate for name, rate in rates.items() if name != BASELINE}
+        words, conditions = [*notes(others, blind)], [*_frame_conditions(others, blind)]
         yield NotableFrame(frame, stamp, "", rates, notes=words, conditions=conditions)
 
 
-def _conditions(
+def _frame_conditions(
     rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
 ) -> Iterator[str]:
     """Yield what is true of a frame, in words: the first variant's health, and the filter."""
@@ -269,7 +271,7 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     """
     if result.recording is None:
         return []
-    chosen = _chosen(result, PICTURED)
+    chosen = _choose_frames(result, PICTURED)
     picker, strips = FramePicker(result, None, None), []
     for done, frame in enumerate(chosen, 1):
         made = picker.strip(frame)
@@ -282,7 +284,7 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     return sorted(strips, key=lambda strip: strip.frame)
 
 
-def _chosen(result: DriveResult, count: int) -> list[int]:
+def _choose_frames(result: DriveResult, count: int) -> list[int]:
     """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
     rows = result.rows
     scored_frames = {*rows["frame"]}
@@ -293,12 +295,14 @@ def _chosen(result: DriveResult, count: int) -> list[int]:
     spread = evenly(pictured, count)
     if not variants:
         unlabelled = result.facts.unlabelled
-        asked = [each for each in (unlabelled.look_at if unlabelled else ()) if each in pictured]
-        return list(dict.fromkeys([*asked, *spread]))[:count]
-    own = finals(only(rows, variant=variants[0]))
-    own = own[own["frame"].isin(pictured)]
-    worst = tables.worst(own, count)["frame"].tolist()
-    best = tables.worst(own, len(own), apart_ns=0)["frame"].tolist()[::-1]
+        doubtful = [
+            frame for frame in (unlabelled.look_at if unlabelled else ()) if frame in pictured
+        ]
+        return list(dict.fromkeys([*doubtful, *spread]))[:count]
+    first_masks = finals(only(rows, variant=variants[0]))
+    first_masks = first_masks[first_masks["frame"].isin(pictured)]
+    worst = tables.worst(first_masks, count)["frame"].tolist()
+    best = tables.worst(first_masks, len(first_masks), apart_ns=0)["frame"].tolist()[::-1]
     turns: list[int] = []
     for place in range(count):
         turns += worst[2 * place : 2 * place + 2]

@@ -20,7 +20,7 @@ from roadeval.logs.files import IMAGES, listed, of_ids, some
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import Drawing, LabelFormat, Meant, Size, settled
+from roadeval.logs.truth.drawn import DrawnLabel, LabelFormat, Meant, Size, settled
 from roadeval.logs.truth.names import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
 from roadeval.runtime.discovery import found_in
@@ -156,12 +156,12 @@ def _drawn(
 
 def _images_in(
     files: Sequence[Path], parsed: Mapping[Path, Any], format_: LabelFormat, size: Size | None
-) -> tuple[list[Drawing], dict[str, str], list[str]]:
+) -> tuple[list[DrawnLabel], dict[str, str], list[str]]:
     """Return the images in some files, those whose labels cannot be read, and files of others.
 
     A file that cannot be read is such an image where each file has one; else a `LogError`.
     """
-    drawings, broken, others = list[Drawing](), dict[str, str](), list[str]()
+    drawings, broken, others = list[DrawnLabel](), dict[str, str](), list[str]()
     damaged, images_in = dict[Path, str](), Counter[Path]()
     for file in files:
         try:
@@ -196,7 +196,7 @@ def _raise(problem: str, *_: Any) -> Picture:
     raise BadMessage(problem)
 
 
-def _label(drawing: Drawing, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
+def _label(drawing: DrawnLabel, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
     def picture(_content: bytes, limits: Limits) -> Picture:
         try:
             pixels = drawing.pixels(classes, limits)

@@ -181,7 +181,7 @@ Shape = Outline | Runs | Undrawn
 
 
 @dataclass(frozen=True)
-class Drawing:
+class DrawnLabel:
     """The shapes on one image."""
 
     image: str
@@ -191,7 +191,7 @@ class Drawing:
     shapes: Iterable[Shape]
     """They are run through once. An error while they are costs this image, and no other."""
 
-    def whole(self, size: Size | None) -> Drawing:
+    def whole(self, size: Size | None) -> DrawnLabel:
         """Return it with all its shapes, of the log's size where it has none.
 
         Raises what the format does, and a `BadMessage` if a shape has no class.
@@ -265,7 +265,7 @@ class LabelFormat:
     """The ending of its files, in lower case."""
     holds: Callable[[Path, Any], bool]
     """Whether a parsed file is of this format."""
-    read: Callable[[Path, Any, Size | None], Iterable[Drawing]]
+    read: Callable[[Path, Any, Size | None], Iterable[DrawnLabel]]
     """Return the label of each image in a parsed file of this format, given the size of the log's
     images. A `LogError` or `BadMessage` says what cannot be used; a KeyError, TypeError or
     ValueError means that the file, or the image, is not as the format asks."""
@@ -277,14 +277,14 @@ def has(*keys: str) -> Callable[[Path, Any], bool]:
 
 
 def settled(
-    drawings: Sequence[Drawing], meant: Meant, broken: dict[str, str], notes: list[str]
-) -> list[Drawing]:
+    drawings: Sequence[DrawnLabel], meant: Meant, broken: dict[str, str], notes: list[str]
+) -> list[DrawnLabel]:
     """Return the images whose shapes are known, ignored ones on top.
 
     Images that are lost for a shape are added to the ``broken`` ones, with the reason, and
     warnings, a sentence each, to the ``notes``.
     """
-    whole: list[Drawing] = []
+    whole: list[DrawnLabel] = []
     for drawing in drawings:
         unknown = [s for s in drawing.shapes if isinstance(s, Undrawn) and not s.is_box_of(meant)]
         if lost := [s for s in unknown if s.label in meant.road | meant.ignored]:
@@ -329,7 +329,7 @@ TOUCHING: Final = 0.005
 """Share of the road's pixels that may cover another shape without a word: outlines that touch."""
 
 
-def _hidden(drawings: Sequence[Drawing], meant: Meant) -> Iterator[str]:
+def _hidden(drawings: Sequence[DrawnLabel], meant: Meant) -> Iterator[str]:
     """Yield a warning where road covers earlier shapes of other classes, which count as road."""
     crossed = []
     for drawing in drawings:

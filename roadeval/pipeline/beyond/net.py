@@ -1,4 +1,4 @@
-"""Road by a network, from an ONNX file that somebody has trained elsewhere."""
+"""Road by a network from an ONNX file, trained elsewhere."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PROBABILITY: Final = LayerSpec(
 
 
 def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return the network as a pure function of what it sees; a `NetworkError`, see `Network.of`."""
+    """Return the network as a pure function of a view; a `NetworkError`, see `Network.of`."""
     network = Network.of(settings)
 
     def run(view: View) -> Output:

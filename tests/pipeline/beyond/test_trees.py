@@ -10,7 +10,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions
-from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, balanced_back, grow
+from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, class_weights, grow
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import reach, scene_of
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
@@ -57,7 +57,7 @@ def features_and_road(seed=0, count=600):
 def test_the_arrays_say_what_scikit_learns_trees_say(weighted):
     values, road = features_and_road(count=1000)
     values = values.round(0)  # so few that each has a bin, as in scikit-learn
-    weights = balanced_back(road, 0.2) if weighted else None
+    weights = class_weights(road, 0.2) if weighted else None
     forest = grow(values, road, weights, SMALL.trees, 0)
     found = forest.sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(

@@ -11,7 +11,7 @@ from roadeval.pipeline.paper import post
 from roadeval.pipeline.paper.post import PostSettings
 from roadeval.pipeline.stage import Output, View
 from tests.pipeline import reference
-from tests.pipeline.images import mask, masks
+from tests.pipeline.images import masks
 
 
 def seen(road):
@@ -90,19 +90,6 @@ def test_closing_fills_gaps_no_wider_than_the_element_and_keeps_the_border_as_it
     for way in (1, -1):
         found = closing(road[None, ::way].astype(np.uint8), element)
         assert found.tolist() == [filled[::way].tolist()]
-
-
-def test_the_boundary_is_the_inner_edge_and_runs_along_the_image_border():
-    road = mask("....", ".###", ".###", ".###")
-    edge = boundary(road, post.structuring_element(3))
-    assert (edge == mask("....", ".###", ".#.#", ".###")).all()
-
-
-@pytest.mark.parametrize("side", range(1, 16, 2))
-def test_structuring_elements_are_squares(side):
-    element = as_mask(post.structuring_element(side))
-    assert element.shape == (side, side)
-    assert element.all()
 
 
 @given(st.integers(1, 5000))

@@ -78,13 +78,6 @@ def test_ndi_by_hand(rgb, ndi):
     assert histogram[codes[0, 0]] == histogram.sum() == 1
 
 
-@pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
-def test_codes_equal_the_formula_on_every_pixel(image):
-    codes, histogram = codes_of(image)
-    np.testing.assert_array_equal(codes, reference.ndi_codes(image))
-    np.testing.assert_array_equal(histogram, np.bincount(codes.ravel(), minlength=256))
-
-
 # --- Eq. 7 and 8 ----------------------------------------------------------------------------------
 
 histograms = st.dictionaries(st.integers(0, 255), st.integers(1, 40), min_size=1, max_size=12)

@@ -96,7 +96,7 @@ def test_a_penalty_beyond_is_refused():
 @pytest.mark.parametrize("red", [0, 110, 255])
 def test_the_mask_equals_the_definition_next_to_the_threshold(case, red):
     settings, machine, stage, _ = case
-    margins, error = svm._margins(machine, settings)
+    margins, error = svm.colour_margins(machine, settings)
     assert error < 1e-5  # or the bound would decide nothing
     quick = margins(red).ravel()
     near = np.argsort(np.abs(quick))[:1000]

@@ -11,13 +11,13 @@ from roadeval.logs.truth import drawn
 
 def _cityscapes(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.Drawing]:
+) -> Iterator[drawn.DrawnLabel]:
     shapes = (
         drawn.Outline(area["label"], drawn.flat(area["polygon"]))
         for area in content["objects"]
         if not area.get("deleted")
     )
-    yield drawn.Drawing(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
+    yield drawn.DrawnLabel(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
 
 
 FORMATS: Final = (

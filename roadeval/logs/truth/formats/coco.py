@@ -14,7 +14,9 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import drawn
 
 
-def _coco(path: Path, content: Mapping[str, Any], _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _coco(
+    path: Path, content: Mapping[str, Any], _: drawn.Size | None
+) -> Iterator[drawn.DrawnLabel]:
     categories = _by_id(path, "category", content["categories"])
     names = {number: str(category["name"]) for number, category in categories.items()}
     images = _by_id(path, "image", content["images"])
@@ -28,7 +30,7 @@ def _coco(path: Path, content: Mapping[str, Any], _: drawn.Size | None) -> Itera
     for number, image in images.items():
         size = drawn.size_in(image)
         shapes = _shapes(annotations[number], names, size)
-        yield drawn.Drawing(str(image["file_name"]), size, shapes)
+        yield drawn.DrawnLabel(str(image["file_name"]), size, shapes)
 
 
 def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[Any, Any]:

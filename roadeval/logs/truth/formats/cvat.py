@@ -13,11 +13,11 @@ from roadeval.logs.truth import drawn
 _NO_AREAS: Final = ("polyline", "points", "tag", "skeleton")
 
 
-def _cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if content.find("track") is not None:
         raise LogError(f"{path}: tracks of a video; export it as CVAT for images")
     for image in content.iter("image"):
-        yield drawn.Drawing(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
+        yield drawn.DrawnLabel(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
 
 
 def _shapes(elements: Iterable[Element]) -> Iterator[drawn.Shape]:

@@ -37,7 +37,7 @@ def _is_label_studio(_: Path, content: Any) -> bool:
 
 def _label_studio(
     _: Path, content: list[Mapping[str, Any]], size: drawn.Size | None
-) -> Iterator[drawn.Drawing]:
+) -> Iterator[drawn.DrawnLabel]:
     # An image may be in several tasks, and of merged projects two tasks may have the same number.
     tasks: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
     sizes: dict[str, drawn.Size | None] = {}
@@ -51,7 +51,7 @@ def _label_studio(
         stated = (drawn.size_in(r, "original_width", "original_height") for r in regions)
         sizes[image] = sizes.get(image) or next(filter(None, stated), None)
     for image, annotations in tasks.items():
-        yield drawn.Drawing(image, sizes[image], _shapes(annotations, sizes[image] or size))
+        yield drawn.DrawnLabel(image, sizes[image], _shapes(annotations, sizes[image] or size))
 
 
 def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:

@@ -18,10 +18,10 @@ _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "qu
 
 def _labelme(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.Drawing]:
+) -> Iterator[drawn.DrawnLabel]:
     areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in _LINES)
     size = drawn.size_in(content, "imageWidth", "imageHeight")
-    yield drawn.Drawing(str(path), size, map(_shape, areas))
+    yield drawn.DrawnLabel(str(path), size, map(_shape, areas))
 
 
 def _shape(shape: Mapping[str, Any]) -> drawn.Shape:

@@ -29,12 +29,12 @@ def _is_scalabel(_: Path, content: Any) -> bool:
     return any("name" in frame and {"labels", "objects"} & {*frame} for frame in _frames(content))
 
 
-def _scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     config = content.get("config") if isinstance(content, dict) else None
     common = drawn.size_in((config or {}).get("imageSize") or {})
     for frame in _frames(content):
         size = drawn.size_in(frame.get("size") or {}) or common
-        yield drawn.Drawing(str(frame["name"]), size, _shapes(frame, size))
+        yield drawn.DrawnLabel(str(frame["name"]), size, _shapes(frame, size))
 
 
 def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn.Shape]:

@@ -31,7 +31,7 @@ def _is_via(_: Path, content: Any) -> bool:
     return any(_images(content))
 
 
-def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     regions = [region for image in _images(content) for region in _regions(image)]
     given = (region.get("region_attributes") for region in regions if isinstance(region, dict))
     names = {name for attributes in given if isinstance(attributes, dict) for name in attributes}
@@ -43,7 +43,7 @@ def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawi
         )
     attribute = next(iter([*usual, *names]), "class")
     for image in _images(content):
-        yield drawn.Drawing(str(image["filename"]), None, _shapes(_regions(image), attribute))
+        yield drawn.DrawnLabel(str(image["filename"]), None, _shapes(_regions(image), attribute))
 
 
 def _shapes(regions: Iterable[Mapping[str, Any]], attribute: str) -> Iterator[drawn.Shape]:

@@ -23,10 +23,10 @@ def _is_yolo(_: Path, content: str) -> bool:
     return not content.strip() or _LINE.search(content) is not None
 
 
-def _yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if size is None:
         raise LogError(f"{path}: its points are shares of the image's size, which is not known")
-    yield drawn.Drawing(str(path), size, _shapes(content, size))
+    yield drawn.DrawnLabel(str(path), size, _shapes(content, size))
 
 
 def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
