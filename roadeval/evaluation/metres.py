@@ -243,7 +243,7 @@ def _runs(flags: Plane, ends: Sums) -> list[Runs]:
     return by_line
 
 
-def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
+def _join_runs(runs: Runs, borders: list[float], gap: float) -> Runs:
     """Join stretches with less than ``gap`` metres between them."""
     joined: Runs = []
     for start, stop in runs:
@@ -263,7 +263,7 @@ def _sides(
     is the place.
     """
     best, far = None, math.inf
-    for start, stop in _joined(runs, borders, GAP):
+    for start, stop in _join_runs(runs, borders, GAP):
         away = max(borders[stop] - middle, middle - borders[start], 0.0)
         if away < far:
             best, far = (start, stop), away
@@ -284,13 +284,13 @@ def _ahead(road: Runs, labelled: Runs, borders: list[float]) -> tuple[float, int
     """
     if not labelled:
         return math.nan, 0, math.nan
-    start, stop = _joined(labelled, borders, GAP_AHEAD)[0]
+    start, stop = _join_runs(labelled, borders, GAP_AHEAD)[0]
     return _free(road, start, borders[stop], borders, math.nan), start, borders[stop]
 
 
 def _free(runs: Runs, start: int, cap: float, borders: list[float], nothing: float) -> float:
     """Return where the road from a pixel on ends, in metres, at most ``cap``; else ``nothing``."""
-    for first, stop in _joined(runs, borders, GAP_AHEAD):
+    for first, stop in _join_runs(runs, borders, GAP_AHEAD):
         if first <= start < stop:
             return min(borders[stop], cap)
     return nothing

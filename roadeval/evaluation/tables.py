@@ -28,7 +28,7 @@ FILTER: Final = "filter"
 """The part of an error rate that the filter caused, beside the parts of the stages."""
 
 
-def grouped(table: pd.DataFrame, by: Sequence[str]) -> Any:
+def group_rows(table: pd.DataFrame, by: Sequence[str]) -> Any:
     """Group rows by columns, in the order in which the groups first occur, as pandas does."""
     return table.groupby([*by], sort=False, observed=True)
 
@@ -59,7 +59,7 @@ def only(table: pd.DataFrame, **values: Any) -> pd.DataFrame:
 def keys_of(table: pd.DataFrame) -> tuple[list[tuple[str, str]], Sums]:
     """Return the distinct drives and cameras of a table, and each row's place in that list."""
     keys = table[KEY].drop_duplicates().astype("str")
-    return [*keys.itertuples(index=False, name=None)], grouped(table, KEY).ngroup().to_numpy()
+    return [*keys.itertuples(index=False, name=None)], group_rows(table, KEY).ngroup().to_numpy()
 
 
 def values_of(table: pd.DataFrame, column: str) -> list[Any]:
@@ -94,7 +94,7 @@ def totals(frames: pd.DataFrame, by: Sequence[str] = MASK) -> pd.DataFrame:
     """
     import pandas as pd
 
-    sums = grouped(frames, by)[COUNTS].sum()
+    sums = group_rows(frames, by)[COUNTS].sum()
     rates = rates_of(frames).groupby([frames[name] for name in by], sort=False, observed=True)
     sizes = rates.size()
     return pd.concat(
@@ -138,9 +138,9 @@ def windows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
     Returned are the rows of ``windows.csv``, by window and then mask. Frames count if any of the
     masks is evaluated there; the last window may have fewer than ``size`` frames.
     """
-    rank = grouped(frames, KEY)["frame"].rank("dense").astype(np.int64)
+    rank = group_rows(frames, KEY)["frame"].rank("dense").astype(np.int64)
     cut = frames.assign(window=(rank - 1) // size)
-    spans = grouped(cut, [*KEY, "window"])["frame"].agg(first_frame="min", last_frame="max")
+    spans = group_rows(cut, [*KEY, "window"])["frame"].agg(first_frame="min", last_frame="max")
     rows = totals(cut, [*KEY, "window", *MASK]).join(spans).reset_index()
     names = [*KEY, "window", "first_frame", "last_frame", "frames", *MASK, *METRICS]
     names += [f"pooled_{name}" for name in METRICS]
@@ -177,7 +177,7 @@ def final_stages(masks: Iterable[tuple[str, str]]) -> dict[str, str]:
 def is_final(table: pd.DataFrame) -> Flags:
     """Return ``(n,)`` whether each row's mask is the final one of its variant on its drive."""
     by = [name for name in (*KEY, "variant") if name in table]
-    mask = grouped(table, [*by, "stage"]).ngroup().to_numpy()
+    mask = group_rows(table, [*by, "stage"]).ngroup().to_numpy()
     _, first = np.unique(mask, return_index=True)
     masks = table.iloc[first]
     is_post = masks["stage"] == FINAL_STAGE
@@ -191,7 +191,7 @@ def finals(table: pd.DataFrame) -> pd.DataFrame:
     return table[is_final(table)]
 
 
-def paired(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
+def pair_rows(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
     """Return the rows that two tables share by the columns ``on``, in the base's order.
 
     Rows that are equal in these columns are matched in their order. The base's other columns end in
@@ -200,7 +200,7 @@ def paired(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataF
     tables = []
     for table in (base, new):
         words = {name: table[name].astype(str) for name in on if table[name].dtype == "category"}
-        tables.append(table.assign(**words, nth=grouped(table, on).cumcount()))
+        tables.append(table.assign(**words, nth=group_rows(table, on).cumcount()))
     pairs = tables[0].merge(tables[1], on=[*on, "nth"], suffixes=("_base", ""))
     return pairs.drop(columns="nth")
 
@@ -228,7 +228,7 @@ def worst(
     return frames.iloc[separate(frames["stamp_ns"].to_numpy(), ranked, count, apart_ns)]
 
 
-def most_changed(
+def most_changed_frames(
     pairs: pd.DataFrame,
     count: int,
     *,
@@ -270,7 +270,7 @@ def changes(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
     change of wrong pixels; columns of the control end in ``_base``.
     """
     last = finals(frames)
-    pairs = paired(only(last, variant=control), only(last, variant=treated), [*KEY, "frame"])
+    pairs = pair_rows(only(last, variant=control), only(last, variant=treated), [*KEY, "frame"])
     wrong = pairs["FP"] + pairs["FN"] - pairs["FP_base"] - pairs["FN_base"]
     change = pairs[TESTED] - pairs[f"{TESTED}_base"]
     return pairs.assign(change=change, wrong=wrong).sort_values("frame")
@@ -310,7 +310,7 @@ def by_region(rows: pd.DataFrame) -> pd.DataFrame:
     Region and variant are the index. Columns are the rates of short tables, and ``pixels`` and
     ``errors``: the region's share of all labelled pixels, and of all wrong ones.
     """
-    sums = grouped(finals(rows), ["region", "variant"])[COUNTS].sum()
+    sums = group_rows(finals(rows), ["region", "variant"])[COUNTS].sum()
     sums = sums.assign(pixels=sums.sum(axis=1), errors=sums["FP"] + sums["FN"])
     regions = sums.index.get_level_values("region")
     halves = sums[regions.isin(HALVES)].groupby("variant", observed=True)[["pixels", "errors"]]
@@ -325,18 +325,18 @@ def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> Iterator[dict
     ``as_is``: the ERR on the same frames without the replacement.
     """
     last = finals(frames)
-    for (variant, oracle), rows in grouped(oracles, ["variant", "oracle"]):
+    for (variant, oracle), rows in group_rows(oracles, ["variant", "oracle"]):
         final = rows[rows["stage"] == rows["stage"].iloc[-1]]
-        pairs = paired(only(last, variant=variant), final, [*KEY, "frame"])
+        pairs = pair_rows(only(last, variant=variant), final, [*KEY, "frame"])
         about = {"variant": variant, "oracle": oracle, "frames": len(pairs)}
         rates = {name: float(pairs[name].mean()) for name in METRICS}
         yield {**about, **rates, "as_is": float(pairs[f"{TESTED}_base"].mean())}
 
 
-def merged(chains: Iterable[Iterable[str]]) -> list[str]:
+def merge_names(chains: Iterable[Iterable[str]]) -> list[str]:
     """Return the names of several chains in one order that agrees with each chain if possible.
 
-    >>> merged([("similarity", "svm", "post"), ("trees", "post")])
+    >>> merge_names([("similarity", "svm", "post"), ("trees", "post")])
     ['similarity', 'svm', 'trees', 'post']
     """
     names: list[str] = []

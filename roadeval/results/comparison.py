@@ -35,7 +35,7 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
 
 def _condition(judgement: Judgement) -> dict[str, Any]:
     facts = {name: value for name, value in vars(judgement).items() if name != "why"}
-    return {**vars(facts.pop("condition")), **facts, "sentence": judged(judgement)}
+    return {**vars(facts.pop("condition")), **facts, "sentence": describe_judgement(judgement)}
 
 
 def changed_settings(comparison: Comparison, most: int | None = None) -> list[str]:
@@ -132,7 +132,7 @@ def changed_drives(comparison: Comparison) -> list[str]:
     return lines
 
 
-def judged(judgement: Judgement) -> str:
+def describe_judgement(judgement: Judgement) -> str:
     """Return a sentence on the value that a condition limits, and whether it holds."""
     condition, drives = judgement.condition, judgement.drives
     if judgement.holds is None:
@@ -175,7 +175,7 @@ def junit_xml(comparison: Comparison, judgements: Iterable[Judgement]) -> bytes:
     cases = [("compare", labels, "system-out", lines)]
     for judgement in judgements:
         kind = {True: "failure", False: "system-out", None: "error"}[judgement.holds]
-        texts = judged(judgement).splitlines()
+        texts = describe_judgement(judgement).splitlines()
         cases.append((judgement.condition.text, judgement.result, kind, texts))
     suite = ElementTree.Element("testsuite", name=visible(labels))
     for what, name, kind, texts in cases:

@@ -169,7 +169,7 @@ class FactsFile:
         try:
             content = read_json(text, cls.VALUES)
         except ValueError as error:
-            raise cls._damaged(where, error) from error
+            raise cls._damage(where, error) from error
         check_format(content, cls.FORMAT, where)
         try:
             facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
@@ -177,9 +177,9 @@ class FactsFile:
             wrong = [e["loc"][0] for e in error.errors(include_url=False, include_input=False)]
             part = next((name for name in wrong if name in content), wrong[0])
             part = "difference" if part == "effects" and part not in content else part
-            raise cls._damaged(where, f"`{part}` is not what it must be") from error
+            raise cls._damage(where, f"`{part}` is not what it must be") from error
         if not is_as_written(content):
-            raise cls._damaged(where, "its content is not what was written")
+            raise cls._damage(where, "its content is not what was written")
         return facts
 
     @classmethod
@@ -193,7 +193,7 @@ class FactsFile:
                 "roadeval replay, or roadeval fleet"
             ) from error
         except ValueError as error:
-            raise cls._damaged(path, error) from error
+            raise cls._damage(path, error) from error
 
     @property
     def evaluation(self) -> EvaluationSettings:
@@ -207,10 +207,10 @@ class FactsFile:
             return EvaluationSettings(**{name: stated[name] for name in names & {*stated}})
         except (TypeError, ValueError) as error:
             what = "`run.evaluation` is not what it must be"
-            raise self._damaged("a summary", what) from error
+            raise self._damage("a summary", what) from error
 
     @classmethod
-    def _damaged(cls, where: object, what: object) -> ResultsError:
+    def _damage(cls, where: object, what: object) -> ResultsError:
         return ResultsError(f"{where}: damaged ({what}); {cls.AGAIN}")
 
 

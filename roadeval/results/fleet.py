@@ -72,17 +72,17 @@ CACHED: Final = ("frames", "regions", "scores", "worst")
 
 def results_path(folder: Path, drive: str) -> Path:
     """Return the results folder of a drive."""
-    return inside(folder / RESULTS / drive, folder)
+    return check_inside(folder / RESULTS / drive, folder)
 
 
 def made_path(folder: Path, drive: str) -> Path:
     """Return the file that says how a drive's results were made."""
-    return inside(folder / RESULTS / f"{drive}.json", folder)
+    return check_inside(folder / RESULTS / f"{drive}.json", folder)
 
 
 def recording_path(folder: Path, drive: str) -> Path:
     """Return the path of a drive's recording, which may not exist."""
-    return inside(folder / RECORDINGS / f"{drive}.rrd", folder)
+    return check_inside(folder / RECORDINGS / f"{drive}.rrd", folder)
 
 
 def cached_path(folder: Path, name: str, drive: str) -> Path:
@@ -91,10 +91,10 @@ def cached_path(folder: Path, name: str, drive: str) -> Path:
     Its folder is not called ``drive=ID``, as partitions are: pandas and Arrow would read that as a
     second column ``drive``, and refuse the folder.
     """
-    return inside(folder / name / drive / f"{name}.parquet", folder)
+    return check_inside(folder / name / drive / f"{name}.parquet", folder)
 
 
-def inside(path: Path, folder: Path) -> Path:
+def check_inside(path: Path, folder: Path) -> Path:
     """Return a path in a fleet's folder; a `ResultsError` if a link there leads out of it."""
     if leads_outside(path, folder):
         raise ResultsError(f"{path}: a link leads out of the fleet's folder; remove it")
@@ -282,16 +282,16 @@ def cache(folder: Path, drive: str) -> None:
         "frames": frames,
         "regions": tables.finals(regions),
         "scores": scores(frames, regions, beyond_masks(results.facts, key)),
-        "worst": _pictured(folder, drive, frames).assign(rank=0),
+        "worst": _frames_with_pictures(folder, drive, frames).assign(rank=0),
     }
     write_parquet({files[name]: (name, rows[name]) for name in CACHED}, summary)
 
 
-def _pictured(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
+def _frames_with_pictures(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of ``worst``: the frames of a drive that have pictures."""
     rows = frames[frames["final"] & (frames["variant"] != BASELINE)]
     place = Path(PICTURES, drive)
-    stems = [path.stem for path in inside(folder / place, folder).glob("*.jpg")]
+    stems = [path.stem for path in check_inside(folder / place, folder).glob("*.jpg")]
     numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]
     rows = rows[~rows.duplicated("frame") & rows["frame"].isin(numbers)]
     return rows.assign(picture=[(place / f"{number}.jpg").as_posix() for number in rows["frame"]])
@@ -329,7 +329,7 @@ class FleetWriter:
                 )
             (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
             for path in self.folder.iterdir():  # the folder may come from anybody
-                inside(path, self.folder)
+                check_inside(path, self.folder)
 
     def finish(
         self,
@@ -366,13 +366,13 @@ class FleetWriter:
         tags = sorted({key for member in members for key in member.tags})
         rows: dict[str, list[Any]] = {"drives": [], "effects": [], "within": [], "cached": []}
         for member in members:
-            self._add(member, self._made(member.drive, digests), rows)
+            self._add(member, self._read_made(member.drive, digests), rows)
         try:
-            made = self._cached(rows["cached"])
+            made = self._read_cache(rows["cached"])
         except ResultsError:  # damaged: the cache is made anew
             for name in CACHED:
-                shutil.rmtree(inside(self.folder / name, self.folder), ignore_errors=True)
-            made = self._cached(rows["cached"], again=True)
+                shutil.rmtree(check_inside(self.folder / name, self.folder), ignore_errors=True)
+            made = self._read_cache(rows["cached"], again=True)
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
         words = made["worst"].astype({"drive": "str"})
@@ -405,7 +405,7 @@ class FleetWriter:
             rows["cached"].append(member.drive)
         rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
 
-    def _cached(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
+    def _read_cache(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
         """Return the cached sums of drives; missing and old ones are made from their results."""
         for drive in drives:
             try:
@@ -419,7 +419,7 @@ class FleetWriter:
             for name in ("scores", "worst")
         }
 
-    def _made(self, drive: str, digests: Mapping[str, str]) -> Made:
+    def _read_made(self, drive: str, digests: Mapping[str, str]) -> Made:
         """Return how a drive's results were made; a `ResultsError` if they are other ones."""
         made = read_made(self.folder, drive)
         if made is None:

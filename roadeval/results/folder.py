@@ -28,7 +28,7 @@ NAME_BYTES: Final = 255
 """Greatest length of a file's name on common file systems."""
 
 
-def belonging(summary: Path) -> frozenset[str]:
+def names_of_results(summary: Path) -> frozenset[str]:
     """Return the names of the files that are results according to a summary, if there is one."""
     listed = None
     with suppress(OSError, ValueError, AttributeError):
@@ -40,7 +40,7 @@ def belonging(summary: Path) -> frozenset[str]:
     return frozenset(listed_files) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
 
 
-CONTENT: Final = Content(SUMMARY, belonging)
+CONTENT: Final = Content(SUMMARY, names_of_results)
 """The files of an existing results folder that a new one replaces."""
 
 
@@ -63,7 +63,7 @@ class ResultsWriter:
         return self._new.partial
 
     def __enter__(self) -> Self:
-        with self.explained():
+        with self.explain_errors():
             self._new.begin()
             for name in OF_A_DRIVE:
                 self._open[name] = _Growing(self.folder, TABLES[name])
@@ -72,7 +72,7 @@ class ResultsWriter:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None and self._finished:
-                with self.explained():
+                with self.explain_errors():
                     self._new.publish()
         finally:
             for table in self._open.values():
@@ -82,7 +82,7 @@ class ResultsWriter:
 
     def append(self, lines: Mapping[str, str]) -> None:
         """Add lines of CSV to tables, by their names."""
-        with self.explained():
+        with self.explain_errors():
             for name, text in lines.items():
                 self._open[name].append(text)
 
@@ -96,7 +96,7 @@ class ResultsWriter:
 
         A table without rows is left out.
         """
-        with self.explained():
+        with self.explain_errors():
             for table in self._open.values():
                 table.file.close()
                 if not table.rows:
@@ -108,7 +108,7 @@ class ResultsWriter:
         self._finished = True
         return facts
 
-    def explained(self) -> AbstractContextManager[None]:
+    def explain_errors(self) -> AbstractContextManager[None]:
         """Turn an OSError inside the block into a `ResultsError`."""
         advice = "; choose another folder with `output.reports`"
         return writing(self._new.path, ResultsError, advice)

@@ -12,7 +12,7 @@ from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import over_drives, strata
-from roadeval.evaluation.tables import COUNTS, MASK, grouped, only, rates_of
+from roadeval.evaluation.tables import COUNTS, MASK, group_rows, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
@@ -50,11 +50,11 @@ def summarise(
     means = grouping.merge(drives[["drive", *tags]], on="drive")
     differences = [*within_one]
     parts: list[StratumFacts] = []
-    for _, against in grouped(means, ["base"]) if not within_one else ():
+    for _, against in group_rows(means, ["base"]) if not within_one else ():
         family = []
-        for (base, variant, stage), mask in grouped(against, ["base", "variant", "stage"]):
+        for (base, variant, stage), mask in group_rows(against, ["base", "variant", "stage"]):
             rates = {}
-            for (rate,), drive_means in grouped(mask, ["metric"]):
+            for (rate,), drive_means in group_rows(mask, ["metric"]):
                 better = METRICS[rate].higher_is_better
                 rates[rate] = over_drives(drive_means, settings.confidence, higher_is_better=better)
             family.append(Effect(base, variant, stage, final=True, rates=rates))
@@ -79,7 +79,7 @@ def summarise(
 
 def _totals(scores: pd.DataFrame) -> Totals:
     """Return the rates of each final mask: means of the drives, and from all pixels together."""
-    by_mask = grouped(scores, MASK)
+    by_mask = group_rows(scores, MASK)
     sums = by_mask[[*COUNTS, "frames"]].sum()
     means = by_mask[[*METRICS]].mean().join(rates_of(sums, METRICS, "pooled_"))
     means.insert(0, "drives", by_mask.size())

@@ -26,7 +26,7 @@ MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are shown together."""
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 OVERCONFIDENT: Final = 0.01
-"""Least difference between errors and stated errors that is reported, see `overconfident`."""
+"""Least difference between errors and stated errors that `describe_overconfidence` reports."""
 NAMED: Final = 5
 """Frames without truth that a verdict names."""
 _OF_FILTER: Final = "The filter "
@@ -71,7 +71,7 @@ def sentence(
         by = f"from {_size(before, digits)} to {_size(after, digits)} %"
     doubt = "" if _doubt(difference) == said_before else f"; {_doubt(difference)}"
     verb = "raises" if difference.mean > 0 else "lowers"
-    return f"{here} {what} {verb} {rate} {by}{windows or _counted(difference)}{doubt}."
+    return f"{here} {what} {verb} {rate} {by}{windows or _count_directions(difference)}{doubt}."
 
 
 def _doubt(difference: Difference) -> str:
@@ -118,7 +118,7 @@ def _here(difference: Difference) -> str:
     return f"Over {counted(units, 'drive')}{in_groups}"
 
 
-def _counted(difference: Difference) -> str:
+def _count_directions(difference: Difference) -> str:
     if difference.worse is None:
         return ""
     if difference.unit == "frames":
@@ -354,7 +354,7 @@ def at_thresholds(
             )
 
 
-def overconfident(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
+def describe_overconfidence(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
     """Yield a sentence on each variant that errs at least twice as often as its probabilities say.
 
     ``curves`` are as in `roadeval.results.facts.Facts`. Less than a point of difference is ignored.
@@ -393,7 +393,7 @@ def _best(best: str, rates: Mapping[str, Rates], blind: Difference | None) -> st
             if several
             else (f"{best} does not beat {BLIND}: it")
         )
-        more = f"{_size(blind.mean, _digits(blind))} pp more{_counted(blind)}"
+        more = f"{_size(blind.mean, _digits(blind))} pp more{_count_directions(blind)}"
         return f"{name} gets {wrong} of the pixels wrong, {more}; {_doubt(blind)}."
     lead = f"Best here is {best}: " if several else f"{best}: "
     lead += f"{wrong} of the pixels are wrong"
@@ -401,8 +401,8 @@ def _best(best: str, rates: Mapping[str, Rates], blind: Difference | None) -> st
         return f"{lead}. No frame with truth was trained on, so {BASELINE} is unknown."
     if not blind.units or blind.is_zero:
         return f"{lead}, as many as with {BLIND}."
-    by = f"That is {_size(blind.mean, _digits(blind))} pp better than {BLIND}{_counted(blind)}"
-    return f"{lead}. {by}; {_doubt(blind)}."
+    by = f"{_size(blind.mean, _digits(blind))} pp better than {BLIND}{_count_directions(blind)}"
+    return f"{lead}. That is {by}; {_doubt(blind)}."
 
 
 def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:

@@ -7,8 +7,8 @@ import pytest
 from roadeval.evaluation.comparison.conditions import Condition
 from roadeval.results.comparison import (
     changed_settings,
+    describe_judgement,
     headline,
-    judged,
     verdict,
 )
 from tests.evaluation.making import a_change, a_comparison, a_difference
@@ -69,5 +69,5 @@ def test_the_headline_says_whether_limits_were_kept(holds, said):
 )
 def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):
     judgement = Condition.parse(text).judge(a_change(WORSE))
-    assert judged(judgement) == f"post.filtered.ERR of new {told.format(text)}"
-    assert " over 8 drives" in judged(replace(judgement, drives=8))
+    assert describe_judgement(judgement) == f"post.filtered.ERR of new {told.format(text)}"
+    assert " over 8 drives" in describe_judgement(replace(judgement, drives=8))

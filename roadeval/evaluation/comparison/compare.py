@@ -50,7 +50,7 @@ from roadeval.evaluation.tables import (
     COUNTS,
     KEY,
     MASK,
-    grouped,
+    group_rows,
     is_final,
     keys_of,
     only,
@@ -332,7 +332,7 @@ def _compare_two(
         changed_settings={new.label: changed} if changed else {},
         changes=tuple(_mask_changes(new.label, pd.concat(masks), of_masks, settings)),
         levels=tuple(_mask_changes(new.label, pd.concat(levels), None, settings)),
-        drives=tuple(_ranked(drives)),
+        drives=tuple(_rank_drives(drives)),
         regions=tuple(_region_changes(new.label, pd.concat(regions), of_regions, settings)),
         moved=tuple(moved_frames(new.label, pairs)) if one_camera else (),
         disagreements=tuple(disagreed),
@@ -401,9 +401,9 @@ def by_drive(
         rates += [old, change.add_prefix("change_")]
         counts += [f"{name}_base" for name in COUNTS]
     keys = [*KEY, *by]
-    by_keys, rated = grouped(rows, keys), pd.concat([rows[keys], *rates], axis=1)
+    by_keys, rated = group_rows(rows, keys), pd.concat([rows[keys], *rates], axis=1)
     sums = by_keys[counts].sum().assign(frames=by_keys.size(), final=by_keys["final"].all())
-    drives = sums.join(grouped(rated, keys).mean()).reset_index()
+    drives = sums.join(group_rows(rated, keys).mean()).reset_index()
     names = [groups[key] for key in zip(drives["drive"], drives["camera"], strict=True)]
     return drives.assign(group=np.array(names, object))
 
@@ -443,7 +443,7 @@ def _mask_changes(
     ``pairs`` are the frames of the only drive; None if several are compared.
     """
     compared = COMPARED if f"{TESTED}_base" in drives else ()
-    for (variant, stage), mask in grouped(drives, MASK):
+    for (variant, stage), mask in group_rows(drives, MASK):
         frames = None if pairs is None else only(pairs, variant=variant, stage=stage)
         yield MaskChange(
             result=label,
@@ -480,7 +480,7 @@ def _drive_changes(
     settings: EvaluationSettings,
 ) -> Iterator[DriveChange]:
     """Yield the changes of final masks drive by drive, not corrected for their number."""
-    by_mask = grouped(finals, [*KEY, *MASK])
+    by_mask = group_rows(finals, [*KEY, *MASK])
     means = by_mask[[f"{TESTED}_base", TESTED]].mean().T.to_dict("list")
     for key, pairs in by_mask:
         drive, camera, variant, stage = key
@@ -490,7 +490,7 @@ def _drive_changes(
         yield DriveChange(*about, base, new, change, q=None, changed=False)
 
 
-def _ranked(changes: Sequence[DriveChange]) -> Iterator[DriveChange]:
+def _rank_drives(changes: Sequence[DriveChange]) -> Iterator[DriveChange]:
     """Yield the changes on drives, corrected for their number, the surest of each mask first."""
 
     def surest_first(change: DriveChange) -> tuple[float, float, str]:

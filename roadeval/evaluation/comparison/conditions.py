@@ -114,18 +114,18 @@ class Condition:
         if difference is not None:
             value, low, high = difference.mean, difference.low, difference.high
         if math.isnan(value):
-            return self.unjudged(mask.result, f"the rate is undefined in {mask.result}")
+            return self.not_judged(mask.result, f"the rate is undefined in {mask.result}")
         limited: float | None = value
         if self.surely:
             # The end of the interval that is closest to keeping the limit.
             limited = low if self.operator in (">", ">=") else high
         if limited is None:
             why = difference.none_because if difference else ""
-            return self.unjudged(mask.result, f"{why}; replay more, or leave out 'surely'")
+            return self.not_judged(mask.result, f"{why}; replay more, or leave out 'surely'")
         holds = OPERATORS[self.operator](100 * limited, self.limit)
         return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
 
-    def unjudged(self, result: str, because: str) -> Judgement:
+    def not_judged(self, result: str, because: str) -> Judgement:
         """Return the judgement that it could not be judged on a result, and why."""
         why = f"{self.text}: not judged in {result}, because {because}"
         nan = math.nan
@@ -164,16 +164,16 @@ def judge(
         masks = comparison.changes if condition.is_change else comparison.levels
         named = [mask for mask in masks if f"{mask.stage}.{mask.variant}" == name]
         for mask in named:
-            why = _why_unjudged(condition, mask, comparison.results, settings.least_frames)
-            yield condition.unjudged(mask.result, why) if why else condition.judge(mask)
+            why = _why_not_judged(condition, mask, comparison.results, settings.least_frames)
+            yield condition.not_judged(mask.result, why) if why else condition.judge(mask)
         if not named:
             names = ", ".join(sorted({f"{mask.stage}.{mask.variant}" for mask in masks}))
             why = f"nothing compared is called {name}; there are {names}"
             new = ", ".join(result.label for result in comparison.results[1:])
-            yield condition.unjudged(new, why)
+            yield condition.not_judged(new, why)
 
 
-def _why_unjudged(
+def _why_not_judged(
     condition: Condition, mask: MaskChange, results: Sequence[ComparedResult], least: int
 ) -> str:
     """Return why a condition cannot be judged on a mask; empty if it can."""

@@ -16,12 +16,12 @@ from roadeval.evaluation.tables import (
     COUNTS,
     KEY,
     MASK,
-    grouped,
+    group_rows,
     is_final,
     keys_of,
-    most_changed,
+    most_changed_frames,
     only,
-    paired,
+    pair_rows,
     rates_of,
 )
 
@@ -163,17 +163,19 @@ def common_masks(base: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
     base's columns end in ``_base``, and masks have the names of the new result.
     """
 
-    def stepped(table: pd.DataFrame) -> pd.DataFrame:
+    def with_step(table: pd.DataFrame) -> pd.DataFrame:
         final = is_final(table)
         return table.assign(final=final, step=np.where(final, "", table["stage"].astype(str)))
 
-    return paired(stepped(base), stepped(new), [*KEY, "variant", "step", "final", "stamp_ns"])
+    return pair_rows(
+        with_step(base), with_step(new), [*KEY, "variant", "step", "final", "stamp_ns"]
+    )
 
 
 def truth_differs(base: pd.DataFrame, new: pd.DataFrame) -> int:
     """Return the number of frames whose truth differs, from two results' rows of ``frames``."""
     base, new = (table[~table.duplicated([*KEY, "frame"])] for table in (base, new))
-    truths = paired(base, new, [*KEY, "stamp_ns"])[["truth", "truth_base"]]
+    truths = pair_rows(base, new, [*KEY, "stamp_ns"])[["truth", "truth_base"]]
     return int((truths.ne(0).all(axis=1) & truths["truth"].ne(truths["truth_base"])).sum())
 
 
@@ -203,7 +205,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     other, other_base = both["TN"] + both["FP"], both["TN_base"] + both["FP_base"]
     same, labelled = (road == road_base) & (other == other_base), road + other > 0
     both = both.assign(same=same, labelled=labelled, in_new=both["in"] != "left_only")
-    parts = grouped(both, [*by, "region"])
+    parts = group_rows(both, [*by, "region"])
     in_both = parts[["labelled", "in_new"]].transform("any").all(axis=1)
     shared = parts["same"].transform("all") & in_both
     both = both[shared & both["labelled"]].sort_values("pair", kind="stable")
@@ -241,11 +243,11 @@ class Disagreement:
 
 def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
     """Yield the frames whose ERR changed most, of the first final mask."""
-    pairs = next((rows for _, rows in grouped(only(pairs, final=True), MASK)), pairs)
+    pairs = next((rows for _, rows in group_rows(only(pairs, final=True), MASK)), pairs)
     base = pairs[f"{TESTED}_base"]
     pairs = pairs.assign(before=base, change=pairs[TESTED] - base)
     for harmed in (True, False):
-        for row in most_changed(pairs, NAMED, harmed=harmed).to_dict("records"):
+        for row in most_changed_frames(pairs, NAMED, harmed=harmed).to_dict("records"):
             was, change = row["before"], row["change"]
             about = row["variant"], row["frame"], row["stamp_ns"]
             yield MovedFrame(result, *about, was, was + change, change)
@@ -265,6 +267,6 @@ def disagreements(
         rows = rows[rows["N"] > 0].merge(stamps, on="frame")
         mine, theirs = rows[new_right] / rows["N"], rows[base_right] / rows["N"]
         rows = rows.assign(mine=mine, theirs=theirs, change=mine + theirs)
-        for row in most_changed(rows, NAMED, harmed=True).to_dict("records"):
+        for row in most_changed_frames(rows, NAMED, harmed=True).to_dict("records"):
             right = row["theirs"], row["mine"]
             yield Disagreement(new, new, row["frame"], row["stamp_ns"], *right)

@@ -190,17 +190,17 @@ class BlindPrior:
         road = np.zeros(truths[0].shape, np.float32)
         labelled = np.zeros_like(road)
         for truth in truths:
-            resized = _resized(truth, road.shape, mixed=False)
+            resized = _resize(truth, road.shape, mixed=False)
             road += resized == ROAD
             labelled += resized != IGNORE
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
         """Return the mask for a frame of ``shape`` (height, width): road from one half."""
-        return Packed.of(_resized(self.road, shape, mixed=True) >= 0.5)
+        return Packed.of(_resize(self.road, shape, mixed=True) >= 0.5)
 
 
-def _resized(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
+def _resize(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
     """Return an image in another size; the nearest pixels if values may not be ``mixed``."""
     if image.shape == shape:
         return image

@@ -89,14 +89,14 @@ class MetreSums:
         for variant, sums in self._rates.items():
             for place, region in enumerate(self._regions):
                 with np.errstate(invalid="ignore"):
-                    value, *ends = _ranged(sums[:, place, 0] / sums[:, place, 1])
+                    value, *ends = _with_range(sums[:, place, 0] / sums[:, place, 1])
                 yield (variant, "ERR", region, int(sums[0, place, 1]), 0, value, nan, *ends)
             for name, value in kitti(self._above[variant], levels.get(variant)).items():
                 yield variant, name, ABOVE, 0, 0, value, nan, nan, nan
             for place, (measured, at) in enumerate(self._measures):
                 places = range(place, len(sums) * len(self._measures), len(self._measures))
                 stances = [self._metres_off(variant, stance_place) for stance_place in places]
-                value, *ends = _ranged(np.array([quantile(metres, 0.5) for metres in stances]))
+                value, *ends = _with_range(np.array([quantile(metres, 0.5) for metres in stances]))
                 frames, p95 = int(self._seen[variant][place]), quantile(np.abs(stances[0]), 0.95)
                 where, missing = f"{at}m" if at else "ahead", frames - len(stances[0])
                 yield (variant, measured, where, frames, missing, value, p95, *ends)
@@ -108,7 +108,7 @@ class MetreSums:
         return np.repeat(np.array([*counter], float) / CENTIMETRES, counts)
 
 
-def _ranged(values: Floats) -> tuple[float, float, float]:
+def _with_range(values: Floats) -> tuple[float, float, float]:
     """Return the value of the first stance, and the least and the greatest of all stances."""
     if len(values) > 1 and not np.isnan(values).any():
         return float(values[0]), float(values.min()), float(values.max())

@@ -46,7 +46,7 @@ from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, holm, within_drive
-from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, paired, rates_of
+from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, pair_rows, rates_of
 from roadeval.geometry.ground import Ground
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Ef
             other = base, finals[base] if final else stage
             of_filter = (base, variant) == (UNFILTERED, FILTERED)
             if final or (of_filter and other in masks):
-                pairs = paired(
+                pairs = pair_rows(
                     only(frames, variant=base, stage=other[1]),
                     only(frames, variant=variant, stage=stage),
                     [*KEY, "frame", "stamp_ns"],
@@ -128,7 +128,7 @@ def evidence(windows: pd.DataFrame, size: int) -> dict[str, dict[str, int]]:
         if not {better, worse} <= masks:
             continue
         base, new = (only(windows, variant=mask[0], stage=mask[1]) for mask in (worse, better))
-        pairs = paired(base, new, [*KEY, "window"])
+        pairs = pair_rows(base, new, [*KEY, "window"])
         difference = pairs[rate] - pairs[f"{rate}_base"]
         full = pairs[["frames", "frames_base"]].min(axis=1) == size
         held, defined = difference < 0, difference.notna()
@@ -328,12 +328,12 @@ class Scoreboard:
         settings, frames = self._settings, self.frames()
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
         curves, beyond = self.curves.totals(), self._edges.totals()
-        for (variant,), rows in tables.grouped(tables.finals(frames), ["variant"]):
+        for (variant,), rows in tables.group_rows(tables.finals(frames), ["variant"]):
             stamps, errors = (rows[name].to_numpy() for name in ("stamp_ns", TESTED))
             beyond[variant]["episodes"] = episodes(stamps, errors, DEGRADED_ERR)
         oracles = self._oracles.table(self._frames_added(), {})
         replaced: dict[str, dict[str, Any]] = {}
-        for (oracle,), rows in tables.grouped(oracles, ["oracle"]):
+        for (oracle,), rows in tables.group_rows(oracles, ["oracle"]):
             for variant, stages in tables.as_trees(tables.totals(rows)).items():
                 replaced.setdefault(variant, {})[oracle] = stages
         windows = tables.windows(frames, settings.window)

@@ -156,10 +156,11 @@ def interval(
 def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
     """Average the differences of a rate over a drive's frames, with an interval.
 
-    ``pairs`` are as of `roadeval.evaluation.tables.paired`: columns are ``camera``, ``stamp_ns``,
-    the rate, and the base's with ``_base`` behind its name. Frames without a difference are left
-    out. The mean of several cameras is the mean of their means. Frames that they took at the same
-    time are no further evidence: a camera that is there twice changes nothing, see `at_moments`.
+    ``pairs`` are as of `roadeval.evaluation.tables.pair_rows`, with columns ``camera``,
+    ``stamp_ns``, the rate, and the base's rate with ``_base`` behind its name. Frames without a
+    difference are left out. The mean of several cameras is the mean of their means. Frames that
+    they took at the same time are no further evidence: a camera that is there twice changes
+    nothing, see `at_moments`.
     """
     stamps, base = pairs["stamp_ns"].to_numpy(), pairs[f"{rate}_base"].to_numpy()
     differences, camera = pairs[rate].to_numpy() - base, pairs["camera"].factorize()[0]
