@@ -53,10 +53,10 @@ def summarise(
     for _, against in group_rows(means, ["base"]) if not within_one else ():
         family = []
         for (base, variant, stage), mask in group_rows(against, ["base", "variant", "stage"]):
-            rates = {}
-            for (rate,), drive_means in group_rows(mask, ["metric"]):
-                better = METRICS[rate].higher_is_better
-                rates[rate] = over_drives(drive_means, settings.confidence, higher_is_better=better)
+            rates = {
+                rate: over_drives(drive_means, settings.confidence, rate)
+                for (rate,), drive_means in group_rows(mask, ["metric"])
+            }
             family.append(Effect(base, variant, stage, final=True, rates=rates))
             for tag, value, change in strata(only(mask, metric=TESTED), tags, settings.confidence):
                 parts.append(StratumFacts(base, variant, tag.removeprefix(TAG), value, change))

@@ -272,4 +272,4 @@ def test_a_perfect_stage_is_held_against_the_same_frames_as_they_are():
     ],
 )
 def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
-    assert tables.merged(chains) == order
+    assert tables.merge_names(chains) == order

@@ -420,9 +420,8 @@ def _difference(
     """Return the difference over drives, or within the only one if its ``pairs`` are given."""
     if pairs is not None:
         return within_drive(pairs, rate, settings)
-    better = METRICS[rate].higher_is_better
-    drives = drives.assign(mean=drives[f"change_{rate}"])
-    return over_drives(drives, settings.confidence, higher_is_better=better)
+    means = drives.assign(mean=drives[f"change_{rate}"])
+    return over_drives(means, settings.confidence, rate)
 
 
 def _rates(drives: pd.DataFrame, end: str = "") -> dict[str, float]:

@@ -29,7 +29,7 @@ from pydantic import BeforeValidator
 
 from roadeval.data.arrays import Floats, Sums
 from roadeval.data.words import counted
-from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
 
@@ -209,10 +209,8 @@ def group_means(drives: pd.DataFrame) -> Floats:
     return means
 
 
-def over_drives(
-    drives: pd.DataFrame, confidence: float, *, higher_is_better: bool = False
-) -> Difference:
-    """Average the differences of drives, in any order, with an interval.
+def over_drives(drives: pd.DataFrame, confidence: float, rate: str = TESTED) -> Difference:
+    """Average the differences of a rate over drives, in any order, with an interval.
 
     Columns are ``drive``; ``group``, a name shared with other drives (a day or a route), else the
     drive's own; and ``mean``, the mean difference on the drive, NaN if no frame has one. A group's
@@ -227,8 +225,13 @@ def over_drives(
     >>> round(difference.mean, 3), difference.low, difference.high, difference.p, difference.worse
     (0.02, -0.01, 0.05, 0.09375, 5)
     """
-    means, groups = drives["mean"].to_numpy(float), group_means(drives)
-    return interval(means, confidence, "drives", averaged=groups, higher_is_better=higher_is_better)
+    return interval(
+        drives["mean"].to_numpy(float),
+        confidence,
+        "drives",
+        averaged=group_means(drives),
+        higher_is_better=METRICS[rate].higher_is_better,
+    )
 
 
 def strata(

@@ -159,7 +159,7 @@ def test_drives_are_counted_by_the_direction_in_which_they_changed():
     means = drives([0.1, 0.2, 0.3, -0.1, 0.0, 0.0])
     lower = over_drives(means, 0.95)
     assert (lower.worse, lower.better, lower.equal) == (3, 1, 2)
-    higher = over_drives(means, 0.95, higher_is_better=True)
+    higher = over_drives(means, 0.95, "ACC")
     assert (higher.worse, higher.better, higher.equal) == (1, 3, 2)
 
 
