@@ -12,8 +12,8 @@ from roadeval.evaluation.stats.difference import Difference
 from roadeval.results import comparison
 from roadeval.results.comparison import (
     changed_settings,
+    describe_judgement,
     headline,
-    judged,
 )
 from roadeval.results.sentences import (
     notes,
@@ -162,5 +162,5 @@ def test_the_headline_says_whether_limits_were_kept(holds, said):
 )
 def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):
     judgement = Condition.parse(text).judge(a_change(WORSE))
-    assert judged(judgement) == f"post.filtered.ERR of new {told.format(text)}"
-    assert " over 8 drives" in judged(replace(judgement, drives=8))
+    assert describe_judgement(judgement) == f"post.filtered.ERR of new {told.format(text)}"
+    assert " over 8 drives" in describe_judgement(replace(judgement, drives=8))
