@@ -37,16 +37,12 @@ def sentence(
     what: str,
     rate: str,
     ends: tuple[Rates, Rates] | None = None,
-    *,
-    windows: str = "",
-    said_before: str = "",
 ) -> str:
     """Return what a difference means for these frames or drives, and then for others like them.
 
     The difference is with ``what`` minus without it, as ``the filter`` or ``net instead of blind``;
     ``rate`` is what changes, as ``ERR of post``. ``ends`` are the rates without and with it, which
-    are named if they are of the same frames or drives; ``windows`` tells in brackets in how many it
-    is lower; ``said_before`` is the clause on others that a sentence before has.
+    are named if they are of the same frames or drives.
 
     >>> difference = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
     >>> sentence(difference, "the filter", "ERR")
@@ -63,9 +59,8 @@ def sentence(
     if defined(before) and defined(after) and abs(after - before - difference.mean) < ROUNDING:
         digits = 1 if abs(difference.mean) >= FINE else 2
         by = f"from {_size(before, digits)} to {_size(after, digits)} %"
-    doubt = "" if _doubt(difference) == said_before else f"; {_doubt(difference)}"
     verb = "raises" if difference.mean > 0 else "lowers"
-    return f"{here} {what} {verb} {rate} {by}{windows or _count_directions(difference)}{doubt}."
+    return f"{here} {what} {verb} {rate} {by}{_count_directions(difference)}; {_doubt(difference)}."
 
 
 def _doubt(difference: Difference) -> str:
