@@ -16,9 +16,9 @@ from typer.core import TyperCommand
 
 from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import debug, defect
 
 FIRST: Final = (
@@ -132,7 +132,7 @@ def explain(error: BaseException) -> int:
             console.drop()
             return ExitCode.BROKEN_PIPE
     known, sentence = _known(error)
-    messages.error(with_flags(_with_notes(sentence, error)))
+    messages.error(_with_notes(sentence, error))
     if isinstance(error, console.OutputError):
         console.drop()
     return ExitCode.FAILED if known else ExitCode.DEFECT
@@ -142,7 +142,7 @@ def _known(error: BaseException) -> tuple[bool, str]:
     """Return whether the user can mend an error, and the message."""
     match error:
         case RoadevalError():
-            return True, str(error)
+            return True, error.sentence
         case OSError(strerror=str(reason)):
             return True, f"{reason}: {error.filename}" if error.filename else reason
         case _ if memory.is_lacking(error):
@@ -153,7 +153,7 @@ def _known(error: BaseException) -> tuple[bool, str]:
 
 def _with_notes(sentence: str, error: BaseException) -> str:
     """Add the notes of an error, as the place of a partial output."""
-    return "; ".join([sentence, *getattr(error, "__notes__", ())])
+    return Sentence("; ").join([sentence, *getattr(error, "__notes__", ())])
 
 
 def _usage(error: typer.TyperException) -> str:

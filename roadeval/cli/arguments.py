@@ -40,7 +40,7 @@ def usage() -> Iterator[None]:
     try:
         yield
     except RoadevalError as error:
-        raise typer.BadParameter(with_flags(str(error))) from error
+        raise typer.BadParameter(with_flags(error.sentence)) from error
 
 
 def _condition(texts: list[str] | None) -> list[str] | None:

@@ -15,25 +15,25 @@ from roadeval.runtime.text import debug, visible, visible_lines, without_secrets
 PROGRAM: Final = "roadeval"
 
 
-def error(sentence: object) -> None:
+def error(sentence: str) -> None:
     """Write an error: ``roadeval: error: ...``."""
     _write("error", "bold red", sentence)
 
 
-def warning(sentence: object) -> None:
+def warning(sentence: str) -> None:
     """Write a warning: ``roadeval: warning: ...``."""
-    _write("warning", "bold yellow", with_flags(str(sentence)))
+    _write("warning", "bold yellow", sentence)
 
 
-def note(sentence: object) -> None:
+def note(sentence: str) -> None:
     """Write what happens now, where it takes long: ``roadeval: note: ...``."""
-    _write("note", "bold", with_flags(str(sentence)))
+    _write("note", "bold", sentence)
 
 
 def losses(sentences: Sequence[str]) -> ExitCode:
     """Write which parts of a log were lost, ``roadeval: lost: ...``, and return the exit code."""
     for sentence in sentences:
-        _write("lost", "bold yellow", with_flags(sentence))
+        _write("lost", "bold yellow", sentence)
     return ExitCode.LOSS if sentences else ExitCode.DONE
 
 
@@ -61,13 +61,14 @@ def loops_missing() -> None:
         )
 
 
-def interrupted(sentence: object) -> None:
+def interrupted(sentence: str) -> None:
     """Write that a signal ended the command: ``roadeval: interrupted: ...``."""
     _write("interrupted", "bold yellow", sentence)
 
 
-def _write(kind: str, style: str, sentence: object) -> None:
-    said = visible(without_secrets(str(sentence)))
+def _write(kind: str, style: str, sentence: str) -> None:
+    """Write a line that names settings by their flags."""
+    said = visible(without_secrets(with_flags(sentence)))
     try:
         from rich.text import Text
 

@@ -1,7 +1,7 @@
 """The options that give the settings of a run their values.
 
 An option is made of a setting's field: its flag, its type and its meaning stand there. No other
-module knows a flag: errors name settings, and `with_flags` replaces these names.
+module knows a flag: sentences name settings, and `with_flags` names their flags.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import typer
 
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
 from roadeval.logs.settings import FrameSettings, LabelPlace, LabelSettings, TopicSettings
+from roadeval.runtime.sentence import name_settings
 from roadeval.runtime.settings import Flag, meanings
 from roadeval.training.settings import TrainingSettings
 
@@ -227,26 +228,28 @@ OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "topics.image": "--image-topic"
 }
-_MARKED: Final = re.compile(r"`([\w-]+(?:\.[\w-]+)*)`")
 
 
 def with_flags(text: str) -> str:
-    """Replace the settings in a message, between backticks, by the flags that give them values.
+    """Return a sentence with its settings named by the flags that give them values.
 
-    >>> with_flags("nothing is left to evaluate; lower `training.frames`")
+    >>> from roadeval.runtime.sentence import Sentence, Setting
+    >>> with_flags(Sentence("nothing is left to evaluate; lower ", Setting("training.frames")))
     'nothing is left to evaluate; lower --train-frames'
-    >>> with_flags("set `masks.net.first` to 1")
+    >>> with_flags(Sentence("set ", Setting("masks.net.first"), " to 1"))
     'set `first` in the file of --masks net=FILE.toml to 1'
     """
-    return _MARKED.sub(_flag_of, text)
+    return str(name_settings(text, _flag_of))
 
 
-def _flag_of(found: re.Match[str]) -> str:
-    table, _, rest = found[1].partition(".")
+def _flag_of(setting: str) -> str:
+    table, _, rest = setting.partition(".")
     name, _, key = rest.partition(".")
     if table == "masks" and key:
         return f"`{key}` in the file of {FLAGS[table]} {name}=FILE.toml"
-    return FLAGS.get(found[1], found[0])
+    if setting.startswith("topics.masks."):
+        return f"{FLAGS['topics.masks']} {key}"
+    return FLAGS.get(setting, f"`{setting}`")
 
 
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:

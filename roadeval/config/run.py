@@ -56,6 +56,7 @@ from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording.layout import RecordRule
+from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import visible, visible_lines
 from roadeval.training.settings import TrainingSettings
@@ -100,22 +101,22 @@ class RunConfig(LogConfig):
         for name in self.only:
             if name not in names:
                 raise ConfigError(
-                    f"`only` {name}: there is no such variant; choose {either(names)}"
+                    f"there is no variant {name}", setting="only", remedy=f"choose {either(names)}"
                 )
         self._check_cameras()
         try:
             RecordRule.parse(self.output.record)
         except RoadevalError as error:
-            raise ConfigError(str(error)) from error
+            raise ConfigError.of(error) from error
         for key, ending in (("save", ".rrd"), ("mcap", ".mcap")):
             path = getattr(self.output, key)
             if path is not None and not path.endswith(ending):
-                raise ConfigError(f"`output.{key}` {path}: name a file that ends in {ending}")
+                problem = f"{path} does not end in {ending}"
+                raise ConfigError(problem, setting=f"output.{key}")
         if self.output.mcap is not None and self.frames.scale != 1:
-            raise ConfigError(
-                "`output.mcap` and `frames.scale` do not go together: reduced masks would not lie "
-                "over the log's images"
-            )
+            problem = Sentence("does not go with ", Setting("frames.scale"))
+            why = ", as reduced masks would not lie over the log's images"
+            raise ConfigError(Sentence(problem, why), setting="output.mcap")
 
     def _check_cameras(self) -> None:
         names = [visible(each.name or each.image) for each in self.cameras]
@@ -131,7 +132,9 @@ class RunConfig(LogConfig):
         of_one += ["ground"] * self.ground.given
         if names and of_one:
             raise ConfigError(
-                f"`{of_one[0]}`: which camera's? Name it under [[cameras]], beside its image"
+                "belongs to one of several cameras",
+                setting=of_one[0],
+                remedy="name it under [[cameras]], beside its image",
             )
         if names and (self.truth.path or self.masks):
             raise ConfigError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from itertools import takewhile
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, SettingError
 from roadeval.runtime.documents import read_toml
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import is_utf8, visible
@@ -37,17 +37,10 @@ PLAIN_WORDS: Final[Mapping[str, str]] = {
     "missing": "is too short a list",
 }
 """Messages by the beginning of the validating library's name of a problem."""
-NOT_UTF8: Final = (
-    "its bytes are not UTF-8, which no configuration can hold: choose another name, or set "
-    "PYTHONUTF8=1 where the system speaks another encoding"
-)
 QUOTED: Final = 60
 """Letters of a wrong value that a message quotes."""
 
 _JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
-
-Keys = tuple[str | int, ...]
-"""The names, and the numbers of items, that lead to a value."""
 
 
 class ConfigError(RoadevalError):
@@ -56,16 +49,13 @@ class ConfigError(RoadevalError):
 
 @contextmanager
 def in_file(where: str) -> Iterator[None]:
-    """Begin the message of a `ConfigError` in the block with a file, or another place, if any.
-
-    In a file a setting is not marked as one that a flag may set.
-    """
+    """Place a `ConfigError` of the block in a file, if there is one: no flag names its settings."""
     try:
         yield
     except ConfigError as error:
         if not where:
             raise
-        raise ConfigError(f"{where}: {str(error).replace('`', '')}") from error
+        raise ConfigError.of(error, where, in_file=True) from error
 
 
 def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
@@ -120,19 +110,17 @@ def override(settings: Any, values: Any, table: str) -> Any:
     A `ConfigError` for an unknown key or a value out of range names the key.
     """
     if not isinstance(values, Mapping):
-        raise ConfigError(f"`{table}`: must be a table")
+        raise ConfigError("must be a table", setting=table)
     if not values:
         return settings
-    if problem := _unusable(values, settings):
-        raise ConfigError(_named(table, *problem))
+    _check(values, settings, table)
     merged = _merged(dataclasses.asdict(settings), values)
     try:
         # In JSON a strict check accepts a list for a tuple, but no text for a number, and no true.
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise ConfigError(_named(table, first["loc"], _plainly(first))) from error
+        raise _refused(table, error.errors(include_url=False)[0]) from error
 
 
 @cache
@@ -156,39 +144,43 @@ def quoted(value: Any) -> str:
     return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
 
 
-def _named(table: str, keys: Sequence[str | int], problem: str) -> str:
-    """Name the setting that a problem is about, unless the problem does.
-
-    >>> _named("labels", ("road", 0), "must be text")
-    '`labels.road`, item 1: must be text'
-    """
-    # After an item's number comes which of its types the validating library tried.
+def _refused(table: str, problem: Mapping[str, Any]) -> ConfigError:
+    """Return the error for a problem that the validating library has found in a table."""
+    keys, cause = problem["loc"], problem.get("ctx", {}).get("error")
+    # After an item's number comes which of its types the library tried.
     names = list(takewhile(lambda part: isinstance(part, str), keys))
-    item = f", item {int(keys[len(names)]) + 1}" if len(names) < len(keys) else ""
-    if not keys and "`" in problem:
-        return problem
-    return f"`{'.'.join(map(str, (table, *names)))}`{item}: {problem}"
+    setting = ".".join((table, *names))
+    if isinstance(cause, SettingError) and cause.setting:
+        return ConfigError.of(cause.rename_settings(lambda name: f"{setting}.{name}"))
+    item = f"item {int(keys[len(names)]) + 1} " if len(names) < len(keys) else ""
+    return ConfigError(f"{item}{_plainly(problem)}", setting=setting)
 
 
-def _unusable(values: Mapping[str, Any], settings: Any, keys: Keys = ()) -> tuple[Keys, str] | None:
-    """Return the first key without a setting, or with text that none can hold, and the problem."""
+def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
+    """Raise a `ConfigError` for a key without a setting, or with text that none can hold."""
     known = None
     if dataclasses.is_dataclass(settings):
         known = [field.name for field in dataclasses.fields(settings)]
     for key, value in values.items():
-        here = (*keys, key)
+        setting = f"{table}.{key}"
         if known is not None and key not in known:
-            choice = f"there is no such setting; choose {either(known)}"
-            return here, choice if known else "it has no settings"
+            if not known:
+                raise ConfigError("it has no settings", setting=setting)
+            choice = f"choose {either(known)}"
+            raise ConfigError("there is no such setting", setting=setting, remedy=choice)
         if isinstance(value, Mapping):
-            if problem := _unusable(value, getattr(settings, key, None), here):
-                return problem
+            _check(value, getattr(settings, key, None), setting)
         elif isinstance(value, str):
             if not is_utf8(value):
-                return here, NOT_UTF8
+                raise ConfigError(
+                    "its bytes are not UTF-8, which no configuration can hold",
+                    setting=setting,
+                    remedy="choose another name, or set PYTHONUTF8=1 where the system speaks "
+                    "another encoding",
+                )
             if "\0" in value:
-                return here, "holds a zero byte, which no name and no path can"
-    return None
+                problem = "holds a zero byte, which no name and no path can"
+                raise ConfigError(problem, setting=setting)
 
 
 def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -204,10 +196,9 @@ def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any
 
 def _plainly(problem: Mapping[str, Any]) -> str:
     """Describe a problem in plain words, with the value that was given."""
-    message, given = str(problem["msg"]).removeprefix("Value error, "), problem["input"]
-    for begin, words in PLAIN_WORDS.items():
-        if problem["type"].startswith(begin):
-            message = words.format_map(problem.get("ctx", {}))
-            break
+    given, context = problem["input"], problem.get("ctx", {})
+    plain = (words for kind, words in PLAIN_WORDS.items() if problem["type"].startswith(kind))
+    message = str(context.get("error", problem["msg"]))
+    message = next(plain, "{}").format(message, **context)
     shown = problem["loc"] and not isinstance(given, Mapping)
     return f"{message} (given: {quoted(given)})" if shown else message

@@ -26,6 +26,7 @@ from roadeval.data import (
 from roadeval.logs.settings import LabelPlace, MaskSettings
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
+from roadeval.runtime.sentence import Sentence, Setting
 
 PAPER_CHAIN: Final = ("shadow", "similarity", "svm", "post")
 
@@ -183,7 +184,7 @@ def _chain(names: Any) -> tuple[str, ...]:
     try:
         found = stages.stages_of(names)
     except stages.UnknownStageError as error:
-        raise ConfigError(f"chain: {error}") from error
+        raise ConfigError.of(error, "chain") from error
     if len({stage.name for stage in found}) < len(found):
         raise ConfigError("chain: a stage can occur only once")
     if names[-1] != FINAL_STAGE:
@@ -259,8 +260,9 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     if method is not None:
         if learning := [name for name in method.learning() if name != "threshold"]:
             raise ConfigError(
-                f"`tunes` {name}: it learns itself ({', '.join(learning)}), and of frames that "
-                "taught it, it says too much to learn from"
+                f"{name} is trained itself ({', '.join(learning)}), so its output on its training "
+                "frames is over-confident",
+                setting="tunes",
             )
         dropped = ("threshold", FINAL_STAGE)
         before = tuple(each for each in method.chain if each not in dropped)
@@ -268,7 +270,7 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     exposure = () if "exposure" in before else ("exposure",)
     chain = (*before, *exposure, "trees", FINAL_STAGE)
     tables = {"preset": "robust", "chain": chain, **settings, "trees": {"opinion": True}}
-    return Variant.of(f"{name}{TUNED}", tables, f"`tunes` {name}")
+    return Variant.of(f"{name}{TUNED}", tables, Sentence(Setting("tunes"), f" {name}"))
 
 
 def with_masks(current: Masks, tables: Any) -> Masks:

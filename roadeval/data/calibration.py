@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from roadeval.runtime.sentence import Sentence, Setting
+
 FISHEYE: Final = ("equidistant", "fisheye", "kannala_brandt")
 """Models whose rays' angles, not their slopes, grow with the distance from the centre."""
 
@@ -77,7 +79,8 @@ class Calibration:
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""
         middle = f"the middle of {self.width}x{self.height} pixels"
-        return f"its centre, {x:.4g}, {y:.4g}, is far from {middle}: correct it with `ground`"
+        centre = f"its centre, {x:.4g}, {y:.4g}, is far from {middle}"
+        return Sentence(f"{centre}: correct it with ", Setting("ground"))
 
     @property
     def bends(self) -> bool:

@@ -287,8 +287,9 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     names = shuffled(set(groups.values()), seed)
     if len(names) < folds:
         raise FleetError(
-            f"`fleet.folds`: {folds} folds need as many drives with truth, or groups of them, "
-            f"and there are {len(names)} (copies of one log count as one)"
+            f"{folds} folds need as many drives with truth, or groups of them, and there are "
+            f"{len(names)} (copies of one log count as one)",
+            setting="fleet.folds",
         )
     fold = {name: place % folds for place, name in enumerate(names)}
     return {drive: fold[group] for drive, group in groups.items()}
@@ -458,7 +459,7 @@ def read_manifest(path: Path) -> Iterator[DriveEntry]:
         try:
             sources = _sources(row.path, path.parent)
         except RoadevalError as error:
-            raise FleetError(f"{where}: {error}") from error
+            raise FleetError.of(error, where) from error
         settings = {name: table[name] for name in OF_A_LOG if name in table}
         for source in sources:
             yield entry_of(source, row.group, row.tags, settings)

@@ -14,6 +14,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 from roadeval.fleet.drives import FleetError
+from roadeval.runtime.sentence import Sentence, Setting
 
 ATTEMPTS: Final = 2
 """Attempts at a drive whose worker dies; on a cluster the scheduler's settings decide."""
@@ -91,8 +92,12 @@ def _local(distributed: Any, count: int) -> Iterator[Any]:
             client = distributed.Client(stack.enter_context(cluster))
         except (OSError, RuntimeError) as error:
             raise FleetError(
-                f"the worker processes cannot be started ({error}): give them more memory, "
-                "processes or open files (see ulimit -a), or take fewer `run.jobs`"
+                f"the worker processes cannot be started ({error})",
+                remedy=Sentence(
+                    "give them more memory, processes or open files (see ulimit -a), or take "
+                    "fewer ",
+                    Setting("run.jobs"),
+                ),
             ) from error
         yield stack.enter_context(client)
 
@@ -110,8 +115,9 @@ def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
             client = distributed.Client(**where, timeout=ANSWER_S)
         except (OSError, TimeoutError, ValueError, TypeError) as error:
             raise FleetError(
-                f"`fleet.scheduler` {scheduler}: does not answer within {ANSWER_S} s, or is no "
-                "Dask scheduler; name it as tcp://host:8786, or by the file that it has written"
+                f"{scheduler} does not answer within {ANSWER_S} s, or is no Dask scheduler",
+                setting="fleet.scheduler",
+                remedy="name it as tcp://host:8786, or by the file that it has written",
             ) from error
         with client:
             yield client

@@ -142,9 +142,10 @@ class _Parts:
         try:
             facts, content = _ask(self._place.url, part)
         except FleetError as error:
-            if not str(error).endswith(NO_PARTS):
+            if error.problem != NO_PARTS:
                 raise
-            raise FleetError(f"{where}: the server gives no parts of files: copy it here") from None
+            problem = "the server gives no parts of files"
+            raise FleetError(problem, where=where, remedy="copy the file here") from None
         if facts.differs(self._facts):
             raise FleetError(f"{where}: {CHANGED}")
         if len(content) != end - begin:
@@ -180,7 +181,7 @@ def _facts(place: _Place) -> _Facts:
     try:
         return _Facts.of(_ask(place.url, obstore.head, place.store, place.key))
     except FleetError as error:  # a signed URL may be good for reading alone
-        if str(error).endswith(SILENT):
+        if error.problem == SILENT:
             raise
         return _Facts.of(_ask(place.url, obstore.get, place.store, place.key).meta)
 
@@ -240,4 +241,4 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
         kind = type(error).__name__
         found = (words for pattern, words in _REASONS if re.search(pattern, f"{kind} {error}"))
         reason = next(found, f"cannot be read ({kind})")
-        raise FleetError(f"{shown(url)}: {reason}") from None
+        raise FleetError(reason, where=shown(url)) from None

@@ -21,6 +21,7 @@ from roadeval.data.arrays import Floats, Matrix
 from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
+from roadeval.runtime.sentence import Sentence, Setting
 
 GROUND_FRAMES: Final = ("base_footprint",)
 """Frames of a vehicle that lie on the ground (REP 120)."""
@@ -202,11 +203,11 @@ def ground_of(
         width, height = settings.size or size
         lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     elif lens is None:
-        return None, f"no metres: {why}"
+        return None, Sentence("no metres: ", why)
     else:
         (above, pitch, roll), text = _pose(logged.mounting if logged else None, settings)
         if above is None or pitch is None:
-            return None, f"no metres: {text}"
+            return None, Sentence("no metres: ", text)
         turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
         plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
     parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
@@ -221,7 +222,7 @@ def ground_of(
     )
     doubt = lens.doubt if settings.focal else ""
     told = f"metres: flat ground, {text}", covers if math.isfinite(near + far) else "", doubt
-    return ground, "; ".join(filter(None, told))
+    return ground, Sentence("; ").join(filter(None, told))
 
 
 def _lens(
@@ -239,12 +240,14 @@ def _lens(
     elif lens is not None and settings.model:
         lens = replace(lens, model=settings.model, distortion=settings.distortion)
     if lens is None:
-        return None, "the focal length is missing: give fov, or focal, with `ground`"
+        missing = "the focal length is missing: give fov, or focal, with "
+        return None, Sentence(missing, Setting("ground"))
     if problem := lens.problem:
-        raise GroundError(f"`ground.{problem.split()[0]}`: its {problem}: no camera has that")
+        setting = f"ground.{problem.split()[0]}"
+        raise GroundError(f"its {problem}, which no camera has", setting=setting)
     if not lens.has_shape(*size):
         shape = f"{lens.width}x{lens.height}, have another shape than the images"
-        raise GroundError(f"`ground.size`: its images, {shape}, {size[0]}x{size[1]}")
+        raise GroundError(f"its images, {shape}, {size[0]}x{size[1]}", setting="ground.size")
     last = max((n for n, number in enumerate(lens.distortion, 1) if number), default=0)
     model = lens.model.strip().lower()
     length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
@@ -273,7 +276,8 @@ def _pose(
         above = above if height is None else f": the log says {height:.6g} m"
         missing = [f"the camera's height above the ground{above}"] * has_no_height
         missing += ["its pitch"] * (pitch is None)
-        return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
+        text = f"missing: {', and '.join(missing)}; give it with "
+        return (None, None, 0.0), Sentence(text, Setting("ground"))
     # Adding 0 makes 0.0 of what would be read as -0.0.
     shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
     way = "up" if pitch < 0 else "down"
@@ -286,7 +290,7 @@ def _of_homography(
 ) -> tuple[tuple[float, ...], bool, str]:
     to_ground = np.reshape(settings.homography, (3, 3))
     if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
-        raise GroundError("`ground.homography` cannot be inverted")
+        raise GroundError("cannot be inverted", setting="ground.homography")
     matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
     plane = np.linalg.inv(to_ground @ matrix)
     # What is far ahead must lie before the camera, not behind it.

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from roadeval.errors import RoadevalError
+from roadeval.runtime.sentence import Sentence, Setting
+
 MAX_PIXELS: Final = 1 << 25
 """Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
 
 
-class ImageError(ValueError):
+class ImageError(RoadevalError, ValueError):
     """An image that is damaged, of an unknown format, or too large to be read.
 
     Its message completes "frame 7: ...".
@@ -33,8 +36,11 @@ class Limits:
             raise ImageError(f"an image of {width}x{height}")
         if width * height > self.max_pixels:
             raise ImageError(
-                f"an image of {width}x{height}, more than the {self.max_pixels} pixels that "
-                "`frames.max_pixels` allows"
+                Sentence(
+                    f"an image of {width}x{height}, more than the {self.max_pixels} pixels that ",
+                    Setting("frames.max_pixels"),
+                    " allows",
+                )
             )
 
 

@@ -15,6 +15,7 @@ from roadeval.logs.settings import LogConfig
 from roadeval.logs.writing.writer import PackResult
 from roadeval.logs.writing.writer import pack as pack_messages
 from roadeval.runtime.files import AnyPath, put, writing
+from roadeval.runtime.sentence import Sentence
 
 MB: Final = 1_000_000
 
@@ -92,7 +93,7 @@ def pack(
     problem = describe(packed.path).problem if truth is not None else ""
     if not problem:
         return packed
-    warning = f"packed, but replay needs more settings: {problem}"
+    warning = Sentence("packed, but replay needs more settings: ", problem)
     return replace(packed, warnings=(*packed.warnings, warning))
 
 

@@ -48,6 +48,7 @@ from roadeval.logs.truth.pairing import (
     frames_of,
     tolerance,
 )
+from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.runtime.text import visible
 
 TRUTH: Final = "/truth"
@@ -121,15 +122,17 @@ class Selection:
     @property
     def notes(self) -> tuple[str, ...]:
         """Return warnings about the camera's images, a sentence each."""
-        notes = []
+        notes = list[str]()
         if self.white not in (None, 1, WHITE):
-            notes.append(f"a sample of {self.white:g} is white; `frames.white` sets another")
+            white = f"a sample of {self.white:g} is white; "
+            notes.append(Sentence(white, Setting("frames.white"), " sets another"))
         if self.image.turned != 1:
             how = "turned, as their EXIF orientation or display matrix asks"
-            what = f"{how}; `frames.unturned` leaves them as stored"
+            unturned = Setting("frames.unturned")
+            what: str = Sentence(f"{how}; ", unturned, " leaves them as stored")
             if not self.camera.images.limits.turn:
                 what = f"as stored, and would be {how}, by viewers and annotation tools"
-            notes.append(f"its images are {what}")
+            notes.append(Sentence("its images are ", what))
         return tuple(notes)
 
     def among_truth(self, numbers: Sequence[int]) -> Sequence[int]:
@@ -146,24 +149,27 @@ class Selection:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Which topics were chosen and why, a sentence each."""
-        lines = [f"image: {self.image.name} ({'; '.join((self.image_why, *self.notes))})"]
+        about = Sentence("; ").join((self.image_why, *self.notes))
+        lines: list[str] = [Sentence(f"image: {self.image.name} (", about, ")")]
         for name, source in self.labels.items():
             what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
             words = source.meaning.words
             if name == SHADOW:
                 words = words.replace("road is", "shadow is")
             lines.append(f"{what}: {source.where} ({source.why}; {words})")
-            lines += [f"{what}: {note}" for note in (*source.notes, *source.meaning.notes)]
+            notes = (*source.notes, *source.meaning.notes)
+            lines += [Sentence(f"{what}: ", note) for note in notes]
         if known := self.calibration:
             place = f", mounted in {known.mounting.parent}" if known.mounting else ""
             model = known.model or f"{'a nameless' if known.bends else 'no'} distortion"
             lines.append(f"calibration: {known.topic} ({model}{place})")
         if self.calibration_why:
-            lines.append(f"{'' if known else 'no '}calibration: {self.calibration_why}")
+            begin = "calibration: " if known else "no calibration: "
+            lines.append(Sentence(begin, self.calibration_why))
         if self.ground_why:
             lines.append(self.ground_why)
         if self.no_truth:
-            lines.append(f"no truth: {self.no_truth}")
+            lines.append(Sentence("no truth: ", self.no_truth))
         if (clock := self.camera.clock) is not Clock.STAMP:
             lines.append(f"the header stamps are all zero or equal; used in place of them: {clock}")
         return tuple(lines)
@@ -198,11 +204,12 @@ def settle(
     choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow)}
     # What would be scored against itself is refused.
     if truth.topic == image:
-        raise LogError(f"`topics.truth` {image.name}: it is the image's own topic")
+        raise LogError(f"{image.name} is the image's own topic", setting="topics.truth")
     for name, topic in asked.masks.items():
-        choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
+        setting = f"topics.masks.{name}"
+        choices[name] = Choice(named(topics, topic, setting), "asked for")
         if choices[name].topic == truth.topic:
-            raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
+            raise LogError(f"{topic} is the truth that it is scored against", setting=setting)
     images = readers[image.name]
     most_ns = tolerance(images, asked.sync_tolerance_ms)
     camera = Camera(images, image, clock_of(images), most_ns, asked.resize_truth)
@@ -217,10 +224,12 @@ def settle(
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     known = calibration_of(image, topics, readers)
     if any(known) and image.turned != 1 and camera.images.limits.turn:
-        known = None, "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
+        turned = "it is of the sensor's rows, and the images are turned ("
+        known = None, Sentence(turned, Setting("frames.unturned"), ")")
     ground, ground_why = ground_of(known[0], config.ground, image.size)
     if any(config.ground.distortion) and is_rectified(image.name):
-        ground_why += "; `ground.distortion` is applied although the topic's name says rectified"
+        rectified = " is applied although the topic's name says rectified"
+        ground_why = Sentence(ground_why, "; ", Setting("ground.distortion"), rectified)
     return Selection(
         camera,
         why,
@@ -274,7 +283,7 @@ def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
         try:
             to_rgb(picture, reader.limits)
         except BadMessage as error:
-            problem = problem or str(error)
+            problem = problem or error.sentence
         else:
             return
     raise nothing_of(reader, problem)
@@ -327,7 +336,7 @@ class Accounting:
     def losses(self) -> tuple[str, ...]:
         """Return a sentence on each undecodable frame that is not ``in_chunks``."""
         lost = sorted(self.undecodable.keys() - self.in_chunks)
-        return tuple(f"frame {number}: {self.undecodable[number]}" for number in lost)
+        return tuple(Sentence(f"frame {number}: ", self.undecodable[number]) for number in lost)
 
     @property
     def notes(self) -> Iterator[str]:
@@ -349,9 +358,10 @@ class Accounting:
             )
         if len(self.frame_ids) > 1:
             names = [f"{visible(name)} ({count})" for name, count in self.frame_ids.items()]
-            yield (
-                f"the images are of several cameras, by frame_id: {first_of(names, NAMED)}; "
-                "`topics.frame_id` chooses one"
+            yield Sentence(
+                f"the images are of several cameras, by frame_id: {first_of(names, NAMED)}; ",
+                Setting("topics.frame_id"),
+                " chooses one",
             )
         for level in ("black", "white"):
             blank = [number for number, colour in self.blank.items() if colour == level]
@@ -413,11 +423,10 @@ class LoggedFrame:
         try:
             return self._decode()
         except (BadMessage, FrameError) as error:
-            reason = f"frame {self.number}: {error}"
-            self.accounting.undecodable[self.number] = str(error)
+            self.accounting.undecodable[self.number] = error.sentence
             if isinstance(self.picture, LostMessageError):
                 self.accounting.in_chunks.add(self.number)
-            raise FrameError(reason) from error
+            raise FrameError.of(error, f"frame {self.number}") from error
 
     def _decode(self) -> Frame:
         import cv2
@@ -464,7 +473,7 @@ class LoggedFrame:
         try:
             label = self.selection.labels[name].meaning.read(picture, camera.images.limits)
         except BadMessage as error:
-            raise FrameError(f"{place}: {error}") from error
+            raise FrameError.of(error, place) from error
         told = place, label.truth.shape[1::-1], "its image", sizes[0]
         if problem := size_problem(*told, resize=camera.resize_labels):
             raise FrameError(problem)
@@ -539,11 +548,12 @@ class FrameStream:
             shown = f"{name.removeprefix('/')}: "
             count, away = partners.unpaired(of_all=asked == self.accounting.in_log)
             if count:
-                yield (
+                yield Sentence(
                     f"{shown}{count} of the {len(source.pictures)} labels of {source.where} belong "
                     f"to no frame: the first is {away / 1e6:.1f} ms from the nearest, and "
-                    f"{source.pairing.tolerance / 1e6:.1f} may lie between "
-                    "(`topics.sync_tolerance_ms`)"
+                    f"{source.pairing.tolerance / 1e6:.1f} may lie between (",
+                    Setting("topics.sync_tolerance_ms"),
+                    ")",
                 )
             if partners.missed:
                 lost = f"{partners.missed} frames have no label: the one in reach lies nearer to"

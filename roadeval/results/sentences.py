@@ -17,6 +17,7 @@ from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import FILTER, final_stages
 from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
+from roadeval.runtime.sentence import Sentence
 
 FINE: Final = 0.005
 """Levels that differ by less are given with two digits."""
@@ -215,7 +216,7 @@ def misfit(found: Finding, period_ms: float | None, remedy: str) -> str:
             ways = ((found.right, "right", "left"), (found.down, "down", "up"))
             parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]
             what = f"moved by {' and '.join(parts)}: moved back {_it(verb)} images and truth better"
-    return f"{subject} {verb} {what}. {remedy}"
+    return Sentence(f"{subject} {verb} {what}. ", remedy)
 
 
 def _it(verb: str) -> str:

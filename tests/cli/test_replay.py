@@ -8,6 +8,7 @@ from roadeval.cli.options import OPTIONS, with_flags
 from roadeval.jobs.progress import Progress
 from roadeval.jobs.run.replay import Outcome
 from roadeval.results.facts import DriveFacts, FrameAccount
+from roadeval.runtime.sentence import Sentence, Setting
 from tests.results.making import facts_of
 
 FACTS = facts_of(
@@ -82,8 +83,8 @@ def test_a_model_and_training_frames_do_not_go_together(capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--road-label 3 --road-label 70000", "--road-label, item 2: must be at most 65535"),
-        (f"--road-label {'9' * 5000}", "--road-label, item 1: must be a whole number"),
+        ("--road-label 3 --road-label 70000", "--road-label: item 2 must be at most 65535"),
+        (f"--road-label {'9' * 5000}", "--road-label: item 1 must be a whole number"),
         ("--every 0", "--every: must be at least 1 (given: 0)"),
     ],
 )
@@ -106,20 +107,19 @@ def test_every_option_s_words_are_a_setting_s_value(asked):
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("lower `training.frames` or `frames.scale`", "lower --train-frames or --scale"),
-        ("name it with `topics.truth`.", "name it with --truth-topic."),
-        ("a.toml: frames.every: bad", "a.toml: frames.every: bad"),
-        ("output.mcap: No such file", "output.mcap: No such file"),
-        ("`training.source` has no flag", "`training.source` has no flag"),
-        ("`masks` my-net: bad", "--masks my-net: bad"),
+        (("lower ", Setting("training.frames"), ", or wait"), "lower --train-frames, or wait"),
+        (("a `topics.truth` that is text",), "a `topics.truth` that is text"),
+        ((Setting("training.source"), " has no flag"), "`training.source` has no flag"),
+        ((Setting("masks"), " my-net: bad"), "--masks my-net: bad"),
         (
-            "`masks.my-net.labels.road` is missing",
+            (Setting("masks.my-net.labels.road"), " is missing"),
             "`labels.road` in the file of --masks my-net=FILE.toml is missing",
         ),
+        ((Setting("topics.masks.net"), ": bad"), "--mask-topic net: bad"),
     ],
 )
-def test_names_of_settings_become_flags(text, shown):
-    assert with_flags(text) == shown
+def test_settings_in_a_sentence_are_named_by_their_flags(text, shown):
+    assert with_flags(Sentence(*text)) == shown
 
 
 def test_warnings_are_told_even_when_quiet(asked, capsys):

@@ -55,7 +55,7 @@ def test_a_mistyped_command_is_guessed(capsys):
         ),
         (
             ["replay", "a.mcap", "--ignore-label", "3"],
-            "--ignore-label needs --road-label: name the values that mean road",
+            "--ignore-label: needs --road-label; name the values that mean road",
         ),
         (
             ["replay", "a.mcap", "--variant", "mine"],

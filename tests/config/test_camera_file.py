@@ -85,10 +85,10 @@ def test_of_several_cameras_the_topic_of_the_images_tells_which(tmp_path: Path):
     ("text", "said"),
     [
         (yaml.dump({"cam0": {**FRONT, "camera_model": "omni"}}), "cam0 is of the model omni"),
-        (OST.replace("-0.3", ".nan"), "ground.distortion, item 1"),
-        (OST.replace("560.5", "-1"), "ground.focal, item 1"),
+        (OST.replace("-0.3", ".nan"), "ground.distortion: item 1"),
+        (OST.replace("560.5", "-1"), "ground.focal: item 1"),
         (OST.replace("560.5", "fx"), "no camera as ROS's camera_calibration"),
-        (OST.replace("image_width: 640", "image_width: [640]"), "ground.size, item 1"),
+        (OST.replace("image_width: 640", "image_width: [640]"), "ground.size: item 1"),
         (OST.replace("  data: [560.5", "  dates: [560.5"), "no camera as ROS's camera_calibration"),
         (yaml.dump({"cam0": {**FRONT, "intrinsics": []}}), "no camera as ROS's"),
         ("- 1\n- 2\n", "no camera as ROS's camera_calibration"),

@@ -98,7 +98,7 @@ def test_user_and_password_of_a_url_are_sent(server):
         ("410/a.mcap", "the server cannot give it"),
         ("503/a.mcap", "the server cannot give it"),
         ("unknown/a.mcap", "the server does not state its length"),
-        ("early/a.mcap", "the server gives no parts of files: copy it here"),
+        ("early/a.mcap", "the server gives no parts of files; copy the file here"),
         ("retagged/a.mcap", "it changed while it was read"),
         ("touched/a.mcap", "it changed while it was read"),
         ("grown/a.mcap", "it changed while it was read"),

@@ -51,6 +51,7 @@ from roadeval.evaluation.tables import (
     rates_of,
     values_of,
 )
+from roadeval.runtime.sentence import Sentence, Setting
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -529,14 +530,15 @@ def _warnings(
                 "lacks them or trained on them"
             )
     of_the_log = [
-        f"`{name}` {setting(before)} and {setting(after)}"
+        Sentence(Setting(name), f" {setting(before)} and {setting(after)}")
         for name, (before, after) in changed.items()
         if name.startswith(_OF_THE_LOG)
     ]
     if of_the_log:
-        yield (
-            f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
-            " part of the change may be theirs"
+        yield Sentence(
+            f"{base} and {new} were replayed with different settings (",
+            Sentence(", ").join(of_the_log),
+            "): part of the change may be theirs",
         )
     if relabelled := sums["relabelled"]:
         guess = "" if of_the_log else " (other labels or topics?)"

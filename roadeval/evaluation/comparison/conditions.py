@@ -40,6 +40,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
 from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.runtime.sentence import Sentence, Setting
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     ">": operator.gt,
@@ -127,7 +128,7 @@ class Condition:
 
     def unjudged(self, result: str, because: str) -> Judgement:
         """Return that it could not be judged on a result, and why."""
-        why = f"{self.text}: not judged in {result}, because {because}"
+        why = Sentence(f"{self.text}: not judged in {result}, because ", because)
         nan = math.nan
         return Judgement(self, result, 0, nan, nan, nan, None, None, None, why)
 
@@ -185,9 +186,10 @@ def _unjudged(
     base, new = results[0], next(each for each in results if each.label == mask.result)
     names = f"{base.label} and {new.label}"
     if None not in (base.scale, new.scale) and base.scale != new.scale:
-        return (
-            f"{names} were replayed with `frames.scale` {base.scale:g} and {new.scale:g}; replay "
-            "both at one scale, or limit in %"
+        return Sentence(
+            f"{names} were replayed with ",
+            Setting("frames.scale"),
+            f" {base.scale:g} and {new.scale:g}; replay both at one scale, or limit in %",
         )
     if new.relabelled:
         return (

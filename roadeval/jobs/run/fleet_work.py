@@ -336,7 +336,7 @@ def _trained(task: FoldTask, about: Path, wanted: str) -> FoldModel:
     try:
         model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
     except TrainingError as error:
-        return FoldModel(task.fold, "", str(error))
+        return FoldModel(task.fold, "", error.sentence)
     save_model(model, task.path)
     digest = sha256_of(task.path)
     told = {

@@ -40,6 +40,7 @@ from roadeval.results.facts import (
 )
 from roadeval.results.sentences import misfit, verdict
 from roadeval.results.tables import TableFacts
+from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def of(run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFa
     return Facts(
         **found,
         effects=[*effects],
-        verdict=" ".join([*misfits, said, *varying]),
+        verdict=Sentence(" ").join([*misfits, said, *varying]),
         misfits=misfits,
         unlabelled=unlabelled,
         estimate=estimated,
@@ -196,11 +197,11 @@ def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -
         first = pictures.first + finding.frames
         setting = "truth" if is_truth else f"masks.{finding.subject}"
         if pictures.by == "number" and first >= 0:
-            remedy = f"Set `{setting}.first` to {first}."
+            remedy = Sentence("Set ", Setting(f"{setting}.first"), f" to {first}.")
     by_time = source is not None and isinstance(source.pairing.images, TopicReader)
     if finding.misfit is Misfit.LAG and is_truth and period_ms and by_time:
         offset = config.topics.sync_offset_ms - finding.frames * period_ms
-        remedy = f"Set `topics.sync_offset_ms` to {offset:.0f}."
+        remedy = Sentence("Set ", Setting("topics.sync_offset_ms"), f" to {offset:.0f}.")
     pixels = {name: round(getattr(finding, name) / selection.scale) for name in ("right", "down")}
     finding = replace(finding, **pixels)
     return misfit(finding, period_ms, remedy)
@@ -238,7 +239,9 @@ def of_cameras(
     by_camera = tables.totals(frames, ["camera", *tables.MASK])
     totals = tables.as_trees(tables.over_cameras(by_camera))
     effects = drive_effects(frames, first.evaluation)
-    misfits = [f"{name}: {text}" for name, own in found.items() for text in own.misfits]
+    misfits: list[str] = [
+        Sentence(f"{camera}: ", text) for camera, own in found.items() for text in own.misfits
+    ]
     claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
     accounts = [asdict(each.frames) for each in found.values()]
     skipped = Counter[str]()
@@ -248,7 +251,7 @@ def of_cameras(
     return replace(
         first,
         effects=effects,
-        verdict=" ".join([*misfits, verdict(totals, effects, claims)]),
+        verdict=Sentence(" ").join([*misfits, verdict(totals, effects, claims)]),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
@@ -283,7 +286,8 @@ def _by_camera(found: Mapping[str, Sequence[str]]) -> Iterator[str]:
     """Yield the cameras' sentences: with the camera's name, but for what all say."""
     common = [each for each in next(iter(found.values())) if all(each in s for s in found.values())]
     yield from common
-    yield from (f"{name}: {e}" for name, own in found.items() for e in own if e not in common)
+    for camera, sentences in found.items():
+        yield from (Sentence(f"{camera}: ", text) for text in sentences if text not in common)
 
 
 def versions() -> dict[str, str]:
@@ -295,7 +299,7 @@ def versions() -> dict[str, str]:
 def warnings(run: Run, totals: Totals) -> tuple[str, ...]:
     """List what a user should know before believing the results."""
     missing = run.selection.no_truth
-    unlabelled = f"there is no road truth to score against, only masks to look at: {missing}"
+    unlabelled = "there is no road truth to score against, only masks to look at: "
     warned = []
     selection, prior = run.selection, run.model.prior
     scale = run.config.frames.scale
@@ -313,12 +317,12 @@ def warnings(run: Run, totals: Totals) -> tuple[str, ...]:
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
     if selection.ground and (lens := selection.calibration) and selection.calibration_why:
-        warned.append(f"metres rest on {lens.topic}: {selection.calibration_why}")
+        warned.append(Sentence(f"metres rest on {lens.topic}: ", selection.calibration_why))
     return (
-        *((unlabelled, *_most_doubtful(run)) if missing else ()),
+        *((Sentence(unlabelled, missing), *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
         *(str(damage) for damage in run.log.damage if not damage.lossy),
-        *(f"{run.selection.image.name}: {note}" for note in run.selection.notes),
+        *(Sentence(f"{run.selection.image.name}: ", note) for note in run.selection.notes),
         *run.frames.accounting.notes,
         *tuple(warned),
         *_taken(run),
@@ -338,7 +342,7 @@ def _most_doubtful(run: Run) -> Iterator[str]:
         kept = f"kept the frames that are most in doubt, by {found.sign} of {found.variant}"
         if found.sign not in RANKS_AT_ONCE:
             kept = "kept no pictures: one method alone says nothing by which a frame could rank"
-        yield f"without truth `output.record` {rule} {kept}"
+        yield Sentence("without truth ", Setting("output.record"), f" {rule} {kept}")
 
 
 def _of_picks(run: Run) -> Iterator[str]:
@@ -374,9 +378,10 @@ def _taken(run: Run) -> Iterator[str]:
     for name, stages in run.methods.items():
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
         if probable and not name.endswith(TUNED):
-            yield (
+            yield Sentence(
                 f"{name}: the network's output is taken for probabilities, for it stays within 0 "
-                "and 1; if it holds logits, write `activation` in its file"
+                "and 1; if it holds logits, set ",
+                Setting("net.activation"),
             )
 
 
@@ -412,10 +417,13 @@ def _sparse(run: Run) -> Iterator[str]:
         )
     if run.selection.truth is not None and not run.frames.accounting.labelled:
         stride = run.config.frames.every
-        why = f": `frames.every` {stride} leaves out each one that has" if stride > 1 else ""
-        yield (
-            f"none of the frames that were read has road truth{why}; `frames.labelled` reads only "
-            "frames that have"
+        why = Sentence(": ", Setting("frames.every"), f" {stride} leaves out each one that has")
+        yield Sentence(
+            "none of the frames that were read has road truth",
+            why if stride > 1 else "",
+            "; ",
+            Setting("frames.labelled"),
+            " reads only frames that have",
         )
 
 
@@ -440,7 +448,8 @@ def _missing(run: Run, totals: Totals) -> Iterator[str]:
             )
         if unused := masks.pairing.unused:
             yield f"{shown}: {unused} labels of {where} belong to no frame"
-        yield from (f"{shown}: {where}: {note}" for note in (*masks.notes, *masks.meaning.notes))
+        notes = (*masks.notes, *masks.meaning.notes)
+        yield from (Sentence(f"{shown}: {where}: ", note) for note in notes)
     yield from run.frames.unpaired()
 
 

@@ -29,6 +29,7 @@ from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, Topi
 from roadeval.logs.messages.frame_numbers import FrameNumbers
 from roadeval.logs.settings import parse_time
 from roadeval.runtime.discovery import found_in
+from roadeval.runtime.sentence import Sentence, Setting
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,7 +369,7 @@ class Video:
                 unit.pts = unit.dts = position
                 self._take(decoder, unit, waiting)
             except (BadMessage, FrameError) as error:
-                self._ready[position] = FrameError(str(error))
+                self._ready[position] = FrameError.of(error)
                 broken = broken or LOST
             yield True
         if decoder is not None:
@@ -428,21 +429,24 @@ class Video:
         if share > _STRAY:
             self.notes.setdefault(
                 "range",
-                f"{100 * share:.0f} % of the luma of frame {frame.pts} lies beyond 16 to 235, and "
-                "the video does not say which range it has: if it is the full one, as of converted "
-                "JPEGs, set `frames.full_range`",
+                Sentence(
+                    f"{100 * share:.0f} % of the luma of frame {frame.pts} lies beyond 16 to 235, "
+                    "and the video does not say which range it has: if it is the full one, as of "
+                    "converted JPEGs, set ",
+                    Setting("frames.full_range"),
+                ),
             )
 
     def _reason(self, decoder: Any, error: Any) -> str:
         """Return why a packet cannot be decoded: its size, where the decoder tells it."""
         reason = f"its video cannot be decoded: {error.strerror}"
         if not (decoder.width and decoder.height):
-            most = f"{self._limits.max_pixels} pixels that `frames.max_pixels` allows"
-            return f"{reason}, or it has more than the {most}"
+            most = f", or it has more than the {self._limits.max_pixels} pixels that "
+            return Sentence(reason, most, Setting("frames.max_pixels"), " allows")
         try:
             self._limits.check(decoder.width, decoder.height)
         except ImageError as too_large:
-            return str(too_large)
+            return too_large.sentence
         return reason
 
 

@@ -20,6 +20,7 @@ from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.topics.choose import words
 from roadeval.logs.topics.reader import Size, TopicInfo, TopicReader
+from roadeval.runtime.sentence import Sentence, Setting
 
 LOOKED_AT: Final = 100
 """Messages of static transforms that are read, at most, of each topic."""
@@ -38,7 +39,7 @@ Known = tuple[Calibration | None, str]
 
 RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undistorted"})
 """Words of topics of images without distortion."""
-_ADVICE: Final = "give its lens with `ground`"
+_ADVICE: Final = Sentence("give its lens with ", Setting("ground"))
 
 
 def is_rectified(name: str) -> bool:
@@ -73,7 +74,7 @@ def calibration_of(
     (topic,) = best
     frame, lens, why = matching[topic]
     if lens is None:
-        return None, f"{topic}: {why}"
+        return None, Sentence(f"{topic}: ", why)
     reader = readers[topic]
     with suppress(*_UNREADABLE):
         last, _ = _read(topic, reader.fields(len(reader) - 1), image)
@@ -92,7 +93,7 @@ def calibration_of(
         notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read so")
         mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
         lens = replace(lens, frame_id=f"{frame}_optical")
-    return replace(lens, mounting=mounting), "; ".join(notes)
+    return replace(lens, mounting=mounting), Sentence("; ").join(notes)
 
 
 def _shared(one: str, other: str) -> int:
@@ -108,7 +109,8 @@ def _lens_of(
 
     Some drivers send zeros until they are ready: few are read, ever farther from the first one.
     """
-    frame, why = "", "no message can be read"
+    frame: str = ""
+    why: str = "no message can be read"
     positions = {0, *(1 << power for power in range(7)), len(reader) - 1}
     for position in sorted(positions & {*range(len(reader))}):
         try:
@@ -116,7 +118,8 @@ def _lens_of(
             frame = str(getattr(message, "header", message).frame_id)
             lens, why = _read(topic.name, message, image)
         except _UNREADABLE:
-            why = f"its {topic.encoding} messages of {topic.schema} cannot be read: {_ADVICE}"
+            unread = f"its {topic.encoding} messages of {topic.schema} cannot be read: "
+            why = Sentence(unread, _ADVICE)
             continue
         if lens is not None:
             return frame, lens, why
@@ -137,7 +140,8 @@ def _read(topic: str, message: Any, image: TopicInfo) -> Known:
     if is_rectified(image.name):
         flat = replace(lens, matrix=(*p[:3], *p[4:7], *p[8:11]), model="", distortion=())
         if lens.bends and not any(p):
-            return None, f"its projection P is zero, and the images are rectified: {_ADVICE}"
+            zero = "its projection P is zero, and the images are rectified: "
+            return None, Sentence(zero, _ADVICE)
         if lens.bends and np.array_equal(flat.matrix, lens.matrix):
             note = "the images are taken as not rectified: P is K, and there is distortion"
         elif any(p):
@@ -145,7 +149,7 @@ def _read(topic: str, message: Any, image: TopicInfo) -> Known:
     if lens.problem:
         return None, f"its {lens.problem}"
     fitted, said = _fitted(lens, message, image.size or size)
-    return fitted, "; ".join(filter(None, (note, said)))
+    return fitted, Sentence("; ").join(filter(None, (note, said)))
 
 
 def _fitted(full: Calibration, message: Any, size: Size) -> Known:
@@ -169,7 +173,7 @@ def _fitted(full: Calibration, message: Any, size: Size) -> Known:
     for lens in (part, full):
         if lens.has_shape(*size):
             note = f"it is for images of {lens.width}x{lens.height}, and scaled"
-            return lens.scaled(*size), "; ".join(filter(None, (note, lens.doubt)))
+            return lens.scaled(*size), Sentence("; ").join(filter(None, (note, lens.doubt)))
     return None, f"it is for images of {part.width}x{part.height}"
 
 

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.reader import TopicInfo
+from roadeval.runtime.sentence import Sentence, Setting
 
 
 def _set(text: str) -> frozenset[str]:
@@ -65,7 +66,7 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
     candidates.
     """
     if asked is not None:
-        return named(topics, asked, "`topics.image`"), "asked for"
+        return named(topics, asked, "topics.image"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
     sent = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
@@ -79,14 +80,14 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         why = "the only camera image" if len(images) > 1 else "the only image topic"
         return cameras[0], f"{why}, of {len(sent)} transports" if len(sent) > 1 else why
     if cameras:
+        choose = Sentence("choose one with ", Setting("topics.image"))
         raise LogError(
-            f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or "
-            "give it once for each of several"
+            f"{len(cameras)} image topics: {_names(cameras)}",
+            remedy=Sentence(choose, ", or give it once for each of several"),
         )
     if images:
-        raise LogError(
-            f"only label images: {_names(images)}; choose the camera's with `topics.image`"
-        )
+        choose = Sentence("choose the camera's with ", Setting("topics.image"))
+        raise LogError(f"only label images: {_names(images)}", remedy=choose)
     listed = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
     more = ", ..." if len(topics) > 8 else ""
     raise LogError(f"no image topic; the log has: {listed or 'no topics at all'}{more}")
@@ -109,13 +110,13 @@ def choose_truth(
     labels of these are none of this one's.
     """
     if asked is not None:
-        return _asked_for(topics, asked, "`topics.truth`")
+        return _asked_for(topics, asked, "topics.truth")
     candidates = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
     roads = [topic for topic in candidates if not topic.lossy]
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
     of_camera = [topic for topic in roads if topic.name not in elsewhere]
     colors = bool(labels.road_colors)
-    truth = _only(_clear_truths(of_camera, image, colors=colors), image, "label", "`topics.truth`")
+    truth = _only(_clear_truths(of_camera, image, colors=colors), image, "label", "topics.truth")
     if truth is not None:
         by = "colours" if truth.channels == 3 else "single channel"
         return Choice(truth, f"the label image, by its name and its {by}")
@@ -125,12 +126,16 @@ def choose_truth(
         if of_rig:
             return Choice(None, why)
         raise LogError(
-            f"{why}: name it with `topics.truth` to use it nevertheless, or give an empty name "
-            "there to continue without truth"
+            why,
+            remedy=Sentence(
+                "name it with ",
+                Setting("topics.truth"),
+                " to use it nevertheless, or give an empty name there to continue without truth",
+            ),
         )
     if roads:
-        why = "no topic is clearly road truth; name one with `topics.truth`:"
-        return Choice(None, f"{why} {_names(roads)}")
+        why = Sentence("no topic is clearly road truth; name one with ", Setting("topics.truth"))
+        return Choice(None, Sentence(why, f": {_names(roads)}"))
     if not candidates:
         return Choice(None, "no label topic")
     why = lossy_labels(candidates[0].name, candidates[0].lossy)
@@ -161,7 +166,7 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
     A `LogError` if the one asked for is not there or no image, or if several are candidates.
     """
     if asked is not None:
-        return _asked_for(topics, asked, "`topics.shadow`")
+        return _asked_for(topics, asked, "topics.shadow")
     shadows = [
         topic
         for topic in _label_topics(topics, image)
@@ -170,7 +175,7 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
         and not topic.lossy
         and not other_camera(topic, image, topics)
     ]
-    shadow = _only(shadows, image, "shadow", "`topics.shadow`")
+    shadow = _only(shadows, image, "shadow", "topics.shadow")
     why = "the shadow mask, by its name and its single channel" if shadow else "no shadow topic"
     return Choice(shadow, why)
 
@@ -233,7 +238,8 @@ def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicIn
     else:
         return
     pattern = re.sub(r"\d+[^/]*$", "*", min(cameras.values()))
-    raise LogError(f"{problem}: choose those that count by `truth.names`, as '{pattern}'")
+    choose = Sentence("choose those that count by ", Setting("truth.names"), f", as '{pattern}'")
+    raise LogError(problem, remedy=choose)
 
 
 def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
@@ -270,12 +276,12 @@ def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
     for topic in topics:
         if topic.name == name and topic.is_image:
             if not topic.count:
-                raise LogError(f"{setting} {name}: the topic holds no message")
+                raise LogError(f"{name} holds no message", setting=setting)
             return topic
     valid = _names(topic for topic in topics if topic.is_image) or "none"
     there = any(topic.name == name for topic in topics)
     what = "carries no images" if there else "is not in the log"
-    raise LogError(f"{setting} {name}: {what}; its image topics are: {valid}")
+    raise LogError(f"{name} {what}", setting=setting, remedy=f"its image topics are: {valid}")
 
 
 def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 import numpy as np
 
+from roadeval.errors import RoadevalError
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, listed, of_ids, some
@@ -112,7 +113,7 @@ def _parsed(file: Path) -> Any:
             case _:
                 return content.decode()
     except OSError as error:
-        raise LogError(f"{file}: {error.strerror}") from error
+        raise LogError(error.strerror or str(error), where=file) from error
     except (ValueError, ParseError) as error:
         reason = str(error)
         if isinstance(error, ParseError):
@@ -120,7 +121,7 @@ def _parsed(file: Path) -> Any:
             reason = f"it is no XML, or ends early (line {line}, column {column + 1})"
         elif isinstance(error, UnicodeDecodeError):
             reason = "it is not in UTF-8"
-        raise LogError(f"{file}: cannot be read as labels: {reason}") from error
+        raise LogError(f"cannot be read as labels: {reason}", where=file) from error
 
 
 def _drawn(
@@ -146,8 +147,8 @@ def _drawn(
     labelled = settled(labelled, meant, broken, notes)
     if not labelled:
         image, problem = next(iter(broken.items()), (files[0], f"{format_.name} without a shape"))
-        where = "" if str(files[0]) == str(image) else f"{files[0]}: "
-        raise LogError(f"{where}{image}: {problem}")
+        where = image if str(files[0]) == str(image) else f"{files[0]}: {image}"
+        raise LogError(problem, where=where)
     classes = {name: value for value, name in enumerate(occurring, 1)}
     labels = [_label(drawing, classes, format_) for drawing in labelled]
     labels += [NamedLabel(Path(name), bytes, partial(_raise, why)) for name, why in broken.items()]
@@ -176,18 +177,18 @@ def _images_in(
                 except _WRONG as error:
                     broken[drawing.image] = _in_words(error, format_)
         except _WRONG as error:
-            damaged[file] = _in_words(error, format_).removeprefix(f"{file}: ")
+            damaged[file] = _in_words(error, format_)
     for file, problem in damaged.items():
         if file in images_in or max(images_in.values(), default=0) > 1:
-            raise LogError(f"{file}: {problem}")
+            raise LogError(problem, where=file)
         broken[str(file)] = problem
     return drawings, broken, others
 
 
 def _in_words(error: Exception, format_: LabelFormat) -> str:
     """Return what is wrong with a file, or with the label of an image."""
-    if not isinstance(error, _NOT_SO) or isinstance(error, ImageError):
-        return str(error)
+    if isinstance(error, RoadevalError):
+        return error.reason
     lacking = f" (it has no {error})" if isinstance(error, KeyError) else ""
     return f"an annotation is not as {format_.name} writes it{lacking}"
 

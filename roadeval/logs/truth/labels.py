@@ -21,7 +21,7 @@ import numpy.typing as npt
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Rgb, Truth
 from roadeval.data.words import counted
 from roadeval.images.formats import Limits
-from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.errors import BadMessage, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import (
@@ -47,6 +47,7 @@ from roadeval.logs.truth.pairing import (
     check_times,
     frames_of,
 )
+from roadeval.runtime.sentence import Sentence, Setting
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
@@ -59,12 +60,17 @@ _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 2
 """Masks that need no settings: what their values mean."""
 BLURRED: Final = 48
 """How far JPEG may move the levels of a mask of 0 and 255."""
-TWO_KINDS: Final = (
-    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road with "
-    "`labels.road`, both where both do"
+TWO_KINDS: Final = Sentence(
+    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road "
+    "with ",
+    Setting("labels.road"),
+    ", both where both do",
 )
-NAME_THEM: Final = (
-    "name those that mean road with `labels.road`, and those to leave out with `labels.ignore`"
+NAME_THEM: Final = Sentence(
+    "name those that mean road with ",
+    Setting("labels.road"),
+    ", and those to leave out with ",
+    Setting("labels.ignore"),
 )
 ALONE: Final = "road"
 """The class that means road where labels have no other."""
@@ -141,7 +147,7 @@ class ClassMap:
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
         is_second = self.others == UNKNOWN and self.meaning.get(255) == IGNORE
         if is_second and (truth == IGNORE).any() and not (truth == ROAD).any():
-            raise BadMessage(f"it holds 255 but no 1: {TWO_KINDS}")
+            raise BadMessage("it holds 255 but no 1", remedy=TWO_KINDS)
         return truth
 
 
@@ -210,8 +216,8 @@ def seen_in(
     values, counts = np.unique(packed, return_counts=True)
     if pixels.ndim != 2 and not labels.road_colors:
         raise LogError(
-            f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}: name those "
-            "that mean road with `labels.road_colors`"
+            f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}",
+            remedy=Sentence("name those that mean road with ", Setting("labels.road_colors")),
         )
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
@@ -259,7 +265,8 @@ def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name:
             words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
             words += f"; {NO_LABEL}" if has_negatives else ""
             return ClassMap(truths, UNKNOWN, False, words)
-    raise LogError(f"{name} holds the values {_listed(map(str, values))}: {remedy}")
+    problem = f"{name} holds the values {_listed(map(str, values))}"
+    raise UnclearLabelsError(problem, remedy=remedy)
 
 
 def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
@@ -272,7 +279,7 @@ def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     road = labels.road or ((ALONE,) if {*classes} == {ALONE} else ())
     there = _counted(origin, classes)
     if not road:
-        raise LogError(f"{name} has the classes {there}: {NAME_THEM}")
+        raise UnclearLabelsError(f"{name} has the classes {there}", remedy=NAME_THEM)
     if origin.lost:
         there += f"; {counted(origin.lost, 'label')} of it cannot be read"
     # A class may be called 7.
@@ -303,7 +310,8 @@ def _as_named(
         words.append([])
         for name in named:
             if name not in codes:
-                raise LogError(f"`labels.{setting}{ending}` {text(name)} does not occur in {there}")
+                problem = f"{text(name)} does not occur in {there}"
+                raise LogError(problem, setting=f"labels.{setting}{ending}")
             meaning[codes[name]] = truth
             words[-1].append(text(name))
     return ClassMap(meaning, NON_ROAD, bool(ending), _words(*words))
@@ -421,12 +429,14 @@ def beside_log(
         where, words = f"{labels.name} of {log}" if log else labels.name, by
         words = words if settings.pair else camera.clock
     else:
-        raise LogError("`truth.images` is for labels with names: those of a log have none")
+        problem = "only labels with names can be paired so, and those of a log have none"
+        raise LogError(problem, setting="truth.images")
     if by == "stamp":
         pairing = by_time(labels, camera, offset_ms)
         check_times(pairing, labels.name)
     elif offset_ms:
-        raise LogError(f"`topics.sync_offset_ms` is for stamps, and {where} is paired by {by}")
+        problem = f"only stamps can be moved, and {where} is paired by {by}"
+        raise LogError(problem, setting="topics.sync_offset_ms")
     else:
         pairing = by_number(labels, settings, camera.images)
     meaning = meaning_of(labels, settings, camera, pairing)
@@ -470,11 +480,12 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
         return ""
     sizes = f"{label} is {theirs[0]}x{theirs[1]}, {image} {ours[0]}x{ours[1]}"
     if is_turned:
-        return (
+        return Sentence(
             f"{sizes}: one of them is turned by a quarter: turn the labels as the images are "
-            "shown, or leave these as they are stored with `frames.unturned`"
+            "shown, or leave these as they are stored with ",
+            Setting("frames.unturned"),
         )
-    return f"{sizes}: scale the labels with `topics.resize_truth`"
+    return Sentence(f"{sizes}: scale the labels with ", Setting("topics.resize_truth"))
 
 
 def check_size(
@@ -497,8 +508,8 @@ def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
     """Return the error that no picture can be decoded, with the reason of the first one."""
     if not problem:
         first = read_or_error(pictures, 0) if len(pictures) else "it holds no picture"
-        problem = str(first)
-    return LogError(f"nothing of {pictures.name} can be decoded: {problem}")
+        problem = first.sentence if isinstance(first, FrameError) else str(first)
+    return LogError(Sentence(f"nothing of {pictures.name} can be decoded: ", problem))
 
 
 def meaning_of(
@@ -524,7 +535,7 @@ def meaning_of(
             else:
                 seen.append({int(confidence.codes(picture, labels.limits).max()): 1})
         except BadMessage as error:
-            problem = problem or str(error)
+            problem = problem or error.sentence
     if not seen:
         raise nothing_of(labels, problem)
     if confidence is not None:
@@ -549,8 +560,10 @@ def meaning_of(
         f"({100 * count / pixels.total():.1f} %)"
         for value, count in pixels.most_common(8)
     )
-    doubt = (
+    doubt = Sentence(
         f"road is {100 * road / known:.2f} % of the labelled pixels that were looked at, which "
-        f"are {shares}: does `labels.road` name the road?"
+        f"are {shares}: does ",
+        Setting("labels.road"),
+        " name the road?",
     )
     return replace(meaning, notes=(doubt,))

@@ -25,6 +25,7 @@ from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.logs.truth.names import NamedLabels
+from roadeval.runtime.sentence import Sentence, Setting
 
 REACH: Final = 4
 """Messages to look at on either side: topics are logged nearly, not always, in stamp order. Where
@@ -429,10 +430,12 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
         # Labels come some moments after their images.
         whole = round(apart / NS, 0 if abs(apart / NS - round(apart / NS)) < 0.2 else 3)
         side = "before" if whole < 0 else "after"
+        setting, moved = Setting("topics.sync_offset_ms"), round(-whole * 1000)
         raise LogError(
-            f"{labels.name}: its stamps are of another clock than those of {images.name}: they lie "
-            f"about {abs(whole):g} s {side} them for the same log times; `topics.sync_offset_ms` "
-            f"{round(-whole * 1000)} moves the truth's to the images'"
+            f"its stamps are of another clock than those of {images.name}: they lie about "
+            f"{abs(whole):g} s {side} them for the same log times",
+            where=labels.name,
+            remedy=Sentence(setting, f" {moved} moves the truth's to the images'"),
         )
 
 
@@ -462,9 +465,11 @@ def _clock_of_names(
     stamped, away = (float(np.median(times)) / 1e6 for times in (behind, after))
     is_nearer = (stamped < 0, abs(stamped)) <= (away < 0, abs(away))
     if np.median(np.abs(after)) >= step and (is_nearer or (by_stamp == by_log).all()):
-        return Clock.STAMP, (
+        return Clock.STAMP, Sentence(
             f"no name is the stamp of a frame: by median they lie {stamped:.1f} ms after the "
-            "nearest one; if they are of another one, `topics.sync_offset_ms` moves them"
+            "nearest one; if they are of another one, ",
+            Setting("topics.sync_offset_ms"),
+            " moves them",
         )
     met = int(np.count_nonzero(np.abs(after) <= most))
     return Clock.LOG_TIME, (
@@ -476,16 +481,23 @@ def _clock_of_names(
 def check_times(pairing: Pairing, name: str) -> None:
     """Refuse, as a `LogError`, labels beside the log of which none has the time of a frame."""
     if not len(pairing.labels):
-        raise LogError(f"{name}: the log has no times to pair by; set `truth.pair` to number")
+        remedy = Sentence("set ", Setting("truth.pair"), " to number")
+        raise LogError("the log has no times to pair by", where=name, remedy=remedy)
     if next(frames_of(pairing), None) is None:
         theirs, ours = (
             f"{stamps.stamp(0)} to {stamps.stamp(len(stamps) - 1)}"
             for stamps in (pairing.labels, pairing.images)
         )
         raise LogError(
-            f"{name}: none of them belongs to a frame by {pairing.by}: theirs are {theirs} ns, the "
-            f"frames' {ours} ns; at most {pairing.tolerance / 1e6:g} ms may lie between "
-            "(`topics.sync_tolerance_ms`), or pair by number (`truth.pair`)"
+            f"none of them belongs to a frame by {pairing.by}: theirs are {theirs} ns, the frames' "
+            f"{ours} ns",
+            where=name,
+            remedy=Sentence(
+                f"allow more than {pairing.tolerance / 1e6:g} ms between them with ",
+                Setting("topics.sync_tolerance_ms"),
+                ", or pair by number with ",
+                Setting("truth.pair"),
+            ),
         )
 
 
@@ -506,17 +518,25 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     named, cut = labels.images, images.expected() != frames
     if named is not None and (named < frames or (named > frames and not cut)):
         raise LogError(
-            f"{name}: {settings.images} holds {named} images and the log {frames}, so it was not "
-            "made of all of them: leave `truth.images` out, and pair by number or stamp"
+            f"{settings.images} holds {named} images and the log {frames}, so it was not made of "
+            "all of them",
+            where=name,
+            setting="truth.images",
+            remedy="leave it out, and pair by number or stamp",
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
         raise LogError(
-            f"{name}: none of them belongs to a frame by {labels.by}: theirs are "
-            f"{keys[0] + first} to {keys[-1] + first} ({some([e.path for e in labels.labels])}), "
-            f"the frames' {first} to {first + frames - 1}: if {keys[0] + first} is the first "
-            "frame's, set `truth.first` to it; or name the folder of the images that the log was "
-            "made of with `truth.images`"
+            f"none of them belongs to a frame by {labels.by}: theirs are {keys[0] + first} to "
+            f"{keys[-1] + first} ({some([e.path for e in labels.labels])}), the frames' {first} "
+            f"to {first + frames - 1}",
+            where=name,
+            remedy=Sentence(
+                f"if {keys[0] + first} is the first frame's, set ",
+                Setting("truth.first"),
+                " to it; or name the folder of the images that the log was made of with ",
+                Setting("truth.images"),
+            ),
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
     unsure = frames - images.sure

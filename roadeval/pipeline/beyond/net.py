@@ -25,7 +25,7 @@ def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
         try:
             road = network.road(view.image)
         except NetworkError as error:
-            raise StageError(f"net: {error}") from error
+            raise StageError.of(error, "net") from error
         mask = Packed.of(road.mask)
         levels = (road.codes >> 8).astype(np.uint8)
         return Output(

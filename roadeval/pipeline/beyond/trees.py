@@ -270,7 +270,8 @@ def see(settings: TreesSettings, image: Rgb, opinion: Output | None = None) -> t
     if not settings.opinion:
         return scene, own
     if opinion is None:
-        raise StageError("trees: `opinion` asks for a stage before it that makes a road mask")
+        problem = "asks for a stage before it that makes a road mask"
+        raise StageError(problem, setting="trees.opinion")
     return scene, np.concatenate([own, opinions(opinion, scene.shape)])
 
 

@@ -15,7 +15,7 @@ _NO_AREAS: Final = ("polyline", "points", "tag", "skeleton")
 
 def _cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
     if content.find("track") is not None:
-        raise LogError(f"{path}: tracks of a video; export it as CVAT for images")
+        raise LogError("tracks of a video", where=path, remedy="export it as CVAT for images")
     for image in content.iter("image"):
         yield drawn.Drawing(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
 

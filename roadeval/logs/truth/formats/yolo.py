@@ -25,7 +25,7 @@ def _is_yolo(_: Path, content: str) -> bool:
 
 def _yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.Drawing]:
     if size is None:
-        raise LogError(f"{path}: its points are shares of the image's size, which is not known")
+        raise LogError("its points are shares of the image's size, which is not known", where=path)
     yield drawn.Drawing(str(path), size, _shapes(content, size))
 
 
