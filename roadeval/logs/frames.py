@@ -153,10 +153,7 @@ class Selection:
         lines: list[str] = [Sentence(f"image: {self.image.name} (", about, ")")]
         for name, source in self.labels.items():
             what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
-            words = source.meaning.words
-            if name == SHADOW:
-                words = words.replace("road is", "shadow is")
-            lines.append(f"{what}: {source.where} ({source.why}; {words})")
+            lines.append(f"{what}: {source.where} ({source.why}; {source.meaning.words})")
             notes = (*source.notes, *source.meaning.notes)
             lines += [Sentence(f"{what}: ", note) for note in notes]
         if known := self.calibration:
@@ -220,7 +217,8 @@ def settle(
             reader = readers[chosen.name]
             pairing = by_time(reader, camera, asked.sync_offset_ms if name == TRUTH else 0.0)
             check_size(chosen.size, reader, 0, camera, pairing)
-            meaning = meaning_of(reader, settings)
+            shown = "shadow" if name == SHADOW else "road"
+            meaning = meaning_of(reader, settings, shown=shown)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     known = calibration_of(image, topics, readers)
     if any(known) and image.turned != 1 and camera.images.limits.turn:

@@ -236,8 +236,10 @@ def _is_blurred(colours: Rgb) -> bool:
     return bool(is_grey and is_white.any() and np.mean((levels > BLURRED) & ~is_white) <= RARE)
 
 
-def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name: str) -> ClassMap:
-    """Decide what the values of label pictures mean.
+def understand(
+    labels: LabelSettings, pictures: Sequence[Collection[int]], name: str, shown: str = "road"
+) -> ClassMap:
+    """Decide what the values of label pictures mean, which show road or ``shown``.
 
     ``pictures`` are the values, or packed colours, that occur in each of some pictures. A
     `LogError` if a value that is named does not occur, or none is named and the values are class
@@ -262,7 +264,7 @@ def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name:
                 remedy = TWO_KINDS
                 break
             ignored = [str(value) for value in values if truths.get(value) == IGNORE]
-            words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
+            words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored, shown)}"
             words += f"; {NO_LABEL}" if has_negatives else ""
             return ClassMap(truths, UNKNOWN, False, words)
     problem = f"{name} holds the values {_listed(map(str, values))}"
@@ -314,7 +316,7 @@ def _as_named(
                 raise LogError(problem, setting=f"labels.{setting}{ending}")
             meaning[codes[name]] = truth
             words[-1].append(text(name))
-    return ClassMap(meaning, NON_ROAD, bool(ending), _words(*words))
+    return ClassMap(meaning, NON_ROAD, bool(ending), _words(words[0], words[1]))
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
@@ -338,9 +340,9 @@ def _color_name(packed: int) -> str:
     return f"{packed >> 16},{packed >> 8 & 255},{packed & 255}"
 
 
-def _words(road: Iterable[str], ignored: Iterable[str]) -> str:
+def _words(road: Iterable[str], ignored: Iterable[str], shown: str = "road") -> str:
     left_out = _listed(ignored)
-    return f"road is {_listed(road)}" + (f", {left_out} is ignored" if left_out else "")
+    return f"{shown} is {_listed(road)}" + (f", {left_out} is ignored" if left_out else "")
 
 
 def _listed(names: Iterable[str], limit: int = 16) -> str:
@@ -517,8 +519,12 @@ def meaning_of(
     settings: MaskSettings,
     camera: Camera | None = None,
     pairing: Pairing | None = None,
+    *,
+    shown: str = "road",
 ) -> Meaning:
     """Find the meaning of labels by looking at some; of those beside the log check the size, too.
+
+    Masks show road, or what ``shown`` is.
 
     A `LogError` if their values cannot be understood.
     """
@@ -544,7 +550,7 @@ def meaning_of(
     if origin.occurring:
         meaning = of_classes(settings.labels, origin, labels.name)
     else:
-        meaning = understand(settings.labels, seen, labels.name)
+        meaning = understand(settings.labels, seen, labels.name, shown)
     pixels = sum(map(Counter, seen), Counter[int]())
     of_truth = Counter[int]()
     for value, count in pixels.items():
