@@ -72,8 +72,8 @@ class RoadevalError(Exception):
         text = Sentence("; ").join(filter(None, (Sentence(": ").join(parts), self.remedy)))
         if self.in_file:
             text = name_settings(text, str)
-        return Sentence(
-            *(part if isinstance(part, Setting) else without_secrets(part) for part in text.parts)
+        return Sentence.of(
+            part if isinstance(part, Setting) else without_secrets(part) for part in text.parts
         )
 
     def __str__(self) -> str:

@@ -1,10 +1,15 @@
 """Errors are data; their sentence names settings as the place needs where it is read."""
 
+import ast
 import pickle
+import re
 from copy import deepcopy
+from pathlib import Path
 
+import roadeval
 from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
+from roadeval.networks.settings import NetSettings
 from roadeval.recording.layout import RecordingError, SeveralCamerasError
 from roadeval.runtime.sentence import Sentence, Setting
 
@@ -12,7 +17,7 @@ ERROR = RoadevalError(
     "7 does not occur",
     where="/labels",
     setting="labels.road",
-    remedy=Sentence("see ", Setting("labels.ignore")),
+    remedy=Sentence("see {labels.ignore}"),
 )
 
 
@@ -66,8 +71,29 @@ def test_a_password_is_in_no_sentence():
 
 
 def test_sentences_keep_their_settings_when_they_are_joined_and_copied():
-    advice = Sentence("lower ", Setting("frames.scale"))
+    advice = Sentence("lower {frames.scale}")
     both = Sentence("; ").join(["too large", advice])
     assert both == "too large; lower `frames.scale`"
     assert with_flags(deepcopy(both)) == "too large; lower --scale"
     assert with_flags("a `frames.scale` of plain text") == "a `frames.scale` of plain text"
+
+
+def test_settings_and_values_are_put_into_a_template_and_not_into_values():
+    sentence = Sentence("{} of {}: see {frames.scale}", 3, "a{b.c}{}.mcap")
+    assert sentence == "3 of a{b.c}{}.mcap: see `frames.scale`"
+    assert sentence.parts[-1] == Setting("frames.scale")
+
+
+def test_templates_name_settings_that_there_are():
+    tables = roadeval.configure({"preset": "robust"}).as_dict() | {"net": vars(NetSettings())}
+    names = {f"{table}.{key}" for table, own in tables.items() if own for key in own}
+    names |= {*tables, "masks", "only", "tunes"}
+    package = Path(roadeval.__file__).parent
+    for path in package.rglob("*.py"):
+        for call in ast.walk(ast.parse(path.read_text())):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Sentence":
+                template = getattr(call.args[0], "value", "")
+                # The settings of one table name each other without it.
+                is_full = path.name != "settings.py"
+                named = {n for n in re.findall(r"{([\w.]+)}", template) if is_full or "." in n}
+                assert named <= names, path

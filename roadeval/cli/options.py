@@ -233,10 +233,10 @@ FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option i
 def with_flags(text: str) -> str:
     """Return a sentence with its settings named by the flags that give them values.
 
-    >>> from roadeval.runtime.sentence import Sentence, Setting
-    >>> with_flags(Sentence("nothing is left to evaluate; lower ", Setting("training.frames")))
+    >>> from roadeval.runtime.sentence import Sentence
+    >>> with_flags(Sentence("nothing is left to evaluate; lower {training.frames}"))
     'nothing is left to evaluate; lower --train-frames'
-    >>> with_flags(Sentence("set ", Setting("masks.net.first"), " to 1"))
+    >>> with_flags(Sentence("set {masks.net.first} to 1"))
     'set `first` in the file of --masks net=FILE.toml to 1'
     """
     return str(name_settings(text, _flag_of))

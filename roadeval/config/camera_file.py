@@ -8,7 +8,7 @@ from typing import Any
 
 from roadeval.config.tables import ConfigError, read_tables
 from roadeval.runtime.documents import read_yaml
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 
 def read_camera(path: str | Path, topic: str | None = None) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def _of_kalibr(path: str | Path, document: Mapping[str, Any], topic: str) -> dic
     own = [name for name, place in places.items() if place and topic.startswith(f"{place}/")]
     if len(own := own or [*places]) > 1:
         names = ", ".join(f"{name} ({place})" for name, place in places.items())
-        choose = Sentence("choose one with ", Setting("topics.image"))
+        choose = Sentence("choose one with {topics.image}")
         raise ConfigError(f"several cameras, {names}", where=path, remedy=choose)
     camera = chain[own[0]]
     if camera["camera_model"] != "pinhole":

@@ -56,7 +56,7 @@ from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording.layout import RecordRule
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import visible, visible_lines
 from roadeval.training.settings import TrainingSettings
@@ -114,9 +114,8 @@ class RunConfig(LogConfig):
                 problem = f"{path} does not end in {ending}"
                 raise ConfigError(problem, setting=f"output.{key}")
         if self.output.mcap is not None and self.frames.scale != 1:
-            problem = Sentence("does not go with ", Setting("frames.scale"))
-            why = ", as reduced masks would not lie over the log's images"
-            raise ConfigError(Sentence(problem, why), setting="output.mcap")
+            problem = "does not go with {frames.scale}: reduced masks would not lie over the images"
+            raise ConfigError(Sentence(problem), setting="output.mcap")
 
     def _check_cameras(self) -> None:
         names = [visible(each.name or each.image) for each in self.cameras]

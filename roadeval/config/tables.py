@@ -153,7 +153,7 @@ def _refused(table: str, problem: Mapping[str, Any]) -> ConfigError:
     if isinstance(cause, SettingError) and cause.setting:
         return ConfigError.of(cause.rename_settings(lambda name: f"{setting}.{name}"))
     item = f"item {int(keys[len(names)]) + 1} " if len(names) < len(keys) else ""
-    return ConfigError(f"{item}{_plainly(problem)}", setting=setting)
+    return ConfigError(f"{item}{describe_problem(problem)}", setting=setting)
 
 
 def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
@@ -194,7 +194,7 @@ def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def _plainly(problem: Mapping[str, Any]) -> str:
+def describe_problem(problem: Mapping[str, Any]) -> str:
     """Describe a problem in plain words, with the value that was given."""
     given, context = problem["input"], problem.get("ctx", {})
     plain = (words for kind, words in PLAIN_WORDS.items() if problem["type"].startswith(kind))

@@ -26,7 +26,7 @@ from roadeval.data import (
 from roadeval.logs.settings import LabelPlace, MaskSettings
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 PAPER_CHAIN: Final = ("shadow", "similarity", "svm", "post")
 
@@ -270,7 +270,7 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     exposure = () if "exposure" in before else ("exposure",)
     chain = (*before, *exposure, "trees", FINAL_STAGE)
     tables = {"preset": "robust", "chain": chain, **settings, "trees": {"opinion": True}}
-    return Variant.of(f"{name}{TUNED}", tables, Sentence(Setting("tunes"), f" {name}"))
+    return Variant.of(f"{name}{TUNED}", tables, Sentence("{tunes} {}", name))
 
 
 def with_masks(current: Masks, tables: Any) -> Masks:

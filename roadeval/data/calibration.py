@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 FISHEYE: Final = ("equidistant", "fisheye", "kannala_brandt")
 """Models whose rays' angles, not their slopes, grow with the distance from the centre."""
@@ -79,8 +79,8 @@ class Calibration:
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""
         middle = f"the middle of {self.width}x{self.height} pixels"
-        centre = f"its centre, {x:.4g}, {y:.4g}, is far from {middle}"
-        return Sentence(f"{centre}: correct it with ", Setting("ground"))
+        far = "its centre, {}, {}, is far from {}: correct it with {ground}"
+        return Sentence(far, f"{x:.4g}", f"{y:.4g}", middle)
 
     @property
     def bends(self) -> bool:

@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 from roadeval.fleet.drives import FleetError
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 ATTEMPTS: Final = 2
 """Attempts at a drive whose worker dies; on a cluster the scheduler's settings decide."""
@@ -94,9 +94,8 @@ def _local(distributed: Any, count: int) -> Iterator[Any]:
             raise FleetError(
                 f"the worker processes cannot be started ({error})",
                 remedy=Sentence(
-                    "give them more memory, processes or open files (see ulimit -a), or take "
-                    "fewer ",
-                    Setting("run.jobs"),
+                    "give them more memory, processes or open files (see ulimit -a), or take fewer "
+                    "{run.jobs}"
                 ),
             ) from error
         yield stack.enter_context(client)

@@ -21,7 +21,7 @@ from roadeval.data.arrays import Floats, Matrix
 from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 GROUND_FRAMES: Final = ("base_footprint",)
 """Frames of a vehicle that lie on the ground (REP 120)."""
@@ -203,11 +203,11 @@ def ground_of(
         width, height = settings.size or size
         lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     elif lens is None:
-        return None, Sentence("no metres: ", why)
+        return None, Sentence("no metres: {}", why)
     else:
         (above, pitch, roll), text = _pose(logged.mounting if logged else None, settings)
         if above is None or pitch is None:
-            return None, Sentence("no metres: ", text)
+            return None, Sentence("no metres: {}", text)
         turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
         plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
     parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
@@ -240,8 +240,7 @@ def _lens(
     elif lens is not None and settings.model:
         lens = replace(lens, model=settings.model, distortion=settings.distortion)
     if lens is None:
-        missing = "the focal length is missing: give fov, or focal, with "
-        return None, Sentence(missing, Setting("ground"))
+        return None, Sentence("the focal length is missing: give fov, or focal, with {ground}")
     if problem := lens.problem:
         setting = f"ground.{problem.split()[0]}"
         raise GroundError(f"its {problem}, which no camera has", setting=setting)
@@ -276,8 +275,8 @@ def _pose(
         above = above if height is None else f": the log says {height:.6g} m"
         missing = [f"the camera's height above the ground{above}"] * has_no_height
         missing += ["its pitch"] * (pitch is None)
-        text = f"missing: {', and '.join(missing)}; give it with "
-        return (None, None, 0.0), Sentence(text, Setting("ground"))
+        text = "missing: {}; give it with {ground}"
+        return (None, None, 0.0), Sentence(text, ", and ".join(missing))
     # Adding 0 makes 0.0 of what would be read as -0.0.
     shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
     way = "up" if pitch < 0 else "down"

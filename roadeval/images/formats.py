@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from roadeval.errors import RoadevalError
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 MAX_PIXELS: Final = 1 << 25
 """Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
@@ -37,9 +37,10 @@ class Limits:
         if width * height > self.max_pixels:
             raise ImageError(
                 Sentence(
-                    f"an image of {width}x{height}, more than the {self.max_pixels} pixels that ",
-                    Setting("frames.max_pixels"),
-                    " allows",
+                    "an image of {}x{}, more than the {} pixels that {frames.max_pixels} allows",
+                    width,
+                    height,
+                    self.max_pixels,
                 )
             )
 

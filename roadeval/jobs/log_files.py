@@ -93,7 +93,7 @@ def pack(
     problem = describe(packed.path).problem if truth is not None else ""
     if not problem:
         return packed
-    warning = Sentence("packed, but replay needs more settings: ", problem)
+    warning = Sentence("packed, but replay needs more settings: {}", problem)
     return replace(packed, warnings=(*packed.warnings, warning))
 
 

@@ -48,7 +48,7 @@ from roadeval.logs.truth.pairing import (
     frames_of,
     tolerance,
 )
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 
 TRUTH: Final = "/truth"
@@ -124,15 +124,14 @@ class Selection:
         """Return warnings about the camera's images, a sentence each."""
         notes = list[str]()
         if self.white not in (None, 1, WHITE):
-            white = f"a sample of {self.white:g} is white; "
-            notes.append(Sentence(white, Setting("frames.white"), " sets another"))
+            white = "a sample of {} is white; {frames.white} sets another"
+            notes.append(Sentence(white, f"{self.white:g}"))
         if self.image.turned != 1:
             how = "turned, as their EXIF orientation or display matrix asks"
-            unturned = Setting("frames.unturned")
-            what: str = Sentence(f"{how}; ", unturned, " leaves them as stored")
+            what = "its images are {}; {frames.unturned} leaves them as stored"
             if not self.camera.images.limits.turn:
-                what = f"as stored, and would be {how}, by viewers and annotation tools"
-            notes.append(Sentence("its images are ", what))
+                what = "its images are as stored, and would be {}, by viewers and annotation tools"
+            notes.append(Sentence(what, how))
         return tuple(notes)
 
     def among_truth(self, numbers: Sequence[int]) -> Sequence[int]:
@@ -150,23 +149,23 @@ class Selection:
     def reasons(self) -> tuple[str, ...]:
         """Which topics were chosen and why, a sentence each."""
         about = Sentence("; ").join((self.image_why, *self.notes))
-        lines: list[str] = [Sentence(f"image: {self.image.name} (", about, ")")]
+        lines: list[str] = [Sentence("image: {} ({})", self.image.name, about)]
         for name, source in self.labels.items():
             what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
             lines.append(f"{what}: {source.where} ({source.why}; {source.meaning.words})")
             notes = (*source.notes, *source.meaning.notes)
-            lines += [Sentence(f"{what}: ", note) for note in notes]
+            lines += [Sentence("{}: {}", what, note) for note in notes]
         if known := self.calibration:
             place = f", mounted in {known.mounting.parent}" if known.mounting else ""
             model = known.model or f"{'a nameless' if known.bends else 'no'} distortion"
             lines.append(f"calibration: {known.topic} ({model}{place})")
         if self.calibration_why:
-            begin = "calibration: " if known else "no calibration: "
-            lines.append(Sentence(begin, self.calibration_why))
+            none = "" if known else "no "
+            lines.append(Sentence("{}calibration: {}", none, self.calibration_why))
         if self.ground_why:
             lines.append(self.ground_why)
         if self.no_truth:
-            lines.append(Sentence("no truth: ", self.no_truth))
+            lines.append(Sentence("no truth: {}", self.no_truth))
         if (clock := self.camera.clock) is not Clock.STAMP:
             lines.append(f"the header stamps are all zero or equal; used in place of them: {clock}")
         return tuple(lines)
@@ -223,11 +222,11 @@ def settle(
     known = calibration_of(image, topics, readers)
     if any(known) and image.turned != 1 and camera.images.limits.turn:
         turned = "it is of the sensor's rows, and the images are turned ("
-        known = None, Sentence(turned, Setting("frames.unturned"), ")")
+        known = None, Sentence("{}{frames.unturned})", turned)
     ground, ground_why = ground_of(known[0], config.ground, image.size)
     if any(config.ground.distortion) and is_rectified(image.name):
         rectified = " is applied although the topic's name says rectified"
-        ground_why = Sentence(ground_why, "; ", Setting("ground.distortion"), rectified)
+        ground_why = Sentence("{}; {ground.distortion}{}", ground_why, rectified)
     return Selection(
         camera,
         why,
@@ -334,7 +333,7 @@ class Accounting:
     def losses(self) -> tuple[str, ...]:
         """Return a sentence on each undecodable frame that is not ``in_chunks``."""
         lost = sorted(self.undecodable.keys() - self.in_chunks)
-        return tuple(Sentence(f"frame {number}: ", self.undecodable[number]) for number in lost)
+        return tuple(Sentence("frame {}: {}", number, self.undecodable[number]) for number in lost)
 
     @property
     def notes(self) -> Iterator[str]:
@@ -357,9 +356,8 @@ class Accounting:
         if len(self.frame_ids) > 1:
             names = [f"{visible(name)} ({count})" for name, count in self.frame_ids.items()]
             yield Sentence(
-                f"the images are of several cameras, by frame_id: {first_of(names, NAMED)}; ",
-                Setting("topics.frame_id"),
-                " chooses one",
+                "the images are of several cameras, by frame_id: {}; {topics.frame_id} chooses one",
+                first_of(names, NAMED),
             )
         for level in ("black", "white"):
             blank = [number for number, colour in self.blank.items() if colour == level]
@@ -547,11 +545,14 @@ class FrameStream:
             count, away = partners.unpaired(of_all=asked == self.accounting.in_log)
             if count:
                 yield Sentence(
-                    f"{shown}{count} of the {len(source.pictures)} labels of {source.where} belong "
-                    f"to no frame: the first is {away / 1e6:.1f} ms from the nearest, and "
-                    f"{source.pairing.tolerance / 1e6:.1f} may lie between (",
-                    Setting("topics.sync_tolerance_ms"),
-                    ")",
+                    "{}{} of the {} labels of {} belong to no frame: the first is {} ms from the "
+                    "nearest, and {} may lie between ({topics.sync_tolerance_ms})",
+                    shown,
+                    count,
+                    len(source.pictures),
+                    source.where,
+                    f"{away / 1e6:.1f}",
+                    f"{source.pairing.tolerance / 1e6:.1f}",
                 )
             if partners.missed:
                 lost = f"{partners.missed} frames have no label: the one in reach lies nearer to"

@@ -239,9 +239,9 @@ class Log:
         except LogError as error:
             refused = error.rename_settings(of_variant)
             if isinstance(error, UnclearLabelsError):
-                confidences = "; or, for confidences, their threshold"
-                refused.remedy = Sentence(refused.remedy, confidences)
-            raise LogError.of(refused, Sentence(Setting("masks"), f" {name}")) from error
+                or_threshold = "{}; or, for confidences, their threshold"
+                refused.remedy = Sentence(or_threshold, refused.remedy)
+            raise LogError.of(refused, Sentence("{masks} {}", name)) from error
         notes, meant = (
             tuple(name_settings(note, of_variant) for note in notes)
             for notes in (masks.notes, masks.meaning.notes)
@@ -314,7 +314,7 @@ class Log:
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(
-                    Sentence("leaves no frame: ", why),
+                    Sentence("leaves no frame: {}", why),
                     where=self.path.name,
                     setting="frames.labelled",
                 )

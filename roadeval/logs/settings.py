@@ -14,7 +14,7 @@ from roadeval.errors import SettingError
 from roadeval.geometry.settings import GroundSettings
 from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import Checked, Flag
 from roadeval.runtime.text import elided
 
@@ -149,13 +149,13 @@ class LabelSettings:
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
             raise SettingError(
-                Sentence("needs ", Setting("road")),
+                Sentence("needs {road}"),
                 setting="ignore",
                 remedy="name the values that mean road",
             )
         if self.ignore_colors and not self.road_colors:
             raise SettingError(
-                Sentence("needs ", Setting("road_colors")),
+                Sentence("needs {road_colors}"),
                 setting="ignore_colors",
                 remedy="name the colours that mean road",
             )
@@ -265,7 +265,7 @@ class LogConfig:
     def __post_init__(self) -> None:
         if self.truth.path and self.topics.truth:
             raise LogError(
-                Sentence("says where the truth is, and so does ", Setting("topics.truth")),
+                Sentence("says where the truth is, and so does {topics.truth}"),
                 setting="truth.path",
                 remedy="give one",
             )

@@ -105,7 +105,7 @@ class Network:
                 raise self.file.error("gives NaN")
             scores = np.clip(scores, -HUGE, HUGE)  # infinity times nothing would be NaN
         if settings.activation == "none" and not _within_one(scores.min(), scores.max()):
-            see = Sentence("see ", Setting("net.activation"))
+            see = Sentence("see {net.activation}")
             raise self.file.error("leaves 0 to 1, so it gives no probabilities", see)
         if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
@@ -254,8 +254,7 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
             "finds instances, as boxes or queries with masks, and gives no map of classes",
             Sentence(
                 "export a network for semantic segmentation (of Ultralytics one called -sem), or "
-                "name an output that is a map by ",
-                Setting("net.outputs"),
+                "name an output that is a map by {net.outputs}"
             ),
         )
     usual: Literal["stretch", "letterbox"] = "letterbox" if is_ultralytics(file) else "stretch"
@@ -263,11 +262,11 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
     settings = _input(settings, file)
     known = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(known) > 1:
-        name_them = Sentence("name those that show road by ", Setting("net.outputs"))
+        name_them = Sentence("name those that show road by {net.outputs}")
         raise file.question("gives several outputs", name_them)
     outputs = settings.outputs or known
     if unknown := [name for name in outputs if name not in known]:
-        see = Sentence("see ", Setting("net.outputs"))
+        see = Sentence("see {net.outputs}")
         raise file.question(f"has no output {unknown[0]!r}", see)
     settings = replace(settings, outputs=outputs)
     made = [
@@ -275,7 +274,7 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
         for name, sample in zip(outputs, samples_of(settings, file), strict=True)
     ]
     if any(settings != made[0] for settings in made):
-        name_some = Sentence("name some of one kind by ", Setting("net.outputs"))
+        name_some = Sentence("name some of one kind by {net.outputs}")
         raise file.question("its outputs differ in kind", name_some)
     return made[-1]
 
@@ -414,14 +413,14 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     layout = settings.layout or ("NCHW" if shape[1] in (1, 3) else "NHWC")
     count, rows, columns = shape[1:] if layout == "NCHW" else (shape[3], shape[1], shape[2])
     if settings.layout is None and count not in (1, 3):
-        give = Sentence("give it by ", Setting("net.layout"))
+        give = Sentence("give it by {net.layout}")
         raise file.question("does not say the order of its input's lengths", give)
     width, height = settings.size or (columns, rows)
     if width is None or height is None:
-        give = Sentence("give width and height by ", Setting("net.size"), ", as [512, 256]")
+        give = Sentence("give width and height by {net.size}, as [512, 256]")
         raise file.question("takes images of any size", give)
     if columns not in (None, width) or rows not in (None, height):
-        see = Sentence("see ", Setting("net.size"))
+        see = Sentence("see {net.size}")
         raise file.question(f"takes no input of {width}x{height}", see)
     settings = replace(
         settings,
@@ -437,7 +436,7 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     for name in ("mean", "deviation"):
         if len(getattr(settings, name)) not in (1, own):
             problem = f"must hold one number, or one for each of {own} channels"
-            raise file.error(Sentence(Setting(f"net.{name}"), f" {problem}"))
+            raise file.error(Sentence("{} {}", Setting(f"net.{name}"), problem))
     return settings
 
 
@@ -470,21 +469,15 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -
     named = tuple(n for n, name in _class_names(file).items() if name == "road" and n < count)
     road = settings.road or named or ((count - 1,) if count <= 2 else ())
     if not road:
-        give = Sentence("give the numbers of those that are road by ", Setting("net.road"))
+        give = Sentence("give the numbers of those that are road by {net.road}")
         raise file.question(f"tells {count} classes apart", give)
     if max(road) >= count:
-        see = Sentence("see ", Setting("net.road"))
+        see = Sentence("see {net.road}")
         raise file.question(f"has no class {max(road)}, but {count} from 0", see)
     if decide == "argmax" and len(road) == count:
         raise file.question(
             f"all classes of its output {name!r} are road",
-            Sentence(
-                "name at least one that is not (see ",
-                Setting("net.road"),
-                " and ",
-                Setting("net.decide"),
-                ")",
-            ),
+            Sentence("name at least one that is not (see {net.road} and {net.decide})"),
         )
     return replace(
         settings,
@@ -498,13 +491,13 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -
 def _of_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings:
     """Complete settings of a network whose output holds numbers of classes."""
     if settings.threshold is not None:
-        leave = Sentence("leave ", Setting("net.threshold"), " out")
+        leave = Sentence("leave {net.threshold} out")
         raise file.question(f"its output {name!r} is of classes alone", leave)
     names = _class_names(file)
     road = settings.road or tuple(n for n, name in names.items() if name == "road")
     if is_ultralytics(file) and len(names) == 1:
         road = (1,)  # of a single class it writes 1, whatever number the class has
     if not road:
-        give = Sentence("give the numbers of those that are road by ", Setting("net.road"))
+        give = Sentence("give the numbers of those that are road by {net.road}")
         raise file.question("gives numbers of classes", give)
     return replace(settings, road=road, activation="classes", decide="argmax")

@@ -21,7 +21,7 @@ from roadeval.data.words import first_of
 from roadeval.networks.settings import MIB, NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 from roadeval.runtime.threads import ended
 
@@ -36,7 +36,7 @@ LARGEST: Final = (1 << 31) - 1
 _SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
 _LATE: Final = "takes longer than {:g} s{} to {}, or has no end"
-_MORE_TIME: Final = Sentence("mend it, or allow more by ", Setting("net.seconds"))
+_MORE_TIME: Final = Sentence("mend it, or allow more by {net.seconds}")
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
 _PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
 _PROBE: Final = """
@@ -115,9 +115,9 @@ class OnnxFile:
         with suppress(TypeError):  # of a type that NumPy lacks, which is refused once it is there
             size = math.prod(n or 1 for n in tensor.shape) * np.dtype(tensor.dtype).itemsize
             if size > limit:
-                much = f"{tensor} takes {size / MIB:,.0f} MiB, more than the {limit / MIB:g} of "
-                problem = Sentence(much, Setting("net.megabytes"))
-                raise self.error(problem, "export it smaller, or allow more")
+                problem = f"{tensor} takes {size / MIB:,.0f} MiB, more than {limit / MIB:g}"
+                remedy = Sentence("export it smaller, or allow more by {net.megabytes}")
+                raise self.error(problem, remedy)
 
     def error(self, problem: str, remedy: str = "") -> NetworkError:
         """Return an error about the file."""
@@ -130,7 +130,7 @@ class OnnxFile:
         )
         listed = f" (inputs: {inputs}; outputs: {outputs})"
         if remedy:
-            return self.error(problem, Sentence(remedy, listed))
+            return self.error(problem, Sentence("{}{}", remedy, listed))
         return self.error(f"{problem}{listed}")
 
 
@@ -151,8 +151,8 @@ def load(settings: NetSettings) -> OnnxFile:
     state = there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns
     file = _opened(path, settings.seconds, *state)
     if settings.sha256 not in (None, file.sha256):
-        problem = f"is another network than was asked for: its SHA-256 is {file.sha256}, and "
-        raise file.error(Sentence(problem, Setting("net.sha256"), f" {settings.sha256}"))
+        other = "is another network than was asked for: {net.sha256} says {}, and its own is {}"
+        raise file.error(Sentence(other, settings.sha256, file.sha256))
     return file
 
 

@@ -18,7 +18,7 @@ from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
 from roadeval.results.tables import ResultsError, TableFacts, read_table
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import Content, NewFolder, writing
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,7 +113,7 @@ class ResultsWriter:
 
     def explained(self) -> AbstractContextManager[None]:
         """Turn an OSError inside the block into a `ResultsError`."""
-        remedy = Sentence("choose another folder with ", Setting("output.reports"))
+        remedy = Sentence("choose another folder with {output.reports}")
         return writing(self._new.path, partial(ResultsError, remedy=remedy))
 
 

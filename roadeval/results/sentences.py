@@ -216,7 +216,7 @@ def misfit(found: Finding, period_ms: float | None, remedy: str) -> str:
             ways = ((found.right, "right", "left"), (found.down, "down", "up"))
             parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]
             what = f"moved by {' and '.join(parts)}: moved back {_it(verb)} images and truth better"
-    return Sentence(f"{subject} {verb} {what}. ", remedy)
+    return Sentence("{} {} {}. {}", subject, verb, what, remedy)
 
 
 def _it(verb: str) -> str:

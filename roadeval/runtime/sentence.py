@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+_PLACE: Final = re.compile(r"\{([\w.]*)\}")
 
 
 class Setting(str):
@@ -12,43 +16,64 @@ class Setting(str):
 
 
 class Sentence(str):
-    """Text made of words and of settings.
+    """Text that knows which of its parts are settings.
 
     As a string it names a setting as Python does, between backticks; `name_settings` gives it the
     names of another place.
 
-    >>> sentence = Sentence("nothing is left to evaluate; lower ", Setting("training.frames"))
+    >>> sentence = Sentence("{} frames are too many; lower {training.frames}", 90)
     >>> print(sentence)
-    nothing is left to evaluate; lower `training.frames`
+    90 frames are too many; lower `training.frames`
     """
 
     parts: tuple[str, ...]
+    """Texts and `Setting`s."""
 
-    def __new__(cls, *parts: str) -> Sentence:
-        """Join parts, among them `Setting`s and other sentences."""
-        pieces: list[str] = []
-        for part in parts:
-            pieces += part.parts if isinstance(part, Sentence) else (part,)
-        texts = (f"`{piece}`" if isinstance(piece, Setting) else piece for piece in pieces)
+    def __new__(cls, template: str, *values: object) -> Sentence:
+        """Put settings and values in place of each ``{table.key}`` and ``{}`` of a template.
+
+        Values may be settings and sentences. Text from elsewhere is a value, never the template.
+        """
+        left, parts = iter(values), []
+        for number, piece in enumerate(_PLACE.split(template)):
+            if number % 2 == 0:
+                parts.append(piece)
+            elif piece:
+                parts.append(Setting(piece))
+            else:
+                value = next(left)
+                parts += _parts(value if isinstance(value, str) else str(value))
+        return cls.of(parts)
+
+    @classmethod
+    def of(cls, parts: Iterable[str]) -> Sentence:
+        """Return the sentence that consists of these texts and settings."""
+        known = tuple(filter(None, parts))
+        texts = (f"`{part}`" if isinstance(part, Setting) else part for part in known)
         self = super().__new__(cls, "".join(texts))
-        self.parts = tuple(pieces)
+        self.parts = known
         return self
 
-    def __getnewargs__(self) -> tuple[str, ...]:  # type: ignore[override]
-        return self.parts
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Sentence.of, (self.parts,)
 
     def join(self, texts: Iterable[str], /) -> Sentence:
         """Return texts as one sentence, with this one between them."""
-        first, *others = [*texts] or [""]
-        return Sentence(first, *(part for text in others for part in (self, text)))
+        parts: list[str] = []
+        for number, text in enumerate(texts):
+            parts += (*self.parts, *_parts(text)) if number else _parts(text)
+        return Sentence.of(parts)
 
 
 def name_settings(text: str, name: Callable[[str], str]) -> Sentence:
     """Return text with the names of its settings as ``name`` returns them.
 
-    >>> sentence = Sentence("lower ", Setting("training.frames"))
+    >>> sentence = Sentence("lower {training.frames}")
     >>> print(name_settings(sentence, {"training.frames": "--train-frames"}.__getitem__))
     lower --train-frames
     """
-    parts = text.parts if isinstance(text, Sentence) else (text,)
-    return Sentence(*(name(part) if isinstance(part, Setting) else part for part in parts))
+    return Sentence.of(name(part) if isinstance(part, Setting) else part for part in _parts(text))
+
+
+def _parts(text: str) -> tuple[str, ...]:
+    return text.parts if isinstance(text, Sentence) else (text,)

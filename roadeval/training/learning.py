@@ -20,7 +20,7 @@ from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.scene import exposed, reach, scene_of, stretched
 from roadeval.pipeline.stage import Output, TrainingSet, View
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.threads import ordered
 from roadeval.training.model import Model, kept_model
 from roadeval.training.settings import TrainingSettings
@@ -38,12 +38,7 @@ class TrainingError(RoadevalError):
     """Frames from which nothing can be learnt."""
 
 
-WITHOUT_TRAINING: Final = Sentence(
-    "give ",
-    Setting("training.model"),
-    ", or run what learns nothing with ",
-    Setting("only"),
-)
+WITHOUT_TRAINING: Final = Sentence("give {training.model}, or run what learns nothing with {only}")
 
 
 def fit(
@@ -70,11 +65,8 @@ def fit(
             raise TrainingError(
                 "there is no truth to train on",
                 remedy=Sentence(
-                    "name its topic with ",
-                    Setting("topics.truth"),
-                    ", give ",
-                    Setting("training.model"),
-                    ', or allow training.source = "patch"',
+                    "name its topic with {topics.truth}, give {training.model}, or allow "
+                    'training.source = "patch"'
                 ),
             )
         source, truths = "patch", [patch_truth(frame.image, settings) for frame in frames]
@@ -90,12 +82,8 @@ def fit(
                 f"frames {frames[0].number} to {frames[-1].number} do not show both road and "
                 "non-road, so nothing can be learnt from them",
                 remedy=Sentence(
-                    "choose other frames with ",
-                    Setting("frames.start"),
-                    " or ",
-                    Setting("training.frames"),
-                    ", or give ",
-                    Setting("training.model"),
+                    "choose other frames with {frames.start} or {training.frames}, or give "
+                    "{training.model}"
                 ),
             )
         images = tuple(frame.image for frame in frames)
@@ -309,17 +297,13 @@ def _require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_t
             raise TrainingError(
                 f"no stage of it can learn further ({', '.join(s.name for s in learning)})",
                 where=f"variant {name}",
-                remedy=Sentence("use preset robust, or leave ", Setting("training.adapt"), " out"),
+                remedy=Sentence("use preset robust, or leave {training.adapt} out"),
             )
     if not by_truth and settings.source != "patch":
         raise TrainingError(
             "no frame of the range has road truth to adapt the model to, and what the reference "
             "patch guesses may make it worse",
-            remedy=Sentence(
-                "leave ",
-                Setting("training.adapt"),
-                ' out, or insist with training.source = "patch"',
-            ),
+            remedy=Sentence('leave {training.adapt} out, or insist with training.source = "patch"'),
         )
 
 
@@ -355,7 +339,8 @@ def _choose(
     if lost and not held.frames:
         raise TrainingError(
             Sentence(
-                f"none of the {len(lost)} frames to train on can be decoded; the first: ",
+                "none of the {} frames to train on can be decoded; the first: {}",
+                len(lost),
                 next(iter(lost.values())),
             )
         )
@@ -369,9 +354,8 @@ def _choose(
             f"the range has {len(every)} labelled frames, and training would take {len(trained)} "
             f"of them and {len(beside)} more as a gap: none is left to evaluate",
             remedy=Sentence(
-                "set ",
-                Setting("training.frames"),
-                f" to {max(len(every) // (2 + 2 * gap), 1)}, ",
+                "set {training.frames} to {}, {}",
+                max(len(every) // (2 + 2 * gap), 1),
                 WITHOUT_TRAINING,
             ),
         )
@@ -393,9 +377,8 @@ def from_drives(
             "no road truth to train on in the range",
             where=bare[0],
             remedy=Sentence(
-                "name its topic with ",
-                Setting("topics.truth"),
-                ', leave the drive out, or set training.source = "patch"',
+                "name its topic with {topics.truth}, leave the drive out, or set training.source "
+                '= "patch"'
             ),
         )
     model = fit([frame for own in frames.values() for frame in own], pipelines, settings)
@@ -440,12 +423,7 @@ class HeldFrames:
             raise TrainingError(
                 f"training holds its frames decoded, and more than {len(self.frames)} of them "
                 f"would take over {GREATEST_MEMORY >> 20} MiB",
-                remedy=Sentence(
-                    "lower ",
-                    Setting("training.frames"),
-                    ", or reduce them with ",
-                    Setting("frames.scale"),
-                ),
+                remedy=Sentence("lower {training.frames}, or reduce them with {frames.scale}"),
             )
         self.frames.append(frame)
         self._on_frame(len(self.frames))

@@ -9,7 +9,7 @@ from annotated_types import Interval
 
 from roadeval.errors import SettingError
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import Flag
 
 
@@ -53,5 +53,5 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         if self.adapt and self.model is None:
-            needs = Sentence("needs ", Setting("model"), ", which it builds on")
+            needs = Sentence("needs {model}, which it builds on")
             raise SettingError(needs, setting="adapt")

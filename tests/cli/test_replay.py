@@ -107,19 +107,17 @@ def test_every_option_s_words_are_a_setting_s_value(asked):
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        (("lower ", Setting("training.frames"), ", or wait"), "lower --train-frames, or wait"),
-        (("a `topics.truth` that is text",), "a `topics.truth` that is text"),
-        ((Setting("training.source"), " has no flag"), "`training.source` has no flag"),
-        ((Setting("masks"), " my-net: bad"), "--masks my-net: bad"),
-        (
-            (Setting("masks.my-net.labels.road"), " is missing"),
-            "`labels.road` in the file of --masks my-net=FILE.toml is missing",
-        ),
-        ((Setting("topics.masks.net"), ": bad"), "--mask-topic net: bad"),
+        ("lower {training.frames} or {frames.scale}", "lower --train-frames or --scale"),
+        ("a `topics.truth` that is text", "a `topics.truth` that is text"),
+        ("{training.source} has no flag", "`training.source` has no flag"),
+        ("{masks} my-net: bad", "--masks my-net: bad"),
+        (Setting("masks.my-net.first"), "`first` in the file of --masks my-net=FILE.toml"),
+        (Setting("topics.masks.net"), "--mask-topic net"),
     ],
 )
 def test_settings_in_a_sentence_are_named_by_their_flags(text, shown):
-    assert with_flags(Sentence(*text)) == shown
+    sentence = Sentence("{}", text) if isinstance(text, Setting) else Sentence(text)
+    assert with_flags(sentence) == shown
 
 
 def test_warnings_are_told_even_when_quiet(asked, capsys):

@@ -27,7 +27,7 @@ def info(
     would pick what it picks, or what it would ask for. Of a log of more than 50 MB only the
     indexes are read, unless --verify asks for all of it.
     """
-    arguments.one_camera(given)
+    arguments.check_one_camera(given)
     config = arguments.configuration(given)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe

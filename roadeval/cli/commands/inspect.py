@@ -59,7 +59,7 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.of_camera(Result(recording), camera)
+    opened = arguments.select_camera(Result(recording), camera)
     if opened.fleet and variant is not None:
         raise typer.BadParameter("--variant does not go with a fleet: its worst are the first's")
     if opened.fleet and frame is not None:

@@ -51,7 +51,7 @@ def pick(
     corrected ones belong into FOLDER/labels. Picking again into the same folder goes on. How a log
     is replayed first is told by a --config of 'replay'; a result is taken as it is.
     """
-    arguments.one_camera(given)
+    arguments.check_one_camera(given)
     config = arguments.configuration(given)
     from roadeval.data.words import counted
     from roadeval.jobs.results.pick import pick as run

@@ -42,7 +42,7 @@ def report(
     from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.of_camera(Result(result), camera)
+    opened = arguments.select_camera(Result(result), camera)
     with progress.watched(quiet) as watch:
         path = write_report(opened, output, on_progress=watch)
     if not quiet:

@@ -36,7 +36,7 @@ def train(
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
     Replay never evaluates the training frames, on any drive.
     """
-    arguments.one_camera(given)
+    arguments.check_one_camera(given)
     config = arguments.configuration(given)
     from roadeval.jobs.run.train import train as run
 

@@ -530,15 +530,17 @@ def _warnings(
                 "lacks them or trained on them"
             )
     of_the_log = [
-        Sentence(Setting(name), f" {setting(before)} and {setting(after)}")
+        Sentence("{} {} and {}", Setting(name), setting(before), setting(after))
         for name, (before, after) in changed.items()
         if name.startswith(_OF_THE_LOG)
     ]
     if of_the_log:
         yield Sentence(
-            f"{base} and {new} were replayed with different settings (",
+            "{} and {} were replayed with different settings ({}): part of the change may be "
+            "theirs",
+            base,
+            new,
             Sentence(", ").join(of_the_log),
-            "): part of the change may be theirs",
         )
     if relabelled := sums["relabelled"]:
         guess = "" if of_the_log else " (other labels or topics?)"

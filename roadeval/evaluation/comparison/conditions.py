@@ -40,7 +40,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
 from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     ">": operator.gt,
@@ -128,7 +128,7 @@ class Condition:
 
     def unjudged(self, result: str, because: str) -> Judgement:
         """Return that it could not be judged on a result, and why."""
-        why = Sentence(f"{self.text}: not judged in {result}, because ", because)
+        why = Sentence("{}: not judged in {}, because {}", self.text, result, because)
         nan = math.nan
         return Judgement(self, result, 0, nan, nan, nan, None, None, None, why)
 
@@ -187,9 +187,11 @@ def _unjudged(
     names = f"{base.label} and {new.label}"
     if None not in (base.scale, new.scale) and base.scale != new.scale:
         return Sentence(
-            f"{names} were replayed with ",
-            Setting("frames.scale"),
-            f" {base.scale:g} and {new.scale:g}; replay both at one scale, or limit in %",
+            "{} were replayed with {frames.scale} {} and {}; replay both at one scale, or "
+            "limit in %",
+            names,
+            f"{base.scale:g}",
+            f"{new.scale:g}",
         )
     if new.relabelled:
         return (

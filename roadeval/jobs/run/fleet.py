@@ -40,7 +40,7 @@ from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
 
@@ -102,7 +102,7 @@ def replay_fleet(
             [own for each in entries for own in each.of_cameras(config.cameras)]
         )
     if config.fleet.folds is not None and config.training.model is not None:
-        problem = Sentence("does not go with ", Setting("training.model"), ": folds train models")
+        problem = Sentence("does not go with {training.model}: folds train models")
         raise FleetError(problem, setting="fleet.folds")
     writer = FleetWriter(Path(output))
     writer.begin()

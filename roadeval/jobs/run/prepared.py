@@ -41,7 +41,7 @@ from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, reuse, trim
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.threads import ordered
 from roadeval.training import learning
 from roadeval.training.learning import Schedule
@@ -100,7 +100,7 @@ class Failures:
         for own in self.by_error.values():
             frames = first_of([str(each.frame) for each in own], KEPT)
             where = f"{len(own)} frames ({frames})" if len(own) > 1 else f"frame {frames}"
-            yield Sentence(f"{where}: variant {own[0].variant}: ", own[0].reason)
+            yield Sentence("{}: variant {}: {}", where, own[0].variant, own[0].reason)
 
 
 SPARSE: Final = 5
@@ -218,9 +218,9 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     truths = frames if selection.truth is None else len(selection.truth.pictures)
     if frames > SPARSE * truths and picks is None:
         note = Sentence(
-            f"at most {truths} of {frames} frames have road truth: ",
-            Setting("frames.labelled"),
-            " reads these alone",
+            "at most {} of {} frames have road truth: {frames.labelled} reads these alone",
+            truths,
+            frames,
         )
         on_progress(Progress(0, None, "opening", note))
     learn = partial(_learn, again, variants, config.training, on_progress)
@@ -400,14 +400,14 @@ def process(
 def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:
     """Return the error that ends a run in which the first frames failed, or all."""
     first, last = failures[0], failures[-1]
-    only = Setting("only")
-    others = [Sentence(only, f" {v.name}") for v in run.layouts if v.name != first.variant]
-    left_out = Sentence(", or leave the variant out with ", Sentence(" ").join(others))
+    names = [layout.name for layout in run.layouts if layout.name != first.variant]
+    others = Sentence(" ").join(Sentence("{only} {}", name) for name in names)
+    remedy = Sentence("mend it, or leave the variant out with {}", others) if names else "mend it"
     frames = f"the first {len(failures)} frames ({first.frame} to {last.frame})"
     return StageError(
-        Sentence(first.reason, f", on each of {frames}"),
+        Sentence("{}, on each of {}", first.reason, frames),
         where=f"variant {first.variant}",
-        remedy=Sentence("mend it", left_out if others else ""),
+        remedy=remedy,
     )
 
 

@@ -28,7 +28,7 @@ from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
 OnFrame = Callable[[FrameResult], None]
@@ -98,10 +98,8 @@ def replay(
         with to.holding((drive, config.training.model)):
             outcome = _written(log, config, to, on_progress, on_frame)
             if to.recording is None and (save := config.output.save) is not None:
-                record = Setting("output.record")
-                because = Sentence(f" {save} is not written: ", record, " is none")
-                unwritten = Sentence(Setting("output.save"), because)
-                return replace(outcome, warnings=(*outcome.warnings, unwritten))
+                unwritten = "{output.save} {} is not written: {output.record} is none"
+                return replace(outcome, warnings=(*outcome.warnings, Sentence(unwritten, save)))
             return outcome
 
 

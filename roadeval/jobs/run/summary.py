@@ -197,11 +197,11 @@ def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -
         first = pictures.first + finding.frames
         setting = "truth" if is_truth else f"masks.{finding.subject}"
         if pictures.by == "number" and first >= 0:
-            remedy = Sentence("Set ", Setting(f"{setting}.first"), f" to {first}.")
+            remedy = Sentence("Set {} to {}.", Setting(f"{setting}.first"), first)
     by_time = source is not None and isinstance(source.pairing.images, TopicReader)
     if finding.misfit is Misfit.LAG and is_truth and period_ms and by_time:
         offset = config.topics.sync_offset_ms - finding.frames * period_ms
-        remedy = Sentence("Set ", Setting("topics.sync_offset_ms"), f" to {offset:.0f}.")
+        remedy = Sentence("Set {topics.sync_offset_ms} to {}.", f"{offset:.0f}")
     pixels = {name: round(getattr(finding, name) / selection.scale) for name in ("right", "down")}
     finding = replace(finding, **pixels)
     return misfit(finding, period_ms, remedy)
@@ -240,7 +240,7 @@ def of_cameras(
     totals = tables.as_trees(tables.over_cameras(by_camera))
     effects = drive_effects(frames, first.evaluation)
     misfits: list[str] = [
-        Sentence(f"{camera}: ", text) for camera, own in found.items() for text in own.misfits
+        Sentence("{}: {}", camera, text) for camera, own in found.items() for text in own.misfits
     ]
     claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
     accounts = [asdict(each.frames) for each in found.values()]
@@ -287,7 +287,7 @@ def _by_camera(found: Mapping[str, Sequence[str]]) -> Iterator[str]:
     common = [each for each in next(iter(found.values())) if all(each in s for s in found.values())]
     yield from common
     for camera, sentences in found.items():
-        yield from (Sentence(f"{camera}: ", text) for text in sentences if text not in common)
+        yield from (Sentence("{}: {}", camera, text) for text in sentences if text not in common)
 
 
 def versions() -> dict[str, str]:
@@ -299,7 +299,7 @@ def versions() -> dict[str, str]:
 def warnings(run: Run, totals: Totals) -> tuple[str, ...]:
     """List what a user should know before believing the results."""
     missing = run.selection.no_truth
-    unlabelled = "there is no road truth to score against, only masks to look at: "
+    unlabelled = "there is no road truth to score against, only masks to look at: {}"
     warned = []
     selection, prior = run.selection, run.model.prior
     scale = run.config.frames.scale
@@ -317,12 +317,12 @@ def warnings(run: Run, totals: Totals) -> tuple[str, ...]:
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
     if selection.ground and (lens := selection.calibration) and selection.calibration_why:
-        warned.append(Sentence(f"metres rest on {lens.topic}: ", selection.calibration_why))
+        warned.append(Sentence("metres rest on {}: {}", lens.topic, selection.calibration_why))
     return (
         *((Sentence(unlabelled, missing), *_most_doubtful(run)) if missing else ()),
         *_sparse(run),
         *(str(damage) for damage in run.log.damage if not damage.lossy),
-        *(Sentence(f"{run.selection.image.name}: ", note) for note in run.selection.notes),
+        *(Sentence("{}: {}", run.selection.image.name, note) for note in run.selection.notes),
         *run.frames.accounting.notes,
         *tuple(warned),
         *_taken(run),
@@ -342,7 +342,7 @@ def _most_doubtful(run: Run) -> Iterator[str]:
         kept = f"kept the frames that are most in doubt, by {found.sign} of {found.variant}"
         if found.sign not in RANKS_AT_ONCE:
             kept = "kept no pictures: one method alone says nothing by which a frame could rank"
-        yield Sentence("without truth ", Setting("output.record"), f" {rule} {kept}")
+        yield Sentence("without truth {output.record} {} {}", rule, kept)
 
 
 def _of_picks(run: Run) -> Iterator[str]:
@@ -379,9 +379,9 @@ def _taken(run: Run) -> Iterator[str]:
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
         if probable and not name.endswith(TUNED):
             yield Sentence(
-                f"{name}: the network's output is taken for probabilities, for it stays within 0 "
-                "and 1; if it holds logits, set ",
-                Setting("net.activation"),
+                "{}: the network's output is taken for probabilities, for it stays within 0 and "
+                "1; if it holds logits, set {net.activation}",
+                name,
             )
 
 
@@ -417,13 +417,11 @@ def _sparse(run: Run) -> Iterator[str]:
         )
     if run.selection.truth is not None and not run.frames.accounting.labelled:
         stride = run.config.frames.every
-        why = Sentence(": ", Setting("frames.every"), f" {stride} leaves out each one that has")
+        why = Sentence(": {frames.every} {} leaves out each one that has", stride)
         yield Sentence(
-            "none of the frames that were read has road truth",
+            "none of the frames that were read has road truth{}; {frames.labelled} reads only "
+            "frames that have",
             why if stride > 1 else "",
-            "; ",
-            Setting("frames.labelled"),
-            " reads only frames that have",
         )
 
 
@@ -449,7 +447,7 @@ def _missing(run: Run, totals: Totals) -> Iterator[str]:
         if unused := masks.pairing.unused:
             yield f"{shown}: {unused} labels of {where} belong to no frame"
         notes = (*masks.notes, *masks.meaning.notes)
-        yield from (Sentence(f"{shown}: {where}: ", note) for note in notes)
+        yield from (Sentence("{}: {}: {}", shown, where, note) for note in notes)
     yield from run.frames.unpaired()
 
 

@@ -29,7 +29,7 @@ from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, Topi
 from roadeval.logs.messages.frame_numbers import FrameNumbers
 from roadeval.logs.settings import parse_time
 from roadeval.runtime.discovery import found_in
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -430,10 +430,11 @@ class Video:
             self.notes.setdefault(
                 "range",
                 Sentence(
-                    f"{100 * share:.0f} % of the luma of frame {frame.pts} lies beyond 16 to 235, "
-                    "and the video does not say which range it has: if it is the full one, as of "
-                    "converted JPEGs, set ",
-                    Setting("frames.full_range"),
+                    "{} % of the luma of frame {} lies beyond 16 to 235, and the video does not "
+                    "say which range it has: if it is the full one, as of converted JPEGs, set "
+                    "{frames.full_range}",
+                    f"{100 * share:.0f}",
+                    frame.pts,
                 ),
             )
 
@@ -441,8 +442,8 @@ class Video:
         """Return why a packet cannot be decoded: its size, where the decoder tells it."""
         reason = f"its video cannot be decoded: {error.strerror}"
         if not (decoder.width and decoder.height):
-            most = f", or it has more than the {self._limits.max_pixels} pixels that "
-            return Sentence(reason, most, Setting("frames.max_pixels"), " allows")
+            most = "{}, or it has more than the {} pixels that {frames.max_pixels} allows"
+            return Sentence(most, reason, self._limits.max_pixels)
         try:
             self._limits.check(decoder.width, decoder.height)
         except ImageError as too_large:

@@ -20,7 +20,7 @@ from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.topics.choose import words
 from roadeval.logs.topics.reader import Size, TopicInfo, TopicReader
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 LOOKED_AT: Final = 100
 """Messages of static transforms that are read, at most, of each topic."""
@@ -39,7 +39,6 @@ Known = tuple[Calibration | None, str]
 
 RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undistorted"})
 """Words of topics of images without distortion."""
-_ADVICE: Final = Sentence("give its lens with ", Setting("ground"))
 
 
 def is_rectified(name: str) -> bool:
@@ -74,7 +73,7 @@ def calibration_of(
     (topic,) = best
     frame, lens, why = matching[topic]
     if lens is None:
-        return None, Sentence(f"{topic}: ", why)
+        return None, Sentence("{}: {}", topic, why)
     reader = readers[topic]
     with suppress(*_UNREADABLE):
         last, _ = _read(topic, reader.fields(len(reader) - 1), image)
@@ -118,8 +117,8 @@ def _lens_of(
             frame = str(getattr(message, "header", message).frame_id)
             lens, why = _read(topic.name, message, image)
         except _UNREADABLE:
-            unread = f"its {topic.encoding} messages of {topic.schema} cannot be read: "
-            why = Sentence(unread, _ADVICE)
+            unread = "its {} messages of {} cannot be read: give its lens with {ground}"
+            why = Sentence(unread, topic.encoding, topic.schema)
             continue
         if lens is not None:
             return frame, lens, why
@@ -141,7 +140,7 @@ def _read(topic: str, message: Any, image: TopicInfo) -> Known:
         flat = replace(lens, matrix=(*p[:3], *p[4:7], *p[8:11]), model="", distortion=())
         if lens.bends and not any(p):
             zero = "its projection P is zero, and the images are rectified: "
-            return None, Sentence(zero, _ADVICE)
+            return None, Sentence(zero + "give its lens with {ground}")
         if lens.bends and np.array_equal(flat.matrix, lens.matrix):
             note = "the images are taken as not rectified: P is K, and there is distortion"
         elif any(p):

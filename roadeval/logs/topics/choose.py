@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.reader import TopicInfo
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 
 def _set(text: str) -> frozenset[str]:
@@ -80,13 +80,11 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         why = "the only camera image" if len(images) > 1 else "the only image topic"
         return cameras[0], f"{why}, of {len(sent)} transports" if len(sent) > 1 else why
     if cameras:
-        choose = Sentence("choose one with ", Setting("topics.image"))
-        raise LogError(
-            f"{len(cameras)} image topics: {_names(cameras)}",
-            remedy=Sentence(choose, ", or give it once for each of several"),
-        )
+        choose = "choose one with {topics.image}, or give it once for each of several"
+        problem = f"{len(cameras)} image topics: {_names(cameras)}"
+        raise LogError(problem, remedy=Sentence(choose))
     if images:
-        choose = Sentence("choose the camera's with ", Setting("topics.image"))
+        choose = Sentence("choose the camera's with {topics.image}")
         raise LogError(f"only label images: {_names(images)}", remedy=choose)
     listed = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
     more = ", ..." if len(topics) > 8 else ""
@@ -128,14 +126,13 @@ def choose_truth(
         raise LogError(
             why,
             remedy=Sentence(
-                "name it with ",
-                Setting("topics.truth"),
-                " to use it nevertheless, or give an empty name there to continue without truth",
+                "name it with {topics.truth} to use it nevertheless, or give an empty name there "
+                "to continue without truth"
             ),
         )
     if roads:
-        why = Sentence("no topic is clearly road truth; name one with ", Setting("topics.truth"))
-        return Choice(None, Sentence(why, f": {_names(roads)}"))
+        why = Sentence("no topic is clearly road truth; name one with {topics.truth}")
+        return Choice(None, Sentence("{}: {}", why, _names(roads)))
     if not candidates:
         return Choice(None, "no label topic")
     why = lossy_labels(candidates[0].name, candidates[0].lossy)
@@ -238,7 +235,7 @@ def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicIn
     else:
         return
     pattern = re.sub(r"\d+[^/]*$", "*", min(cameras.values()))
-    choose = Sentence("choose those that count by ", Setting("truth.names"), f", as '{pattern}'")
+    choose = Sentence("choose those that count by {truth.names}, as '{}'", pattern)
     raise LogError(problem, remedy=choose)
 
 

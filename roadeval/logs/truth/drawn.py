@@ -25,7 +25,7 @@ import numpy.typing as npt
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.files import some
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 Mask = npt.NDArray[np.bool_]
 Size = tuple[int, int]
@@ -311,12 +311,12 @@ def settled(
     without = [d.image for d in whole if meant.road.isdisjoint(d.classes)]
     if without and meant.road:
         counted = "left out" if meant.skip_roadless else "counted as images without road"
-        advice = Sentence("; ", Setting("truth.skip_roadless"), " leaves them out")
+        advice = Sentence("{truth.skip_roadless} leaves them out")
         roadless = (
             f"{len(without)} of {len(drawings)} images have shapes, but none of road, and are "
             f"{counted} ({some(without)})"
         )
-        notes.append(Sentence(roadless, "" if meant.skip_roadless else advice))
+        notes.append(roadless if meant.skip_roadless else Sentence("{}; {}", roadless, advice))
         # Where no image has road its class is named wrongly, which is told later.
         if meant.skip_roadless and len(without) < len(whole):
             whole = [d for d in whole if not meant.road.isdisjoint(d.classes)]
@@ -359,8 +359,10 @@ def _hidden(drawings: Sequence[Drawing], meant: Meant) -> Iterator[str]:
         if len(looked) < len(crossed):
             images = f"{len(looked)} images that were looked at"
         yield Sentence(
-            f"road was drawn over {', '.join(name for name, _ in classes.most_common())} in "
-            f"{len(shares)} of {images}: {100 * np.mean(shares):.1f} % of the road's pixels "
-            "there, which count as road; draw road first, or name these classes in ",
-            Setting("labels.ignore"),
+            "road was drawn over {} in {} of {}: {} % of the road's pixels there, which count "
+            "as road; draw road first, or name these classes in {labels.ignore}",
+            ", ".join(name for name, _ in classes.most_common()),
+            len(shares),
+            images,
+            f"{100 * np.mean(shares):.1f}",
         )

@@ -47,7 +47,7 @@ from roadeval.logs.truth.pairing import (
     check_times,
     frames_of,
 )
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
@@ -61,16 +61,11 @@ _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 2
 BLURRED: Final = 48
 """How far JPEG may move the levels of a mask of 0 and 255."""
 TWO_KINDS: Final = Sentence(
-    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road "
-    "with ",
-    Setting("labels.road"),
-    ", both where both do",
+    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what "
+    "means road with {labels.road}, both where both do"
 )
 NAME_THEM: Final = Sentence(
-    "name those that mean road with ",
-    Setting("labels.road"),
-    ", and those to leave out with ",
-    Setting("labels.ignore"),
+    "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
 )
 ALONE: Final = "road"
 """The class that means road where labels have no other."""
@@ -217,7 +212,7 @@ def seen_in(
     if pixels.ndim != 2 and not labels.road_colors:
         raise LogError(
             f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}",
-            remedy=Sentence("name those that mean road with ", Setting("labels.road_colors")),
+            remedy=Sentence("name those that mean road with {labels.road_colors}"),
         )
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
@@ -483,11 +478,11 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
     sizes = f"{label} is {theirs[0]}x{theirs[1]}, {image} {ours[0]}x{ours[1]}"
     if is_turned:
         return Sentence(
-            f"{sizes}: one of them is turned by a quarter: turn the labels as the images are "
-            "shown, or leave these as they are stored with ",
-            Setting("frames.unturned"),
+            "{}: one of them is turned by a quarter: turn the labels as the images are shown, "
+            "or leave these as they are stored with {frames.unturned}",
+            sizes,
         )
-    return Sentence(f"{sizes}: scale the labels with ", Setting("topics.resize_truth"))
+    return Sentence("{}: scale the labels with {topics.resize_truth}", sizes)
 
 
 def check_size(
@@ -511,7 +506,7 @@ def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
     if not problem:
         first = read_or_error(pictures, 0) if len(pictures) else "it holds no picture"
         problem = first.sentence if isinstance(first, FrameError) else str(first)
-    return LogError(Sentence(f"nothing of {pictures.name} can be decoded: ", problem))
+    return LogError(Sentence("nothing of {} can be decoded: {}", pictures.name, problem))
 
 
 def meaning_of(
@@ -567,9 +562,9 @@ def meaning_of(
         for value, count in pixels.most_common(8)
     )
     doubt = Sentence(
-        f"road is {100 * road / known:.2f} % of the labelled pixels that were looked at, which "
-        f"are {shares}: does ",
-        Setting("labels.road"),
-        " name the road?",
+        "road is {} % of the labelled pixels that were looked at, which are {}: does "
+        "{labels.road} name the road?",
+        f"{100 * road / known:.2f}",
+        shares,
     )
     return replace(meaning, notes=(doubt,))

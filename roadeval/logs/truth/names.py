@@ -33,7 +33,7 @@ from roadeval.logs.files import (
 )
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.settings import LabelPlace
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 
 SHORT: Final = 10
@@ -109,8 +109,8 @@ class NamedLabels:
         try:
             return label.picture(label.content(), self.limits)
         except (OSError, BadMessage, ImageError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error.sentence
-            raise FrameError(str(reason), where=self.place(position)) from error
+            reason = str(error.strerror) if isinstance(error, OSError) else error.sentence
+            raise FrameError(reason, where=self.place(position)) from error
 
     def place(self, position: int) -> str:
         """Return a label's path, for messages to people."""
@@ -230,14 +230,13 @@ def _numbers(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
                 "the names do not tell which digits are the frame's number",
                 where=some(sorted({first, odd_one or last})),
                 remedy=Sentence(
-                    "show them by ",
-                    Setting("truth.names"),
-                    f", as frame_{NUMBER}_*; or name the folder of the log's images by ",
-                    Setting("truth.images"),
+                    "show them by {truth.names}, as frame_{}_*; or name the folder of the log's "
+                    "images by {truth.images}",
+                    NUMBER,
                 ),
             )
     if max(map(len, digits), default=_DIGITS + 1) > _DIGITS:
-        remedy = Sentence("pair by names, with ", Setting("truth.images"))
+        remedy = Sentence("pair by names, with {truth.images}")
         raise LogError("its name has no number", where=first, remedy=remedy)
     return dict(zip(files, map(int, digits), strict=True))
 
@@ -257,5 +256,5 @@ def _first_number(numbers: npt.NDArray[np.int64], frames: int | None, name: str)
         f"its labels have the numbers {low} to {high}, which does not tell whether the first "
         "frame is number 0 or 1",
         where=name,
-        remedy=Sentence("set ", Setting("truth.first"), " to 0 or to 1"),
+        remedy=Sentence("set {truth.first} to 0 or to 1"),
     )

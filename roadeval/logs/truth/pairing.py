@@ -25,7 +25,7 @@ from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.logs.truth.names import NamedLabels
-from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.sentence import Sentence
 
 REACH: Final = 4
 """Messages to look at on either side: topics are logged nearly, not always, in stamp order. Where
@@ -430,12 +430,12 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
         # Labels come some moments after their images.
         whole = round(apart / NS, 0 if abs(apart / NS - round(apart / NS)) < 0.2 else 3)
         side = "before" if whole < 0 else "after"
-        setting, moved = Setting("topics.sync_offset_ms"), round(-whole * 1000)
+        remedy = "{topics.sync_offset_ms} {} moves the truth's to the images'"
         raise LogError(
             f"its stamps are of another clock than those of {images.name}: they lie about "
             f"{abs(whole):g} s {side} them for the same log times",
             where=labels.name,
-            remedy=Sentence(setting, f" {moved} moves the truth's to the images'"),
+            remedy=Sentence(remedy, round(-whole * 1000)),
         )
 
 
@@ -466,10 +466,9 @@ def _clock_of_names(
     is_nearer = (stamped < 0, abs(stamped)) <= (away < 0, abs(away))
     if np.median(np.abs(after)) >= step and (is_nearer or (by_stamp == by_log).all()):
         return Clock.STAMP, Sentence(
-            f"no name is the stamp of a frame: by median they lie {stamped:.1f} ms after the "
-            "nearest one; if they are of another one, ",
-            Setting("topics.sync_offset_ms"),
-            " moves them",
+            "no name is the stamp of a frame: by median they lie {} ms after the nearest one; "
+            "if they are of another one, {topics.sync_offset_ms} moves them",
+            f"{stamped:.1f}",
         )
     met = int(np.count_nonzero(np.abs(after) <= most))
     return Clock.LOG_TIME, (
@@ -481,7 +480,7 @@ def _clock_of_names(
 def check_times(pairing: Pairing, name: str) -> None:
     """Refuse, as a `LogError`, labels beside the log of which none has the time of a frame."""
     if not len(pairing.labels):
-        remedy = Sentence("set ", Setting("truth.pair"), " to number")
+        remedy = Sentence("set {truth.pair} to number")
         raise LogError("the log has no times to pair by", where=name, remedy=remedy)
     if next(frames_of(pairing), None) is None:
         theirs, ours = (
@@ -493,10 +492,9 @@ def check_times(pairing: Pairing, name: str) -> None:
             f"{ours} ns",
             where=name,
             remedy=Sentence(
-                f"allow more than {pairing.tolerance / 1e6:g} ms between them with ",
-                Setting("topics.sync_tolerance_ms"),
-                ", or pair by number with ",
-                Setting("truth.pair"),
+                "allow more than {} ms between them with {topics.sync_tolerance_ms}, or pair by "
+                "number with {truth.pair}",
+                f"{pairing.tolerance / 1e6:g}",
             ),
         )
 
@@ -532,10 +530,9 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
             f"to {first + frames - 1}",
             where=name,
             remedy=Sentence(
-                f"if {keys[0] + first} is the first frame's, set ",
-                Setting("truth.first"),
-                " to it; or name the folder of the images that the log was made of with ",
-                Setting("truth.images"),
+                "if {} is the first frame's, set {truth.first} to it; or name the folder of the "
+                "images that the log was made of with {truth.images}",
+                keys[0] + first,
             ),
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
