@@ -56,8 +56,8 @@ Conditions = Annotated[
     list[str] | None,
     option(
         "--fail-if",
-        "Limit of a change, as 'post.filtered.ERR > +0.5pp' (with 'surely' at the end: of its "
-        "whole interval), or of a level, as '> 20%'. Repeatable.",
+        "Condition for exit code 4: a change, as 'post.filtered.ERR > +0.5pp' (with 'surely' at "
+        "the end: its whole interval), or a level, as '> 20%'. Repeatable.",
         "CONDITION",
         callback=_check_conditions,
     ),

@@ -26,7 +26,7 @@ def warning(sentence: str) -> None:
 
 
 def note(sentence: str) -> None:
-    """Write what happens now, where it takes long: ``roadeval: note: ...``."""
+    """Write what happens now, if that takes long: ``roadeval: note: ...``."""
     _write("note", "bold", sentence)
 
 
@@ -47,7 +47,7 @@ def conditions(held: Sequence[str], unjudged: Sequence[str]) -> ExitCode:
 
 
 def traceback(text: str) -> None:
-    """Write a traceback, where they are asked for."""
+    """Write a traceback, if ``ROADEVAL_DEBUG`` asks for it."""
     if debug():
         sys.stderr.write(visible_lines(text))
 
@@ -56,8 +56,8 @@ def loops_missing() -> None:
     """Warn if frames take long because the package was installed without its compiled loops."""
     if kernels.missing():
         warning(
-            "the compiled loops are missing, and a frame takes several times as long: there was "
-            "no C compiler when roadeval was installed, or they are older than it: install it again"
+            "the compiled loops are missing, so a frame takes several times as long: there was no "
+            "C compiler when roadeval was installed, or the build is outdated; reinstall roadeval"
         )
 
 
@@ -68,12 +68,12 @@ def interrupted(sentence: str) -> None:
 
 def _write(kind: str, style: str, sentence: str) -> None:
     """Write a line that names settings by their flags."""
-    said = visible(without_secrets(with_flags(sentence)))
+    text = visible(without_secrets(with_flags(sentence)))
     try:
         from rich.text import Text
 
-        line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", said)
+        line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", text)
         console.diagnostics().print(line, soft_wrap=True)
     except (ImportError, MemoryError):
-        # Where memory is short the library does not load.
-        sys.stderr.write(f"{PROGRAM}: {kind}: {said}\n")
+        # If memory is short, the library does not load.
+        sys.stderr.write(f"{PROGRAM}: {kind}: {text}\n")

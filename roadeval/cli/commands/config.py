@@ -1,4 +1,4 @@
-"""``roadeval config``: the whole effective configuration, to read and to edit."""
+"""``roadeval config``: the effective configuration, to read and to edit."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from roadeval.cli.options import Given, takes
 def config(*, given: Given) -> int:
     """Print the whole effective configuration as TOML.
 
-    Each setting with its meaning and range; the file that it makes can be edited and given to
-    --config.
+    Each setting comes with its meaning and range. The file can be edited and given to --config.
     """
     settings = arguments.configuration(given)
     from roadeval.config.run import config_toml

@@ -11,7 +11,7 @@ from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 
 
-def _ending(path: Path | None) -> Path | None:
+def _check_ending(path: Path | None) -> Path | None:
     if path is not None and path.suffix.lower() not in (".pdf", ".html", ".htm", ""):
         raise typer.BadParameter(f"{path}: end it in .pdf or .html")
     return path
@@ -24,10 +24,10 @@ def report(
         Path | None,
         arguments.option(
             "-o --output",
-            "A page to browse where it ends in .html. Default: reports/<recording>.pdf, or "
-            "report.pdf in the folder given.",
+            "File of the report; one that ends in .html is a page to browse. Default: "
+            "reports/<recording>.pdf, or report.pdf in the results folder.",
             "FILE.pdf|FILE.html",
-            callback=_ending,
+            callback=_check_ending,
         ),
     ] = None,
     camera: arguments.Camera = None,
@@ -35,9 +35,9 @@ def report(
 ) -> int:
     """Write the report of a drive or of a fleet, as a PDF or as a page.
 
-    Does the filter help, where are the errors, which stage broke it, and the frames to look at;
-    from the recording alone, or from a results folder, then without pictures. A page is one file
-    that needs no network and no server.
+    It shows whether the filter helps, where the errors are, which stage causes them, and which
+    frames to look at. A recording is enough; the report of a results folder has no pictures. A
+    page is one file that needs no network and no server.
     """
     from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result

@@ -26,13 +26,13 @@ def train(
         ),
     ],
     *,
-    output: Annotated[Path, arguments.option("-o --output", "Where the model lands.", "MODEL")],
+    output: Annotated[Path, arguments.option("-o --output", "File of the model.", "MODEL")],
     given: Given,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Train a model on some drives, for use on others.
 
-    The training frames are labelled ones, spread evenly over each drive. Where no drive has road
+    The training frames are labelled ones, spread evenly over each drive. If no drive has road
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
     Replay never evaluates the training frames, on any drive.
     """

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 GAP: Final = 2
 """Spaces between columns."""
 LONGEST: Final = 20
-"""Longer names may be folded, so that numbers are beside them."""
+"""Letters of a name above which it may be folded, so that numbers are beside it."""
 
 
 def show(blocks: Iterable[Block], out: Console) -> None:
     """Print headings, texts, lists and tables, with an empty line between them."""
-    for place, block in enumerate(blocks):
-        if place:
+    for number, block in enumerate(blocks):
+        if number:
             out.print()
         match block:
             case Heading() | Text():
@@ -38,7 +38,7 @@ def show(blocks: Iterable[Block], out: Console) -> None:
 def show_table(table: Table, out: Console) -> None:
     """Print a table.
 
-    Columns of numbers that the console has no room for are printed below, with the words again.
+    Columns of numbers for which the console has no room are printed below, with the names again.
     """
     from rich import box
     from rich.table import Table as Grid
@@ -65,7 +65,7 @@ def show_table(table: Table, out: Console) -> None:
 
 
 def _texts(table: Table, place: int) -> list[str]:
-    """Return a column's texts; numbers, and what is subtracted, in ASCII."""
+    """Return a column's texts, with numbers and minus signs in ASCII."""
     texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
     return texts if place in table.text_columns else [*map(ascii_of, texts)]
 
@@ -77,9 +77,9 @@ def ascii_of(number: str) -> str:
 
 
 def _parts(table: Table, columns: Sequence[Sequence[str]], room: int) -> Iterator[list[int]]:
-    """Part the columns of numbers into those that fit beside the words, one at least a part.
+    """Divide the columns of numbers into parts that fit beside the names.
 
-    As few parts as there can be, of about as many columns each: none is left alone below.
+    There are as few parts as possible, with about as many columns each, and at least one.
     """
     from rich.cells import cell_len
 

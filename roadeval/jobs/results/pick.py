@@ -37,7 +37,7 @@ PNG: Final = "png"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PickedFrames:
     """The frames that a command has picked."""
 
     folder: Path
@@ -67,7 +67,7 @@ def pick(
     variant: str | None = None,
     seed: int = 0,
     on_progress: OnProgress = ignore,
-) -> list[Outcome]:
+) -> list[PickedFrames]:
     """Pick frames of logs without truth to label: half drawn at random, half most in doubt.
 
     Parameters
@@ -171,7 +171,7 @@ class _Wanted:
     """The configuration as TOML, of a log that was replayed here; None of a recording."""
 
 
-def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
+def _picked(drive: DriveResult, wanted: _Wanted) -> PickedFrames:
     """Pick frames of a recording and write them."""
     rows = drive.table("unlabelled")
     names = values_of(rows, "variant")
@@ -204,7 +204,7 @@ def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
     _write(drive, picks, [(each, masks[each.frame]) for each in new], wanted)
     log = drive.facts.log
     repeats = wanted.folder / RUN if wanted.run else drive.path
-    return Outcome(wanted.folder, picks, len(new), log.path if log else drive.name, repeats)
+    return PickedFrames(wanted.folder, picks, len(new), log.path if log else drive.name, repeats)
 
 
 def _known(drive: DriveResult, own: pd.DataFrame, variant: str, wanted: _Wanted) -> Picks:
