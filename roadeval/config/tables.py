@@ -1,4 +1,4 @@
-"""From the tables of a TOML file to settings; messages name the file and the key."""
+"""Tables of TOML files, and the settings that they make."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PLAIN_WORDS: Final[Mapping[str, str]] = {
     "too_long": "must be a list of at most {max_length}",
     "missing": "is too short a list",
 }
-"""Messages by the beginning of the validating library's name of a problem."""
+"""Messages by the beginning of pydantic's name of a problem."""
 QUOTED: Final = 60
 """Letters of a wrong value that a message quotes."""
 
@@ -44,7 +44,7 @@ _JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="c
 
 
 class ConfigError(RoadevalError):
-    """A setting that cannot be used: which file, which key, and what is allowed."""
+    """A setting that cannot be used."""
 
 
 @contextmanager
@@ -61,7 +61,7 @@ def in_file(where: str) -> Iterator[None]:
 def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     """Read the tables of a TOML file, or of the ``run.toml`` that a recording holds.
 
-    A `ConfigError` if there are none to read, or they name code that may not be loaded: see
+    A `ConfigError` if they cannot be read, or name code that may not be loaded; see
     `roadeval.config.run.load_config`.
     """
     try:
@@ -76,66 +76,65 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
 
 
 def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
-    """Raise a `ConfigError` for a chain that names a module: the file may be anybody's."""
+    """Raise a `ConfigError` for a chain that names a module, as anybody may have made the file."""
     variants = tables.get("variants", {})
-    asked = [tables, *(variants.values() if isinstance(variants, Mapping) else ())]
-    for each in asked:
-        chain = each.get("chain", ()) if isinstance(each, Mapping) else ()
+    for table in (tables, *(variants.values() if isinstance(variants, Mapping) else ())):
+        chain = table.get("chain", ()) if isinstance(table, Mapping) else ()
         for name in chain if isinstance(chain, list) else ():
             if isinstance(name, str) and ":" in name:
                 raise ConfigError(
-                    f"{path}: its chain names code, {visible(name)}, which is loaded only from a "
-                    "TOML file that you give: replay the drive with the run.toml of its results"
+                    f"its chain names code, {visible(name)}, which is loaded only from a TOML file "
+                    "that you give",
+                    where=path,
+                    remedy="replay the drive with the run.toml of its results",
                 )
 
 
 def _text(path: Path) -> str:
     check_input(path)
     if path.suffix != ".rrd":
-        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with this mark
     from roadeval.recording.recording import run_toml_in
 
     text = run_toml_in(path)
     if text is None:
-        raise ConfigError(
-            f"{path}: holds no configuration, for the run was cut: replay the drive once with its "
-            "options, and that recording holds them"
-        )
+        problem = "has no configuration because the run was interrupted"
+        raise ConfigError(problem, where=path, remedy="replay the drive once more")
     return text
 
 
 def override(settings: Any, values: Any, table: str) -> Any:
-    """Return a settings dataclass with the values of its table in place, validated as a whole.
+    """Return a settings dataclass with the values of its table in place.
 
-    A `ConfigError` for an unknown key or a value out of range names the key.
+    A `ConfigError`, which names the key, for an unknown one or a value that is not allowed.
     """
     if not isinstance(values, Mapping):
         raise ConfigError("must be a table", setting=table)
     if not values:
         return settings
     _check(values, settings, table)
-    merged = _merged(dataclasses.asdict(settings), values)
+    merged = _merge(dataclasses.asdict(settings), values)
     try:
-        # In JSON a strict check accepts a list for a tuple, but no text for a number, and no true.
+        # In JSON a strict check accepts a list for a tuple, but for a number neither text nor true.
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:
-        raise _refused(table, error.errors(include_url=False)[0]) from error
+        raise _error_of(table, error.errors(include_url=False)[0]) from error
 
 
 @cache
 def adapter(kind: type) -> TypeAdapter[Any]:
-    """Return what validates a settings dataclass and has its schema: to make it takes a while."""
+    """Return pydantic's validator of a settings dataclass, which takes a while to make."""
     return TypeAdapter(kind)
 
 
 def either(names: Iterable[str]) -> str:
-    """List names to choose from."""
+    """Return names to choose from, in a row."""
     return ", ".join(sorted(names))
 
 
 def quoted(value: Any) -> str:
-    """Write a value as in a file, shortened for a message.
+    """Return a value as in a file, shortened for a message.
 
     >>> quoted(True)
     'true'
@@ -144,10 +143,10 @@ def quoted(value: Any) -> str:
     return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
 
 
-def _refused(table: str, problem: Mapping[str, Any]) -> ConfigError:
-    """Return the error for a problem that the validating library has found in a table."""
+def _error_of(table: str, problem: Mapping[str, Any]) -> ConfigError:
+    """Return the error for a problem that pydantic has found in a table."""
     keys, cause = problem["loc"], problem.get("ctx", {}).get("error")
-    # After an item's number comes which of its types the library tried.
+    # The number of an item is followed by the type that pydantic tried for it.
     names = list(takewhile(lambda part: isinstance(part, str), keys))
     setting = ".".join((table, *names))
     if isinstance(cause, SettingError) and cause.setting:
@@ -157,16 +156,16 @@ def _refused(table: str, problem: Mapping[str, Any]) -> ConfigError:
 
 
 def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
-    """Raise a `ConfigError` for a key without a setting, or with text that none can hold."""
-    known = None
+    """Raise a `ConfigError` for a key that is no setting, or text that no setting can be."""
+    names = None
     if dataclasses.is_dataclass(settings):
-        known = [field.name for field in dataclasses.fields(settings)]
+        names = [field.name for field in dataclasses.fields(settings)]
     for key, value in values.items():
         setting = f"{table}.{key}"
-        if known is not None and key not in known:
-            if not known:
+        if names is not None and key not in names:
+            if not names:
                 raise ConfigError("it has no settings", setting=setting)
-            choice = f"choose {either(known)}"
+            choice = f"choose {either(names)}"
             raise ConfigError("there is no such setting", setting=setting, remedy=choice)
         if isinstance(value, Mapping):
             _check(value, getattr(settings, key, None), setting)
@@ -183,19 +182,20 @@ def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
                 raise ConfigError(problem, setting=setting)
 
 
-def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested tables with values in place."""
     merged = dict(base)
     for key, value in values.items():
         inner = merged.get(key)
         if isinstance(inner, Mapping) and isinstance(value, Mapping):
-            merged[key] = _merged(inner, value)
+            merged[key] = _merge(inner, value)
         else:
             merged[key] = value
     return merged
 
 
 def describe_problem(problem: Mapping[str, Any]) -> str:
-    """Describe a problem in plain words, with the value that was given."""
+    """Return the message on a problem that pydantic has found, with the value that was given."""
     given, context = problem["input"], problem.get("ctx", {})
     plain = (words for kind, words in PLAIN_WORDS.items() if problem["type"].startswith(kind))
     message = str(context.get("error", problem["msg"]))

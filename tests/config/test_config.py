@@ -64,7 +64,7 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ("variants = 3", r"\[variants\] must hold a table for each variant"),
         ("[variants]\nwide = 3", r"\[variants.wide\] must be a table"),
         ("[variants.wide.svm]\nc = 0", r"\[variants.wide\]: svm\.c: "),
-        ("[variants.wide.training]\nframes = 3", r"\[training\] holds for the whole run"),
+        ("[variants.wide.training]\nframes = 3", r"\[training\] applies to all variants"),
         ("[variants.filtered]\nchain = ['svm', 'post']", "the name is taken"),
         ("chain = ['svm', 'blur', 'post']", r"no stage 'blur'; choose .*shadow"),
         ("chain = ['svm']", "chain must end with post"),
@@ -144,7 +144,7 @@ def test_no_stage_is_called_like_a_table_of_the_run():
     [
         ("size = [8, 8]\n", "file must name the network"),
         ('file = "n.onnx"\nsise = [8, 8]\n', r"net\.sise: there is no such setting"),
-        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold says nothing"),
+        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold has no effect"),
     ],
 )
 def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, said):
