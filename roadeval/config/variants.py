@@ -104,7 +104,7 @@ class Variant:
         return cls(name, pipeline, preset)
 
     def layout(self) -> VariantLayout:
-        """Return the layout of the variant, which recording and tables need before the first frame."""
+        """Return the layout, which recording and tables need before the first frame."""
         stages_ = self.pipeline.stages()
         title = ", ".join(stage.title for stage in stages_ if stage.name != FINAL_STAGE)
         if any(stage.is_filter for stage in stages_):
@@ -241,7 +241,7 @@ def network_variant(name: str, path: str) -> Variant:
 
 
 def thresholded_variant(name: str) -> Variant:
-    """Return the variant of another method's confidences, with a threshold of the training frames."""
+    """Return the variant of a method's confidences, with the training frames' threshold."""
     chain = ("given", "threshold", FINAL_STAGE)
     return Variant.of(name, {"chain": chain, "given": {"name": name}, "post": AS_IT_IS})
 

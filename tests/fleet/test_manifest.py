@@ -38,7 +38,7 @@ def test_a_manifest_says_more_of_each_drive(entries, tmp_path):
     first, second = entries(TOML)
     assert (first.path, first.group) == (tmp_path / "a.mcap", "7")
     assert first.tags == {"weather": "rain", "lanes": "2", "wet": "true", "slope": "0.5"}
-    assert (second.path, second.known) == (tmp_path / "b.mcap", (None, {}, {}))
+    assert (second.path, second.description) == (tmp_path / "b.mcap", (None, {}, {}))
 
 
 def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_a_whole(entries):

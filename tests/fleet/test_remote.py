@@ -164,7 +164,7 @@ def test_an_endpoint_without_tls_must_be_allowed(s3, monkeypatch):
     [
         ("s3://key:geheim@bucket/a", "s3://bucket/a: credentials are read from the environment"),
         ("s3:///a", "s3:///a: no bucket in it"),
-        ("ftp://me:geheim@host/a", "ftp://host/a: no scheme that is known"),
+        ("ftp://me:geheim@host/a", "ftp://host/a: an unknown scheme"),
     ],
 )
 def test_a_url_that_cannot_be_read_is_refused(url, message):

@@ -15,13 +15,13 @@ from roadeval.errors import RoadevalError
 from roadeval.fleet.drives import (
     DriveEntry,
     FleetError,
-    cameras_apart,
     deal,
     find_drives,
     groups_of,
+    name_cameras,
     shuffled,
 )
-from roadeval.fleet.engine import ATTEMPTS, died, started
+from roadeval.fleet.engine import ATTEMPTS, is_worker_death, start_workers
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
     Done,
@@ -98,9 +98,7 @@ def replay_fleet(
     config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in listed(drives)])
     if config.cameras:
-        entries = cameras_apart(
-            [own for each in entries for own in each.of_cameras(config.cameras)]
-        )
+        entries = name_cameras([own for each in entries for own in each.of_cameras(config.cameras)])
     if config.fleet.folds is not None and config.training.model is not None:
         problem = Sentence("does not go with {training.model}: folds train models")
         raise FleetError(problem, setting="fleet.folds")
@@ -183,7 +181,7 @@ class FleetRun:
     def _engine(self) -> Executor:
         """Return who does the tasks."""
         if self.executor is None:
-            starting = started(self.config.run.jobs, self.config.fleet.scheduler)
+            starting = start_workers(self.config.run.jobs, self.config.fleet.scheduler)
             self.executor, count = self.stack.enter_context(starting)
             self.workers = max(count, 1)
         return self.executor
@@ -257,7 +255,7 @@ class FleetRun:
                     f"{self.folder}: the workers have gone, or their scheduler; what is done is "
                     "kept, and the same command again does the rest"
                 ) from error
-        if died(error):
+        if is_worker_death(error):
             return (
                 f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
                 "runs out"
