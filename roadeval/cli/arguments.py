@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roadeval.cli.options import FLAGS, Given, with_flags
+from roadeval.cli.options import FLAGS, OptionValues, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
@@ -32,6 +32,22 @@ Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
 Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
 Json = Annotated[bool, option("--json", "Print the result on stdout as JSON.")]
 Quiet = Annotated[bool, option("-q --quiet", "No progress and no tables; warnings remain.")]
+
+
+def ending_in(*endings: str, unnamed: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+    """Return the callback of an option whose paths must have one of these endings.
+
+    Those that are ``unnamed`` are allowed, too, but the message does not propose them.
+    """
+
+    def check(paths: Any) -> Any:
+        for path in paths if isinstance(paths, list) else filter(None, [paths]):
+            if path.suffix.lower() not in (*endings, *unnamed):
+                choice = f"{', '.join(endings[:-1])} or {endings[-1]}"
+                raise typer.BadParameter(f"{path}: end it in {choice}")
+        return paths
+
+    return check
 
 
 @contextmanager
@@ -64,7 +80,7 @@ Conditions = Annotated[
 ]
 
 
-def configuration(given: Given) -> RunConfig:
+def configuration(options: OptionValues) -> RunConfig:
     """Return the configuration that a preset, a file, and options on top of both make.
 
     A `typer.BadParameter` if a value is wrong whatever the files hold, or options do not go
@@ -75,30 +91,30 @@ def configuration(given: Given) -> RunConfig:
     from roadeval.config.tables import ConfigError, in_file, read_tables
     from roadeval.config.variants import network_variant
 
-    preset = {"preset": given["preset"]} if "preset" in given else {}
+    preset = {"preset": options["preset"]} if "preset" in options else {}
     with usage():
-        _check_names(given)
+        _check_names(options)
         config = configure(preset)
-    if path := given.get("config"):
+    if path := options.get("config"):
         tables = read_tables(path)
-        if preset and tables.get("preset", given["preset"]) != given["preset"]:
-            problem = f"starts from preset {tables['preset']}, not from {given['preset']}"
+        if preset and tables.get("preset", options["preset"]) != options["preset"]:
+            problem = f"starts from preset {tables['preset']}, not from {options['preset']}"
             raise ConfigError(problem, where=path)
         config = configure({**preset, **tables}, where=str(path))
-    variants = [_variant(name, path) for name, path in given.get("variants", ())]
-    variants += [network_variant(name, path) for name, path in given.get("nets", ())]
-    masks = {name: _mask_tables(name, path) for name, path in given.get("masks", ())}
+    variants = [_variant(name, path) for name, path in options.get("variants", ())]
+    variants += [network_variant(name, path) for name, path in options.get("nets", ())]
+    masks = {name: _mask_tables(name, path) for name, path in options.get("masks", ())}
     with usage():
-        config = config.override({**_tables(given), "masks": masks}).with_variants(variants)
-        config = config.with_tuned(given.get("tunes", ()))
-        if "only" in given:
-            config = config.override({"only": given["only"]})
-    if path := given.get("ground"):
+        config = config.override({**_tables(options), "masks": masks}).with_variants(variants)
+        config = config.with_tuned(options.get("tunes", ()))
+        if "only" in options:
+            config = config.override({"only": options["only"]})
+    if path := options.get("ground"):
         ground = read_camera(path, config.topics.image)
         with in_file(str(path)):
             config = config.override({"ground": ground})
     frame_options = {"training.frames", "training.placement", "training.gap"}
-    if config.training.model and not config.training.adapt and frame_options & given.keys():
+    if config.training.model and not config.training.adapt and frame_options & options.keys():
         raise typer.BadParameter(
             "--train-frames, --train-on and --train-gap do not go with a model "
             f"({config.training.model})"
@@ -151,32 +167,32 @@ def select_camera(result: Result_, name: str | None) -> Result_:
     return result.cameras[camera]
 
 
-def check_one_camera(given: Given) -> None:
+def check_one_camera(options: OptionValues) -> None:
     """Raise a `typer.BadParameter` for several cameras."""
-    if len(given.get("cameras", ())) > 1:
+    if len(options.get("cameras", ())) > 1:
         raise typer.BadParameter("--image-topic: this command takes one camera at a time")
 
 
-def _check_names(given: Given) -> None:
+def _check_names(options: OptionValues) -> None:
     """Raise a `ConfigError` if two variants have one name, or a name cannot be used."""
     from roadeval.config.variants import check_variant_name
     from roadeval.data import FILTERED, UNFILTERED
 
     taken = [FILTERED, UNFILTERED]
     for option in ("variants", "nets", "topics.masks", "masks"):
-        for name, _ in given.get(option, ()):
+        for name, _ in options.get(option, ()):
             check_variant_name(name, taken)
             taken.append(name)
 
 
-def _tables(given: Given) -> dict[str, Any]:
+def _tables(options: OptionValues) -> dict[str, Any]:
     """Return the values of options as the tables of a TOML file."""
     tables: dict[str, Any] = {}
-    for setting, value in given.items():
+    for setting, value in options.items():
         table, _, key = setting.partition(".")
         if key:
             tables.setdefault(table, {})[key] = dict(value) if key == "masks" else value
-    topics = given.get("cameras", ())
+    topics = options.get("cameras", ())
     if len(topics) > 1:
         tables["cameras"] = [{"image": topic} for topic in topics]
     elif topics:

@@ -26,8 +26,8 @@ from roadeval.runtime.sentence import name_settings
 from roadeval.runtime.settings import Flag, meanings
 from roadeval.training.settings import TrainingSettings
 
-Given = Mapping[str, Any]
-"""Values of options by the names of their settings, without those that were not typed."""
+OptionValues = Mapping[str, Any]
+"""The values of the options that were typed, by the names of their settings."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:
             readers: Mapping[type, Callable[[str], Any]] = {str: str, int: value_or_name}
             return list[str], readers.get(_bare(get_args(kind)[0]), color)
         case _:
-            return list[str], partial(named if get_args(kind)[1] is str else _maybe_named, names)
+            return list[str], partial(named, names, alone=get_args(kind)[1] is not str)
 
 
 def _bare(hint: Any) -> Any:
@@ -206,8 +206,13 @@ def color(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in parts)
 
 
-def named(names: str, text: str) -> tuple[str, str]:
-    """Return the parts of ``NAME=VALUE``; for ``names`` see `_kind`."""
+def named(names: str, text: str, *, alone: bool = False) -> tuple[str, str | None]:
+    """Return the parts of ``NAME=VALUE``; for ``names`` see `_kind`.
+
+    With ``alone`` the text may be a name without a value, if it cannot be a path.
+    """
+    if alone and not ("=" in text or Path(text).suffix or Path(text).name != text):
+        return text, None
     *name, value = text.split("=", 1)
     if not value:
         raise typer.BadParameter(f"{text!r} has nothing after '='")
@@ -215,11 +220,6 @@ def named(names: str, text: str) -> tuple[str, str]:
         flag = names.partition(" ")[0]
         raise typer.BadParameter(f"{text!r}: write {names}={value}, as {flag} mine={value}")
     return name[0], value
-
-
-def _maybe_named(names: str, text: str) -> tuple[str, str | None]:
-    is_path = "=" in text or Path(text).suffix or Path(text).name != text
-    return named(names, text) if is_path else (text, None)
 
 
 OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option.group)))
@@ -238,42 +238,41 @@ def with_flags(text: str) -> str:
     >>> with_flags(Sentence("set {masks.net.first} to 1"))
     'set `first` in the file of --masks net=FILE.toml to 1'
     """
-    return str(name_settings(text, _flag_of))
 
+    def flag_of(setting: str) -> str:
+        match setting.split(".", 2):
+            case "masks", name, key:
+                return f"`{key}` in the file of {FLAGS['masks']} {name}=FILE.toml"
+            case "topics", "masks", name:
+                return f"{FLAGS['topics.masks']} {name}"
+        return FLAGS.get(setting, f"`{setting}`")
 
-def _flag_of(setting: str) -> str:
-    table, _, rest = setting.partition(".")
-    name, _, key = rest.partition(".")
-    if table == "masks" and key:
-        return f"`{key}` in the file of {FLAGS[table]} {name}=FILE.toml"
-    if setting.startswith("topics.masks."):
-        return f"{FLAGS['topics.masks']} {key}"
-    return FLAGS.get(setting, f"`{setting}`")
+    return str(name_settings(text, flag_of))
 
 
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """Let a command take the options of some settings, which it receives as ``given``.
+    """Let a command take the options of some settings, and receive their values as ``options``.
 
     The settings are those of `OPTIONS`, or whole tables. A ValueError for any other name.
     """
     names_of = {option: {option.setting, option.setting.partition(".")[0]} for option in OPTIONS}
     if unknown := {*settings}.difference(*names_of.values()):
         raise ValueError(f"no option sets {', '.join(sorted(unknown))}")
-    options = [option for option, names in names_of.items() if names & {*settings}]
+    taken = [option for option, names in names_of.items() if names & {*settings}]
 
     def decorate(command: Callable[..., int]) -> Callable[..., int]:
         @wraps(command)
         def run(*args: Any, **values: Any) -> int:
-            typed = {o.setting: o.value(values.pop(o.argument, None)) for o in options}
-            given = {setting: value for setting, value in typed.items() if value is not None}
-            return command(*args, given=given, **values)
+            read = {o.setting: o.value(values.pop(o.argument, None)) for o in taken}
+            typed = {setting: value for setting, value in read.items() if value is not None}
+            return command(*args, options=typed, **values)
 
         # The options stand after the arguments, and before the command's own options.
         signature = inspect.signature(command, eval_str=True)
-        parameters = [p for p in signature.parameters.values() if p.name != "given"]
+        parameters = [p for p in signature.parameters.values() if p.name != "options"]
         arguments = [p for p in parameters if p.kind is not p.KEYWORD_ONLY]
         others = [p for p in parameters if p.kind is p.KEYWORD_ONLY]
-        parameters = [*arguments, *(option.parameter() for option in options), *others]
+        parameters = [*arguments, *(option.parameter() for option in taken), *others]
         run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in parameters}
         return run

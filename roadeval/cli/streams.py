@@ -23,7 +23,9 @@ def take_over(*, debug: bool) -> None:
     with ``debug`` everything is.
     """
     _fill_closed()
-    sys.stderr = _stderr(os.dup(2))
+    encoding = sys.stderr.encoding if sys.stderr else None
+    own_file = BufferedWriter(_LossyFile(os.dup(2), "w"))
+    sys.stderr = TextIOWrapper(own_file, encoding, errors=UNENCODABLE, line_buffering=True)
     if not debug:
         _close_to_libraries()
     if isinstance(sys.stdout, TextIOWrapper):
@@ -47,13 +49,6 @@ def _fill_closed() -> None:
                 os.close(opened)
     if sys.stdout is None:
         sys.stdout = os.fdopen(1, "w", closefd=False)
-
-
-def _stderr(number: int) -> TextIOWrapper:
-    """Return stderr as a text stream on a descriptor of its own."""
-    encoding = sys.stderr.encoding if sys.stderr else None
-    buffered = BufferedWriter(_LossyFile(number, "w"))
-    return TextIOWrapper(buffered, encoding, errors=UNENCODABLE, line_buffering=True)
 
 
 class _LossyFile(FileIO):

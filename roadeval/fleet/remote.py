@@ -76,9 +76,15 @@ def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path
     source = os.fspath(drive)
     if not is_url(source):
         return Path(source)
-    name, place = Path(_file_name(source)), _open_store(source, patience_s)
+    name, place = Path(file_name(source)), _open_store(source, patience_s)
     file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
     return RemoteLog(shown(source), name, file)
+
+
+def file_name(url: str) -> str:
+    """Return the name in a URL, with ``_`` for letters that some system does not allow."""
+    name = re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|]', "_", last_part(url))
+    return name if name.strip(".") else "drive"
 
 
 class _FileState(NamedTuple):
@@ -184,12 +190,6 @@ def _state_of(place: _Place) -> _FileState:
         if error.problem == SILENT:
             raise
         return _FileState.of(_ask(place.url, obstore.get, place.store, place.key).meta)
-
-
-def _file_name(url: str) -> str:
-    """Return the name in a URL, with ``_`` for letters that some system does not allow."""
-    name = re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|]', "_", last_part(url))
-    return name if name.strip(".") else "drive"
 
 
 def _open_store(url: str, patience_s: float) -> _Place:

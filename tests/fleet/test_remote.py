@@ -71,9 +71,9 @@ def test_what_is_behind_a_url_is_read(server):
     ],
 )
 def test_the_name_of_a_file_is_none_of_a_folder_whatever_the_url_says(path, name):
-    from roadeval.fleet.remote import _file_name
+    from roadeval.fleet.remote import file_name
 
-    assert _file_name(f"https://host/{path}") == name
+    assert file_name(f"https://host/{path}") == name
 
 
 def test_a_signed_url_is_asked_with_its_query_and_not_shown_with_it(server):

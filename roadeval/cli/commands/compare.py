@@ -5,17 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from roadeval.cli import arguments, console, messages
-
-
-def _check_endings(paths: list[Path] | None) -> list[Path] | None:
-    for path in paths or ():
-        if path.suffix.lower() not in (".pdf", ".html", ".md", ".json"):
-            raise typer.BadParameter(f"{path}: end it in .pdf, .html, .md or .json")
-    return paths
-
 
 Results = Annotated[
     list[Path],
@@ -39,7 +29,7 @@ Outputs = Annotated[
         "-o --output",
         "File of the comparison, whose ending is .pdf, .html, .md or .json. Repeatable.",
         "FILE",
-        callback=_check_endings,
+        callback=arguments.ending_in(".pdf", ".html", ".md", ".json"),
     ),
 ]
 Junit = Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 Drives = Annotated[
     list[str],
@@ -34,7 +34,7 @@ def fleet(
             "FOLDER",
         ),
     ],
-    given: Given,
+    options: OptionValues,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -44,7 +44,7 @@ def fleet(
     what is missing or has changed. A drive that cannot be used is a row with the reason, and the
     exit code is 3 then.
     """
-    config = arguments.configuration(given)
+    config = arguments.configuration(options)
     from roadeval.cli.screens import fleet as screen
     from roadeval.jobs.run.fleet import replay_fleet as run
 

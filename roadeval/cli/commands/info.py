@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
@@ -15,7 +15,7 @@ from roadeval.cli.options import Given, takes
 def info(
     drive: arguments.Drive,
     *,
-    given: Given,
+    options: OptionValues,
     verify: Annotated[
         bool, arguments.option("--verify", "Search of the whole log for damage.")
     ] = False,
@@ -27,8 +27,8 @@ def info(
     replay would pick what it picks, or what it would ask for. If the log has more than 50 MB, only
     its indexes are read, unless --verify is given.
     """
-    arguments.check_one_camera(given)
-    config = arguments.configuration(given)
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 if TYPE_CHECKING:
     from roadeval.jobs.results.pick import PickedFrames
@@ -43,7 +43,7 @@ def pick(
         ),
     ] = None,
     seed: Annotated[int, arguments.option("--seed", "Random seed.", "N", min=0)] = 0,
-    given: Given,
+    options: OptionValues,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Pick frames of a log without truth to label.
@@ -54,8 +54,8 @@ def pick(
     masks; put the corrected masks into FOLDER/labels. Picking again into the same folder adds
     frames. A log is replayed first, by the --config of 'replay'; a result is used as it is.
     """
-    arguments.check_one_camera(given)
-    config = arguments.configuration(given)
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
     from roadeval.data.words import counted
     from roadeval.jobs.results.pick import pick as run
     from roadeval.logs.truth.picks import Why

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
@@ -13,7 +13,7 @@ from roadeval.cli.options import Given, takes
 def replay(
     drive: arguments.Drive,
     *,
-    given: Given,
+    options: OptionValues,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -22,7 +22,7 @@ def replay(
     Every intermediate goes into a recording for the Rerun viewer. If the log has truth, each stage
     is scored against it, with the shadow filter and without.
     """
-    config = arguments.configuration(given)
+    config = arguments.configuration(options)
     from roadeval.cli.screens import replay as screen
     from roadeval.jobs.run.replay import replay as run
 

@@ -5,16 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-
-
-def _check_ending(path: Path | None) -> Path | None:
-    if path is not None and path.suffix.lower() not in (".pdf", ".html", ".htm", ""):
-        raise typer.BadParameter(f"{path}: end it in .pdf or .html")
-    return path
 
 
 def report(
@@ -27,7 +19,7 @@ def report(
             "File of the report; one that ends in .html is a page to browse. Default: "
             "reports/<recording>.pdf, or report.pdf in the results folder.",
             "FILE.pdf|FILE.html",
-            callback=_check_ending,
+            callback=arguments.ending_in(".pdf", ".html", unnamed=(".htm", "")),
         ),
     ] = None,
     camera: arguments.Camera = None,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
@@ -27,7 +27,7 @@ def train(
     ],
     *,
     output: Annotated[Path, arguments.option("-o --output", "File of the model.", "MODEL")],
-    given: Given,
+    options: OptionValues,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Train a model on some drives, for use on others.
@@ -36,8 +36,8 @@ def train(
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
     Replay never evaluates the training frames, on any drive.
     """
-    arguments.check_one_camera(given)
-    config = arguments.configuration(given)
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
     from roadeval.jobs.run.train import train as run
 
     with progress.watched(quiet) as watch:

@@ -45,7 +45,10 @@ def show_table(table: Table, out: Console) -> None:
 
     if table.caption:
         out.print(ascii_of(table.caption))
-    columns = [_texts(table, place) for place in range(len(table.columns))]
+    columns = []
+    for place in range(len(table.columns)):
+        texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
+        columns.append(texts if place in table.text_columns else [*map(ascii_of, texts)])
     for number, part in enumerate(_parts(table, columns, out.width)):
         if number:
             out.print()
@@ -62,12 +65,6 @@ def show_table(table: Table, out: Console) -> None:
                     text.stylize("bold")
             grid.add_row(*cells.values(), end_section=line + 1 in table.breaks)
         out.print(grid)
-
-
-def _texts(table: Table, place: int) -> list[str]:
-    """Return a column's texts, with numbers and minus signs in ASCII."""
-    texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
-    return texts if place in table.text_columns else [*map(ascii_of, texts)]
 
 
 def ascii_of(number: str) -> str:
