@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     try:
-        with signals.raised():
+        with signals.as_exceptions():
             code = app(args=arguments, prog_name=messages.PROGRAM, standalone_mode=False)
             console.flush()
             return int(code or ExitCode.DONE)
@@ -122,7 +122,7 @@ def explain(error: BaseException) -> int:
     sentence: str
     match error:
         case signals.Stopped() | KeyboardInterrupt():
-            messages.interrupted(_with_notes("stopped before the end", error))
+            messages.interruption(_with_notes("stopped before the end", error))
             return getattr(error, "exit_code", ExitCode.INTERRUPTED)
         case typer.TyperException():
             messages.error(_usage_message(error))

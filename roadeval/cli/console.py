@@ -102,7 +102,7 @@ def drop() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def wrapped(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
+def wrap(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
     """Wrap a sentence between words only, so that no name or path is broken.
 
     ``indent`` is the left margin; ``hang`` is added to it from the second line on.

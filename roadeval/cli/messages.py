@@ -52,7 +52,7 @@ def traceback(text: str) -> None:
         sys.stderr.write(visible_lines(text))
 
 
-def loops_missing() -> None:
+def warn_of_missing_loops() -> None:
     """Warn if frames take long because the package was installed without its compiled loops."""
     if kernels.missing():
         warning(
@@ -61,7 +61,7 @@ def loops_missing() -> None:
         )
 
 
-def interrupted(sentence: str) -> None:
+def interruption(sentence: str) -> None:
     """Write that a signal ended the command: ``roadeval: interrupted: ...``."""
     _write("interrupted", "bold yellow", sentence)
 

@@ -135,7 +135,7 @@ class Option:
         return [self.read(word) for word in typed] if typed else None
 
 
-def _options() -> Iterator[Option]:
+def _make_options() -> Iterator[Option]:
     for table, (settings, group) in TABLES.items():
         hints, texts = get_type_hints(settings, include_extras=True), meanings(settings)
         for field in dataclasses.fields(settings):
@@ -171,34 +171,36 @@ def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:
 
     ``names`` is the flag and the placeholder of the name in its value, as ``--net NAME``.
     """
-    kind = _bare(hint)
+    kind = _without_metadata(hint)
     match get_origin(kind):
         case None:
             return kind, None
         case typing.Literal:
             return str, None
         case builtins.tuple:
-            readers: Mapping[type, Callable[[str], Any]] = {str: str, int: value_or_name}
-            return list[str], readers.get(_bare(get_args(kind)[0]), color)
+            readers: Mapping[type, Callable[[str], Any]] = {str: str, int: read_label}
+            return list[str], readers.get(_without_metadata(get_args(kind)[0]), read_color)
         case _:
-            return list[str], partial(named, names, alone=get_args(kind)[1] is not str)
+            return list[str], partial(read_named, names, alone=get_args(kind)[1] is not str)
 
 
-def _bare(hint: Any) -> Any:
+def _without_metadata(hint: Any) -> Any:
     """Return a type without its metadata, and without None."""
     while get_origin(hint) is Annotated:
         hint = get_args(hint)[0]
     if get_origin(hint) in (Union, types.UnionType):
-        return _bare(next(kind for kind in get_args(hint) if kind is not types.NoneType))
+        return _without_metadata(
+            next(kind for kind in get_args(hint) if kind is not types.NoneType)
+        )
     return hint
 
 
-def value_or_name(text: str) -> int | str:
+def read_label(text: str) -> int | str:
     """Return the value of a label, or the name of its class."""
     return int(text) if re.fullmatch(r"-?[0-9]{1,18}", text) else text
 
 
-def color(text: str) -> tuple[int, ...]:
+def read_color(text: str) -> tuple[int, ...]:
     """Return the numbers of ``R,G,B``."""
     parts = text.split(",")
     if len(parts) != 3 or not all(part.strip().isdecimal() for part in parts):
@@ -206,7 +208,7 @@ def color(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in parts)
 
 
-def named(names: str, text: str, *, alone: bool = False) -> tuple[str, str | None]:
+def read_named(names: str, text: str, *, alone: bool = False) -> tuple[str, str | None]:
     """Return the parts of ``NAME=VALUE``; for ``names`` see `_kind`.
 
     With ``alone`` the text may be a name without a value, if it cannot be a path.
@@ -222,7 +224,7 @@ def named(names: str, text: str, *, alone: bool = False) -> tuple[str, str | Non
     return name[0], value
 
 
-OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option.group)))
+OPTIONS: Final = tuple(sorted(_make_options(), key=lambda option: GROUPS.index(option.group)))
 """In the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "topics.image": "--image-topic"

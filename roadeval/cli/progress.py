@@ -15,7 +15,7 @@ LINE_PERIOD_S: Final = 10.0
 
 
 @contextmanager
-def watched(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
+def show(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
     """Yield the function that a job calls with its progress; the display lasts for the block."""
     if quiet:
         yield lambda _progress: None

@@ -26,7 +26,7 @@ class Stopped(SystemExit):
 
 
 @contextmanager
-def raised() -> Iterator[None]:
+def as_exceptions() -> Iterator[None]:
     """Turn the first SIGINT or SIGTERM into `Stopped`; a later one ends the process at once.
 
     Python accepts handlers from the main thread only; in any other thread nothing changes.

@@ -34,7 +34,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
-from roadeval.config.tables import ConfigError, adapter, either, in_file, override, read_tables
+from roadeval.config.tables import ConfigError, adapter, in_file, list_names, override, read_tables
 from roadeval.config.variants import (
     PRESETS,
     TRAINED,
@@ -98,7 +98,9 @@ class RunConfig(LogConfig):
         for name in self.only:
             if name not in names:
                 raise ConfigError(
-                    f"there is no variant {name}", setting="only", remedy=f"choose {either(names)}"
+                    f"there is no variant {name}",
+                    setting="only",
+                    remedy=f"choose {list_names(names)}",
                 )
         self._check_cameras()
         try:
@@ -234,19 +236,19 @@ class RunConfig(LogConfig):
         variants = []
         for name in names:
             if name not in pipelines and name not in masks:
-                remedy = f"choose {either({*pipelines, *masks} - {FILTERED, UNFILTERED})}"
+                remedy = f"choose {list_names({*pipelines, *masks} - {FILTERED, UNFILTERED})}"
                 raise ConfigError(f"there is no method {name}", setting="tunes", remedy=remedy)
             variants.append(tuned_variant(name, pipelines.get(name)))
         return self.with_variants(variants)
 
-    def given(self) -> set[str]:
+    def input_masks(self) -> set[str]:
         """Return the names of the masks that the variants use as input."""
         settings = (pipeline.settings.get("given") for pipeline in self.pipelines().values())
         return {given.name for given in settings if given is not None}
 
     def for_training(self) -> RunConfig:
         """Return the configuration with only those masks from which variants learn."""
-        masks = {name: masks for name, masks in self.masks.items() if name in self.given()}
+        masks = {name: masks for name, masks in self.masks.items() if name in self.input_masks()}
         return replace(self, masks=masks, only=())
 
     def of_drive(self, tables: Mapping[str, Any]) -> RunConfig:
@@ -266,7 +268,7 @@ class RunConfig(LogConfig):
                 raise ConfigError(f"[masks.{name}] has no path: a folder, or LOG.mcap:/topic")
         used = {*self.masks, *self.topics.masks}
         if self.only:
-            used &= {*self.only, *self.given()}
+            used &= {*self.only, *self.input_masks()}
         topics = {name: topic for name, topic in self.topics.masks.items() if name in used}
         return replace(
             self,
@@ -275,7 +277,7 @@ class RunConfig(LogConfig):
             truth=in_drive(self.truth, path),
         )
 
-    def ignored(self) -> tuple[str, ...]:
+    def ignored_settings(self) -> tuple[str, ...]:
         """Return a note on each setting of a variant's preset that the run does not follow."""
         return tuple(
             f"{variant.name}: preset {variant.preset} asks for {section}.{key} = {value}, but all "

@@ -128,15 +128,15 @@ def adapter(kind: type) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def either(names: Iterable[str]) -> str:
+def list_names(names: Iterable[str]) -> str:
     """Return names to choose from, in a row."""
     return ", ".join(sorted(names))
 
 
-def quoted(value: Any) -> str:
+def quote(value: Any) -> str:
     """Return a value as in a file, shortened for a message.
 
-    >>> quoted(True)
+    >>> quote(True)
     'true'
     """
     text = dumps(value, ensure_ascii=False, default=str)
@@ -165,7 +165,7 @@ def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
         if names is not None and key not in names:
             if not names:
                 raise ConfigError("it has no settings", setting=setting)
-            choice = f"choose {either(names)}"
+            choice = f"choose {list_names(names)}"
             raise ConfigError("there is no such setting", setting=setting, remedy=choice)
         if isinstance(value, Mapping):
             _check(value, getattr(settings, key, None), setting)
@@ -201,4 +201,4 @@ def describe_problem(problem: Mapping[str, Any]) -> str:
     message = str(context.get("error", problem["msg"]))
     message = next(plain, "{}").format(message, **context)
     shown = problem["loc"] and not isinstance(given, Mapping)
-    return f"{message} (given: {quoted(given)})" if shown else message
+    return f"{message} (given: {quote(given)})" if shown else message

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from roadeval.config.settings import SECTIONS
-from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
+from roadeval.config.tables import ConfigError, in_file, list_names, override, read_tables
 from roadeval.data import (
     ERRORS,
     FILTERED,
@@ -134,14 +134,14 @@ def preset_of(tables: Mapping[str, Any]) -> str:
     """Return the name of the preset of some tables; a `ConfigError` if there is no such preset."""
     name = tables.get("preset", "paper")
     if not isinstance(name, str) or name not in PRESETS:
-        remedy = f"choose {either(PRESETS)}"
+        remedy = f"choose {list_names(PRESETS)}"
         raise ConfigError(f"there is no {name!r}", where="preset", remedy=remedy)
     return name
 
 
 def check_tables(tables: Mapping[str, Any], allowed: Collection[str]) -> None:
     """Raise a `ConfigError` for a table, or a key outside of tables, that is not allowed."""
-    names = either(name for name in allowed if name != "chain")
+    names = list_names(name for name in allowed if name != "chain")
     for key, table in tables.items():
         if key in allowed:
             continue
@@ -177,7 +177,7 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
 
 def _stages_of(chain: Any) -> tuple[Stage, ...]:
     """Return the stages of a chain; a `ConfigError` if they do not make one."""
-    choice = f"choose {either(stages.names())}"
+    choice = f"choose {list_names(stages.names())}"
     if not isinstance(chain, list | tuple) or not chain:
         raise ConfigError("chain must be a list of stages", remedy=choice)
     for name in chain:
@@ -208,7 +208,7 @@ def check_variant_name(name: str, taken: Collection[str]) -> None:
             where=where,
         )
     if name in RESERVED:
-        raise ConfigError(f"the name is reserved ({either(RESERVED)})", where=where)
+        raise ConfigError(f"the name is reserved ({list_names(RESERVED)})", where=where)
     if name in taken:
         raise ConfigError("the name is taken", where=where, remedy="choose another")
 

@@ -57,21 +57,21 @@ def scheme_of(url: str) -> str:
     scheme = match[1].lower() if match else ""
     if scheme not in SCHEMES:
         remedy = f"choose {', '.join(f'{scheme}://' for scheme in SCHEMES)}"
-        raise FleetError("an unknown scheme", where=shown(url), remedy=remedy)
+        raise FleetError("an unknown scheme", where=public_source(url), remedy=remedy)
     if scheme in ("https", "http"):
         try:
             has_host = bool(urlsplit(url).hostname)
         except ValueError:
             has_host = False
         if not has_host:
-            raise FleetError("no host in it", where=shown(url))
+            raise FleetError("no host in it", where=public_source(url))
     return scheme
 
 
-def shown(source: str) -> str:
+def public_source(source: str) -> str:
     """Return the source of a drive as it may be shown: a URL without user, password and query.
 
-    >>> shown("https://me:secret@host/a.mcap?X-Amz-Signature=5d1c")
+    >>> public_source("https://me:secret@host/a.mcap?X-Amz-Signature=5d1c")
     'https://host/a.mcap'
     """
     return visible(public_url(source) if is_url(source) else without_secrets(source))
@@ -82,9 +82,9 @@ def bucket_and_key(url: str) -> tuple[str, str]:
     bucket, _, key = url.partition("://")[2].partition("/")
     if "@" in bucket:
         problem = "credentials are read from the environment, not from a URL"
-        raise FleetError(problem, where=shown(url))
+        raise FleetError(problem, where=public_source(url))
     if not bucket:
-        raise FleetError("no bucket in it", where=shown(url))
+        raise FleetError("no bucket in it", where=public_source(url))
     return bucket, key
 
 
@@ -134,7 +134,7 @@ class DriveEntry:
     @property
     def shown(self) -> str:
         """The source without its secrets."""
-        return shown(self.source)
+        return public_source(self.source)
 
     @property
     def camera(self) -> str:
@@ -235,7 +235,7 @@ def is_bag(folder: Path) -> bool:
         return False
 
 
-def in_order(path: PurePath) -> list[Any]:
+def natural_path(path: PurePath) -> list[Any]:
     """Sort key by which ``monday/drive_2`` comes before ``monday/drive_10``."""
     return [(natural(Path(part)), part) for part in path.parts]
 
@@ -284,7 +284,7 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     >>> deal({"a": "monday", "b": "monday", "c": "tuesday"}, 2, seed=0)
     {'a': 1, 'b': 1, 'c': 0}
     """
-    names = shuffled(set(groups.values()), seed)
+    names = shuffle(set(groups.values()), seed)
     if len(names) < folds:
         raise FleetError(
             f"{folds} folds need as many drives with truth, or groups of them, and there are "
@@ -295,7 +295,7 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     return {drive: fold[group] for drive, group in groups.items()}
 
 
-def shuffled(names: Iterable[str], seed: int) -> list[str]:
+def shuffle(names: Iterable[str], seed: int) -> list[str]:
     """Return names in an order that depends on the seed, not on their own order."""
 
     def digest(name: str) -> bytes:
@@ -341,7 +341,7 @@ def _sources(word: str, base: Path) -> list[str]:
         scheme_of(word)
         if word.endswith("/"):
             remedy = "name its logs, or a manifest of them"
-            raise FleetError("a folder", where=shown(word), remedy=remedy)
+            raise FleetError("a folder", where=public_source(word), remedy=remedy)
         _check_no_manifest(Path(last_part(word)))
         return [word]
     path = base / Path(word).expanduser()
@@ -385,7 +385,7 @@ def _find_below(folder: Path) -> list[Path]:
         seen.add(here.resolve())
         folders[:] = sorted(filter(is_usable, folders))
         drives += [here] if is_bag(here) else [here / file for file in files if is_log(file)]
-    return sorted(drives, key=lambda path: in_order(path.relative_to(folder)))
+    return sorted(drives, key=lambda path: natural_path(path.relative_to(folder)))
 
 
 def _find_matches(word: str, base: Path) -> list[Path]:
@@ -398,7 +398,7 @@ def _find_matches(word: str, base: Path) -> list[Path]:
         drives.update(_find_below(folder))
     if not drives:
         raise FleetError("no log matches it", where=visible(word))
-    return sorted(drives, key=in_order)
+    return sorted(drives, key=natural_path)
 
 
 def _absolute(path: Path) -> Path:

@@ -29,8 +29,8 @@ from roadeval.fleet.drives import (
     bucket_and_key,
     is_url,
     last_part,
+    public_source,
     scheme_of,
-    shown,
 )
 from roadeval.logs.log import RemoteLog
 from roadeval.runtime.threads import in_thread
@@ -67,7 +67,7 @@ _REASONS: Final = (
 """Patterns of obstore's errors and messages, and their meaning; the first that matches counts."""
 
 
-def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
+def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
     """Return the path of a drive, or the file behind its URL, for `roadeval.logs.log.open_log`.
 
     Only the parts of the file that are needed are read. A `FleetError` if the URL is none, nothing
@@ -78,7 +78,7 @@ def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path
         return Path(source)
     name, place = Path(file_name(source)), _open_store(source, patience_s)
     file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
-    return RemoteLog(shown(source), name, file)
+    return RemoteLog(public_source(source), name, file)
 
 
 def file_name(url: str) -> str:
@@ -144,7 +144,7 @@ class _RemoteFile:
                     break
             return _FileState.of(answer.meta), bytes(content)
 
-        where = shown(self._place.url)
+        where = public_source(self._place.url)
         try:
             state, content = _ask(self._place.url, read_part)
         except FleetError as error:
@@ -202,7 +202,9 @@ def _open_store(url: str, patience_s: float) -> _Place:
         from obstore import store as stores
     except ImportError as error:
         remedy = "pip install 'roadeval[remote]'"
-        raise FleetError("URLs are read by obstore", where=shown(url), remedy=remedy) from error
+        raise FleetError(
+            "URLs are read by obstore", where=public_source(url), remedy=remedy
+        ) from error
     # The limits for connecting, for the next bytes, for the whole answer, and for trying again.
     pause = timedelta(seconds=patience_s / 2)
     times = {"connect_timeout": pause, "read_timeout": pause, "timeout": timedelta(days=1)}
@@ -240,4 +242,4 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
         kind = type(error).__name__
         reasons = (reason for pattern, reason in _REASONS if re.search(pattern, f"{kind} {error}"))
         reason = next(reasons, f"cannot be read ({kind})")
-        raise FleetError(reason, where=shown(url)) from None
+        raise FleetError(reason, where=public_source(url)) from None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet.remote import readable
+from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.logs.log import LogDescription, describe, open_log
@@ -50,12 +50,12 @@ def info(
     def step(done: int, total: int) -> None:
         on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
 
-    described = describe(readable(drive), config, verify=verify, on_bytes=step)
+    described = describe(open_source(drive), config, verify=verify, on_bytes=step)
     if config is None or not config.truth.path or described.problem:
         return described
     from roadeval.jobs.run.summary import misfits_of_truth
 
-    with open_log(readable(drive), config) as log:
+    with open_log(open_source(drive), config) as log:
         return replace(described, misfits=(*misfits_of_truth(log),))
 
 

@@ -51,7 +51,7 @@ def test_a_line_comes_now_and_then_with_rate_and_time_left(monkeypatch):
 def test_at_a_terminal_there_is_a_bar(monkeypatch):
     screen = Console(file=io.StringIO(), force_terminal=True, width=80)
     monkeypatch.setattr(console, "diagnostics", lambda: screen)
-    with progress.watched() as watch:
+    with progress.show() as watch:
         watch(step(40, 100))
         watch(step(50, 100))
         watch(step(60, 100))

@@ -5,7 +5,7 @@ import pytest
 import roadeval
 from roadeval.fleet import remote
 from roadeval.fleet.drives import FleetError
-from roadeval.fleet.remote import readable
+from roadeval.fleet.remote import open_source
 from roadeval.logs.log import open_log
 from tests.fleet.serving import Server
 from tests.jobs.making import settings, write_log
@@ -23,7 +23,7 @@ def test_a_log_has_one_identity_on_disk_and_at_two_urls(server, tmp_path):
     with open_log(path) as log:
         digest = log.digest
     for url in (server.url("a/noise.mcap"), server.url("b/noise.mcap?signature=5d1c")):
-        with open_log(readable(url)) as log:
+        with open_log(open_source(url)) as log:
             assert log.digest == digest
             assert (log.name, log.source) == ("noise", url.partition("?")[0])
 
@@ -40,7 +40,7 @@ def test_a_replay_of_a_url_is_that_of_the_file(server, tmp_path):
 def test_only_what_is_needed_is_fetched(server, tmp_path, monkeypatch):
     monkeypatch.setattr(remote, "_PART", 1 << 10)
     path = write(tmp_path / "noise.mcap")
-    with open_log(readable(server.url("noise.mcap"))) as log:
+    with open_log(open_source(server.url("noise.mcap"))) as log:
         (topic,) = log.topics
         assert (topic.count, log.digest != "") == (FRAMES, True)
     assert server.sent < path.stat().st_size // 20
@@ -49,7 +49,7 @@ def test_only_what_is_needed_is_fetched(server, tmp_path, monkeypatch):
 def test_a_log_that_changes_while_it_is_read_is_named(server, tmp_path, monkeypatch):
     monkeypatch.setattr(remote, "_PART", 1 << 10)
     path = write(tmp_path / "noise.mcap")
-    with open_log(readable(server.url("noise.mcap"))) as log:
+    with open_log(open_source(server.url("noise.mcap"))) as log:
         content = bytearray(path.read_bytes())
         content[len(content) // 2] ^= 0xFF
         path.write_bytes(content)

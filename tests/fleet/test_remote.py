@@ -12,7 +12,7 @@ import pytest
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet import remote
-from roadeval.fleet.remote import readable, stamp
+from roadeval.fleet.remote import open_source, stamp
 from tests.fleet.serving import CONTENT, SLOW, Server, s3_is_at
 
 
@@ -40,7 +40,7 @@ def s3(server, monkeypatch):
 
 def fetched(url: str, patience_s: float = 20) -> bytes:
     """The bytes of a drive."""
-    return readable(url, patience_s).file.read(len(CONTENT))
+    return open_source(url, patience_s).file.read(len(CONTENT))
 
 
 def refused(url: str) -> str:
@@ -57,7 +57,7 @@ def refused(url: str) -> str:
 def test_what_is_behind_a_url_is_read(server):
     url = server.url("whole/Monday%20rain.mcap")
     assert fetched(url) == CONTENT
-    assert readable(url).path == Path("Monday rain.mcap")
+    assert open_source(url).path == Path("Monday rain.mcap")
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_the_name_of_a_file_is_none_of_a_folder_whatever_the_url_says(path, name
 
 
 def test_a_signed_url_is_asked_with_its_query_and_not_shown_with_it(server):
-    log = readable(server.url("whole/a.mcap?sig=geheim%2F&x=1"))
+    log = open_source(server.url("whole/a.mcap?sig=geheim%2F&x=1"))
     assert (log.path, log.source) == (Path("a.mcap"), server.url("whole/a.mcap"))
     assert server.asked[0][1] == "/whole/a.mcap?sig=geheim%2F&x=1"
     message = refused(server.url("403/a.mcap?sig=geheim", user="me:geheim@"))

@@ -170,10 +170,10 @@ def test_a_run_that_fails_leaves_an_earlier_one_s_partial_recording(drive, tmp_p
 
 def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_warned_of():
     robust = {"variants": {"v": {"preset": "robust"}}}
-    (pixels, most) = roadeval.configure(robust).ignored()
+    (pixels, most) = roadeval.configure(robust).ignored_settings()
     assert "v: preset robust asks for training.pixels_per_class = 1000" in pixels
     assert "training.max_pixels = 50000" in most
-    assert roadeval.configure({"preset": "robust"} | robust).ignored() == ()
+    assert roadeval.configure({"preset": "robust"} | robust).ignored_settings() == ()
 
 
 @pytest.mark.parametrize("table", TABLES)

@@ -48,13 +48,13 @@ def fleet(
     from roadeval.cli.screens import fleet as screen
     from roadeval.jobs.run.fleet import replay_fleet as run
 
-    with progress.watched(quiet) as watch:
+    with progress.show(quiet) as watch:
         outcome = run(paths, output, config, on_progress=watch)
     if json:
         console.emit(outcome.facts.text().rstrip())
     elif not quiet:
         screen.show(outcome, console.results())
-    messages.loops_missing()
+    messages.warn_of_missing_loops()
     for sentence in screen.problems(outcome):
         messages.warning(sentence)
     return ExitCode.LOSS if outcome.lost else ExitCode.DONE

@@ -32,7 +32,7 @@ def info(
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe
 
-    with progress.watched(quiet=json or not verify) as watch:
+    with progress.show(quiet=json or not verify) as watch:
         log = describe(drive, config, verify=verify, on_progress=watch)
     if json:
         from roadeval.results.facts import json_text

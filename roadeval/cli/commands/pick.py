@@ -60,7 +60,7 @@ def pick(
     from roadeval.jobs.results.pick import pick as run
     from roadeval.logs.truth.picks import Why
 
-    with progress.watched(quiet) as watch:
+    with progress.show(quiet) as watch:
         drives = run(
             *(sources, count, output, config),
             labels=form,
@@ -79,7 +79,7 @@ def pick(
         out = console.results()
         out.print(f"Correct {drives[0].folder}/proposals, and put the results into labels/.")
         console.show_next(out, _next_command(drives, output))
-    messages.loops_missing()
+    messages.warn_of_missing_loops()
     return ExitCode.DONE
 
 

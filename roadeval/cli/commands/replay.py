@@ -26,7 +26,7 @@ def replay(
     from roadeval.cli.screens import replay as screen
     from roadeval.jobs.run.replay import replay as run
 
-    with progress.watched(quiet) as watch:
+    with progress.show(quiet) as watch:
         outcome = run(drive, config, on_progress=watch)
     if json:
         console.emit(outcome.facts.text().rstrip())
@@ -34,7 +34,7 @@ def replay(
         screen.show(outcome, console.results())
     for text in outcome.tracebacks:
         messages.traceback(text)
-    messages.loops_missing()
+    messages.warn_of_missing_loops()
     for warning in outcome.warnings:
         messages.warning(warning)
     return messages.losses(outcome.losses)

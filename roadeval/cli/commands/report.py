@@ -35,7 +35,7 @@ def report(
     from roadeval.jobs.results.result import Result
 
     opened = arguments.select_camera(Result(result), camera)
-    with progress.watched(quiet) as watch:
+    with progress.show(quiet) as watch:
         path = write_report(opened, output, on_progress=watch)
     if not quiet:
         console.emit(str(path))

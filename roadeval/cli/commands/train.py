@@ -40,9 +40,9 @@ def train(
     config = arguments.configuration(options)
     from roadeval.jobs.run.train import train as run
 
-    with progress.watched(quiet) as watch:
+    with progress.show(quiet) as watch:
         model = run(paths, output, config, on_progress=watch)
-    messages.loops_missing()
+    messages.warn_of_missing_loops()
     for warning in model.warnings:
         messages.warning(warning)
     if not quiet:

@@ -40,10 +40,10 @@ def show(log: LogDescription, out: Console) -> None:
         out.print(f"replay would stop: {with_flags(log.problem)}", soft_wrap=True)
         return
     for misfit in log.misfits:
-        out.print(console.wrapped(with_flags(misfit), out.width, 0), soft_wrap=True)
+        out.print(console.wrap(with_flags(misfit), out.width, 0), soft_wrap=True)
     out.print("replay would pick")
     for pick in log.picks:
-        out.print(console.wrapped(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True)
+        out.print(console.wrap(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True)
 
 
 def _topic_table(topics: Sequence[TopicInfo]) -> Table:

@@ -19,7 +19,7 @@ from roadeval.fleet.drives import (
     find_drives,
     groups_of,
     name_cameras,
-    shuffled,
+    shuffle,
 )
 from roadeval.fleet.engine import ATTEMPTS, is_worker_death, start_workers
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -192,7 +192,7 @@ class FleetRun:
         configs = {entry.id: entry.config(settings) for entry in self.entries}
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
-        asked = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
+        asked = [by_id[drive] for drive in shuffle(by_id, settings.training.seed)]
         training = [
             FoldTask(
                 self.folder,

@@ -12,7 +12,7 @@ from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
 from roadeval.evaluation.score.scoreboard import DriveSums
 from roadeval.evaluation.tables import joined
-from roadeval.fleet.remote import readable
+from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
@@ -93,7 +93,7 @@ def replay(
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
-    with open_log(readable(drive, config.run.patience_s), config) as log:
+    with open_log(open_source(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
             outcome = _written(log, config, to, on_progress, on_frame)

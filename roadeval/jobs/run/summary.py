@@ -86,7 +86,7 @@ def of(run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFa
             *(run.selection.size or (0, 0)),
             rate_hz=run.selection.image.rate_hz,
             **sums.times,
-            topics=[*run.selection.reasons, *run.config.ignored()],
+            topics=[*run.selection.reasons, *run.config.ignored_settings()],
             calibration=run.calibration,
             ground=run.selection.ground_as_read,
         ),
