@@ -43,7 +43,7 @@ Answer = TypeVar("Answer")
 PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
-_PART: Final = 64 << 10
+PART: Final = 64 << 10
 """Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
 _POLL_S: Final = 0.2
 """Seconds between two checks for an answer."""
@@ -123,7 +123,7 @@ class _RemoteFile:
     def read(self, size: int) -> bytes:
         begin, end = self._at, min(self._at + size, self._size)
         if not self._begin <= begin <= end <= self._begin + len(self._part):
-            self._part = self._fetch(begin, min(max(end, begin + _PART), self._size))
+            self._part = self._fetch(begin, min(max(end, begin + PART), self._size))
             self._begin = begin
         self._at = max(begin, end)
         return self._part[begin - self._begin : self._at - self._begin]

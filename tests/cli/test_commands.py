@@ -20,10 +20,10 @@ def bare(tmp_path, monkeypatch):
 
 def test_the_patch_trains_a_log_without_truth(bare, capsys):
     assert main(["train", "bare.mcap", "--config", "patch.toml", "-o", "m.model"]) == 0
-    told = capsys.readouterr()
-    assert "m.model: filtered, unfiltered; trained on 3 frames" in told.out
-    assert told.out.endswith("pixels, by the patch\n")
-    assert "guess" not in told.err
+    streams = capsys.readouterr()
+    assert "m.model: filtered, unfiltered; trained on 3 frames" in streams.out
+    assert streams.out.endswith("pixels, by the patch\n")
+    assert "guess" not in streams.err
 
 
 def test_what_holds_for_one_drive_is_read_from_a_manifest(tmp_path, monkeypatch, capsys):
@@ -33,9 +33,9 @@ def test_what_holds_for_one_drive_is_read_from_a_manifest(tmp_path, monkeypatch,
     write_log(tmp_path / "ids.mcap", codes=(5, 3))
     words = ["train", "mask.mcap", "ids.mcap", "-o", "m.model", "--train-frames", "2"]
     assert main([*words, "ids.toml"]) == 0
-    told = capsys.readouterr()
-    assert "by the truth" in told.out
-    assert "warning" not in told.err
+    streams = capsys.readouterr()
+    assert "by the truth" in streams.out
+    assert "warning" not in streams.err
     assert main(words) == 1
     assert "ids.mcap: /truth/road holds the values 3 5" in capsys.readouterr().err
 
@@ -44,9 +44,9 @@ def test_what_was_left_out_is_told_and_decides_the_exit_code(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     write_log(tmp_path / "broken.mcap", broken=8)
     assert main(["train", "broken.mcap", "-o", "m.model", "--train-frames", "3", "-q"]) == 3
-    told = capsys.readouterr().err
-    assert "roadeval: lost: frame 8: 8 bytes that are no image" in told
-    assert "roadeval: lost: 1 of 3 training frames could not be decoded" in told
+    stderr = capsys.readouterr().err
+    assert "roadeval: lost: frame 8: 8 bytes that are no image" in stderr
+    assert "roadeval: lost: 1 of 3 training frames could not be decoded" in stderr
     assert (tmp_path / "m.model").exists()
 
 
@@ -77,8 +77,8 @@ def folder(tmp_path):
 def test_images_and_masks_become_one_log(folder, capsys):
     words = ["pack", f"{folder}/imgs", "--truth", f"{folder}/masks", "-o", f"{folder}/d.mcap"]
     assert main(words) == 0
-    said = capsys.readouterr()
-    assert "d.mcap: 3 images, 2 with a mask; 10 images a second" in said.out
-    assert "images without a mask: 2.jpg" in said.err
+    streams = capsys.readouterr()
+    assert "d.mcap: 3 images, 2 with a mask; 10 images a second" in streams.out
+    assert "images without a mask: 2.jpg" in streams.err
     main(["info", f"{folder}/d.mcap"])
     assert "truth: /truth/road" in capsys.readouterr().out

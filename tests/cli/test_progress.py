@@ -28,9 +28,9 @@ def lines_of(steps, monkeypatch):
     monkeypatch.setattr(progress.time, "monotonic", clock)
     with Display(get_time=clock, disable=True) as display:
         watch = progress.Watch(display, written.append, lines=True)
-        for seconds, each in steps:
+        for seconds, step in steps:
             clock.seconds = 100 + seconds
-            watch(each)
+            watch(step)
     return written
 
 

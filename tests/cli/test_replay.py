@@ -17,20 +17,20 @@ FACTS = facts_of(
 
 
 @pytest.fixture
-def asked(monkeypatch):
-    """What the main job was asked for; it does nothing and is done at once."""
-    asked = {"warnings": (), "losses": ()}
+def job(monkeypatch):
+    """The arguments of the main job, which does nothing, and what it returns."""
+    job = {"warnings": (), "losses": ()}
 
     def replay(drive, config, *, on_progress):
-        asked.update(drive=drive, config=config)
+        job.update(drive=drive, config=config)
         on_progress(Progress(3, 3, "replaying"))
-        return Outcome(None, None, FACTS, asked["warnings"], asked["losses"], ())
+        return Outcome(None, None, FACTS, job["warnings"], job["losses"], ())
 
     monkeypatch.setattr("roadeval.jobs.run.replay.replay", replay)
-    return asked
+    return job
 
 
-def test_every_option_arrives(asked, tmp_path):
+def test_every_option_arrives(job, tmp_path):
     settings = tmp_path / "narrow.toml"
     settings.write_text("[shadow]\nring_width = 3\n")
     words = (
@@ -42,7 +42,7 @@ def test_every_option_arrives(asked, tmp_path):
         "--every 2 --max-frames 7 --record none --jobs 1"
     )
     assert main(words.split()) == 0
-    assert asked["config"] == configure(
+    assert job["config"] == configure(
         {
             "preset": "printed",
             "shadow": {"ring_width": 3},
@@ -64,7 +64,7 @@ def test_every_option_arrives(asked, tmp_path):
     )
 
 
-def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
+def test_a_preset_that_is_not_the_file_s_is_refused(job, tmp_path, capsys):
     (tmp_path / "c.toml").write_text('preset = "gated"\n')
     words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--preset"]
     assert main([*words, "gated"]) == 0
@@ -81,22 +81,22 @@ def test_a_model_and_training_frames_do_not_go_together(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("--road-label 3 --road-label 70000", "--road-label: item 2 must be at most 65535"),
         (f"--road-label {'9' * 5000}", "--road-label: item 1 must be a whole number"),
         ("--every 0", "--every: must be at least 1 (given: 0)"),
     ],
 )
-def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
+def test_a_value_that_cannot_be_is_named_by_its_flag(words, message, capsys):
     assert main(["replay", "d.mcap", *words.split()]) == 2
-    assert f"roadeval: error: {said}" in capsys.readouterr().err
+    assert f"roadeval: error: {message}" in capsys.readouterr().err
 
 
-def test_every_option_s_words_are_a_setting_s_value(asked):
-    """The help's flags and the settings' names belong together, each once."""
+def test_every_option_s_words_are_a_setting_s_value(job):
+    """Every option of the help sets another setting."""
     assert main(["replay", "d.mcap", "--model", "city.model"]) == 0
-    assert asked["config"].training.model == "city.model"
+    assert job["config"].training.model == "city.model"
     flags = [flag for option in OPTIONS for flag in option.flags]
     assert len({*flags}) == len(flags)
     for option in OPTIONS:
@@ -120,16 +120,16 @@ def test_settings_in_a_sentence_are_named_by_their_flags(text, shown):
     assert with_flags(sentence) == shown
 
 
-def test_warnings_are_told_even_when_quiet(asked, capsys):
-    asked["warnings"] = ("the classifier of filtered calls everything road",)
+def test_warnings_are_told_even_when_quiet(job, capsys):
+    job["warnings"] = ("the classifier of filtered calls everything road",)
     assert main(["replay", "drive.mcap", "--quiet"]) == 0
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err == ("roadeval: warning: the classifier of filtered calls everything road\n")
 
 
-def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
-    asked["losses"] = ("frame 7: its JPEG ends early",)
+def test_a_loss_is_told_and_has_its_exit_code(job, capsys):
+    job["losses"] = ("frame 7: its JPEG ends early",)
     assert main(["replay", "drive.mcap", "--quiet"]) == 3
     assert capsys.readouterr().err == "roadeval: lost: frame 7: its JPEG ends early\n"
 

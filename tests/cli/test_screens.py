@@ -1,4 +1,4 @@
-"""What a replay came to, on a screen."""
+"""The result of a replay on one screen."""
 
 import io
 from pathlib import Path

@@ -140,15 +140,15 @@ def test_no_stage_is_called_like_a_table_of_the_run():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("size = [8, 8]\n", "file must name the network"),
         ('file = "n.onnx"\nsise = [8, 8]\n', r"net\.sise: there is no such setting"),
         ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold has no effect"),
     ],
 )
-def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, said):
-    with pytest.raises(ConfigError, match=said) as caught:
+def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, message):
+    with pytest.raises(ConfigError, match=message) as caught:
         network_variant("mine", str(write(tmp_path, text)))
     assert str(tmp_path / "c.toml") in str(caught.value)
 
@@ -159,4 +159,4 @@ def test_an_empty_topic_is_that_of_every_camera_but_of_those_that_name_one(name,
     named = {name: taken} if taken else {}
     cameras = [{"image": f"/{side}", **named} for side in ("left", "right")]
     config = configure({"topics": {name: ""}, "cameras": cameras})
-    assert {getattr(each.topics, name) for each in config.by_camera().values()} == {taken}
+    assert {getattr(camera.topics, name) for camera in config.by_camera().values()} == {taken}

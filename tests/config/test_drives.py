@@ -1,4 +1,4 @@
-"""What is asked of a single drive: its name in paths, and settings of its own."""
+"""The configuration of a single drive: its name in paths, and its own settings."""
 
 import pytest
 
@@ -9,8 +9,8 @@ from roadeval.config.tables import ConfigError
 def test_masks_are_those_of_the_drive():
     config = configure({"masks": {"net": {"path": "net/{drive}", "threshold": 0.4}}})
     assert config.for_drive("logs/a.mcap").masks["net"].path == "net/a"
-    own = config.of_drive({"masks": {"net": {"path": "elsewhere"}}}).masks["net"]
-    assert (own.path, own.threshold) == ("elsewhere", 0.4)
+    masks = config.of_drive({"masks": {"net": {"path": "elsewhere"}}}).masks["net"]
+    assert (masks.path, masks.threshold) == ("elsewhere", 0.4)
 
 
 def test_what_holds_for_the_whole_run_is_refused_of_a_drive():

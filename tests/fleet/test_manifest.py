@@ -49,7 +49,7 @@ def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_
             "frames": {"every": 2, "end": "20"},
         }
     )
-    first, second = (each.config(run) for each in entries(TOML))
+    first, second = (entry.config(run) for entry in entries(TOML))
     assert (first.topics.image, first.topics.masks) == ("/left", {"net": "/net"})
     assert first.topics.truth == "/truth"
     assert (first.labels.road, first.labels.ignore) == ((3, 7), ())

@@ -31,14 +31,14 @@ def test_a_log_has_one_identity_on_disk_and_at_two_urls(server, tmp_path):
 def test_a_replay_of_a_url_is_that_of_the_file(server, tmp_path):
     path = write_log(tmp_path / "drive.mcap")
     for name, drive in (("disk", path), ("url", server.url("drive.mcap"))):
-        found = roadeval.replay(drive, settings(record="none"), reports=tmp_path / name)
-        assert found.facts.log.path == str(drive)
+        outcome = roadeval.replay(drive, settings(record="none"), reports=tmp_path / name)
+        assert outcome.facts.log.path == str(drive)
     tables = [(tmp_path / name / "frames.csv").read_text() for name in ("disk", "url")]
     assert tables[0] == tables[1]
 
 
 def test_only_what_is_needed_is_fetched(server, tmp_path, monkeypatch):
-    monkeypatch.setattr(remote, "_PART", 1 << 10)
+    monkeypatch.setattr(remote, "PART", 1 << 10)
     path = write(tmp_path / "noise.mcap")
     with open_log(open_source(server.url("noise.mcap"))) as log:
         (topic,) = log.topics
@@ -47,7 +47,7 @@ def test_only_what_is_needed_is_fetched(server, tmp_path, monkeypatch):
 
 
 def test_a_log_that_changes_while_it_is_read_is_named(server, tmp_path, monkeypatch):
-    monkeypatch.setattr(remote, "_PART", 1 << 10)
+    monkeypatch.setattr(remote, "PART", 1 << 10)
     path = write(tmp_path / "noise.mcap")
     with open_log(open_source(server.url("noise.mcap"))) as log:
         content = bytearray(path.read_bytes())

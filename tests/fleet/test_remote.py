@@ -27,7 +27,7 @@ def server(running, monkeypatch):
     """A server, and a client with little patience."""
     pause = {"init_backoff": timedelta(milliseconds=1), "max_backoff": timedelta(milliseconds=9)}
     monkeypatch.setattr(remote, "RETRIES", {"max_retries": 2, "backoff": pause})
-    running.asked.clear()
+    running.requests.clear()
     return running
 
 
@@ -79,14 +79,14 @@ def test_the_name_of_a_file_is_none_of_a_folder_whatever_the_url_says(path, name
 def test_a_signed_url_is_asked_with_its_query_and_not_shown_with_it(server):
     log = open_source(server.url("whole/a.mcap?sig=geheim%2F&x=1"))
     assert (log.path, log.source) == (Path("a.mcap"), server.url("whole/a.mcap"))
-    assert server.asked[0][1] == "/whole/a.mcap?sig=geheim%2F&x=1"
+    assert server.requests[0][1] == "/whole/a.mcap?sig=geheim%2F&x=1"
     message = refused(server.url("403/a.mcap?sig=geheim", user="me:geheim@"))
     assert message == f"{server.url('403/a.mcap')}: the server denies access"
 
 
 def test_user_and_password_of_a_url_are_sent(server):
     fetched(server.url("whole/a.mcap", user="me:ge%40heim@"))
-    header = server.asked[-1][2]["authorization"]
+    header = server.requests[-1][2]["authorization"]
     assert header == f"Basic {b64encode(b'me:ge@heim').decode()}"
 
 
@@ -131,7 +131,7 @@ def test_a_silent_server_is_waited_for_as_long_as_was_asked(server, path):
 
 def test_a_part_that_breaks_off_goes_on_where_it_broke(server):
     assert fetched(server.url("resumed/a.mcap")) == CONTENT
-    ranges = [headers["range"] for method, _, headers in server.asked if method == "GET"]
+    ranges = [headers["range"] for method, _, headers in server.requests if method == "GET"]
     assert ranges[0] == f"bytes=0-{len(CONTENT) - 1}"
     assert len(ranges) > 1
     assert not ranges[1].startswith("bytes=0-")
