@@ -9,10 +9,10 @@ from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison.compare import (
-    Change,
     ComparedResult,
     Comparison,
     DriveChange,
+    MaskChange,
     RegionChange,
 )
 from roadeval.evaluation.comparison.conditions import Judgement
@@ -36,7 +36,7 @@ from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
-Row = Change | MovedFrame | RegionChange | DriveChange
+Row = MaskChange | MovedFrame | RegionChange | DriveChange
 """Something about a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
 """What a row has in each column, by their titles."""
@@ -120,7 +120,7 @@ def overview(
         ("Not judged", None, "warning"),
         ("Limits kept", False, "plain"),
     ):
-        if lines := [told.judged(each) for each in judgements if each.holds is kind]:
+        if lines := [told.describe_judgement(each) for each in judgements if each.holds is kind]:
             yield BulletList(title, lines, tone)
     yield Text(told.verdict(comparison), "verdict")
     yield from (Text(line) for line in told.changed_settings(comparison, most))
@@ -174,13 +174,15 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
         yield Text(legend, "note")
 
 
-def _changed(comparison: Comparison) -> list[Change]:
+def _changed(comparison: Comparison) -> list[MaskChange]:
     """Return what is shown of a comparison: not the variants of which no stage changed."""
     names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
     return [row for row in comparison.changes if (row.result, row.variant) in names]
 
 
-def _by(rows: Sequence[Change], key: Callable[[Change], str]) -> list[tuple[str, list[Change]]]:
+def _by(
+    rows: Sequence[MaskChange], key: Callable[[MaskChange], str]
+) -> list[tuple[str, list[MaskChange]]]:
     return [(name, [*own]) for name, own in groupby(rows, key)]
 
 

@@ -25,7 +25,11 @@ Rank = Annotated[
 ]
 Variant = Annotated[
     str | None,
-    arguments.option("--variant", "Variant by which frames rank. Default: the first.", "NAME"),
+    arguments.option(
+        "--variant",
+        "Variant by which frames rank. Default: what you brought, else filtered.",
+        "NAME",
+    ),
 ]
 Screenshot = Annotated[
     Path | None,
