@@ -162,7 +162,7 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
         for each in stages.stages_of(chain)
     }
     pipeline = Pipeline(chain, settings)
-    for stage in pipeline.heard():
+    for stage in pipeline.heard_stages():
         if stage.fit is not None:
             raise ConfigError(f"chain: {stage.name} learns, so no later stage can learn from it")
     layers = [spec.name for spec in (*pipeline.layers(), ERRORS)]
@@ -257,7 +257,7 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     before: tuple[str, ...] = ("given",)
     settings = {"given": {"name": name}}
     if method is not None:
-        if learning := [name for name in method.learning() if name != "threshold"]:
+        if learning := [name for name in method.learning_stages() if name != "threshold"]:
             raise ConfigError(
                 f"`tunes` {name}: it learns itself ({', '.join(learning)}), and of frames that "
                 "taught it, it says too much to learn from"

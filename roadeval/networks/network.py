@@ -17,7 +17,7 @@ from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.text import visible
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.threads import map_ordered
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,7 +323,7 @@ def _samples(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
         return arrays
 
     # In a thread, so that a signal is heard meanwhile.
-    by_output = [*zip(*ordered(run, make_test_images(settings), 1), strict=True)]
+    by_output = [*zip(*map_ordered(run, make_test_images(settings), 1), strict=True)]
     for name, arrays in zip(outputs, by_output, strict=True):
         if len({array.shape for array in arrays}) > 1:
             raise file.error(_VARIES.format(name, arrays[1].shape, arrays[0].shape))

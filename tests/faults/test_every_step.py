@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.runtime.files import claimed_folder
+from roadeval.runtime.files import claim_folder
 from tests.faults import making, steps
 from tests.faults.forking import Forks
 
@@ -69,7 +69,7 @@ def notes(place):
 
 
 def recover(place):
-    with claimed_folder(place / "reports", making.CONTENT) as certain:
+    with claim_folder(place / "reports", making.CONTENT) as certain:
         assert certain
 
 

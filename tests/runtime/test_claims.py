@@ -10,12 +10,12 @@ import sys
 
 import pytest
 
-from roadeval.runtime.files import claimed
+from roadeval.runtime.files import claim
 
 HELD = """
 import pathlib, sys
-from roadeval.runtime.files import claimed
-with claimed(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]).parent):
+from roadeval.runtime.files import claim
+with claim(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]).parent):
     print("held", flush=True)
     sys.stdin.read()
 """
@@ -35,34 +35,34 @@ def other(tmp_path):
         process.kill()
 
 
-def claim(folder, name="out"):
-    with claimed(folder / name, folder) as certain:
+def claim_briefly(folder, name="out"):
+    with claim(folder / name, folder) as certain:
         return certain
 
 
 def test_what_another_process_writes_is_refused_with_its_name_until_it_is_killed(other, tmp_path):
     with pytest.raises(BlockingIOError) as caught:
-        claim(tmp_path)
+        claim_briefly(tmp_path)
     match = re.fullmatch(
         r"another run is writing it \(process (\d+) on \S+, since \d{4}-\d\d-\d\d \d\d:.*\)",
         caught.value.strerror,
     )
     assert int(match[1]) == other.pid
-    assert claim(tmp_path, "another")
+    assert claim_briefly(tmp_path, "another")
     other.send_signal(signal.SIGKILL)
     other.wait()
     assert names(tmp_path) == [".out.lock"]
-    assert claim(tmp_path)
+    assert claim_briefly(tmp_path)
     assert names(tmp_path) == []
 
 
 def test_two_in_one_process_are_two_and_the_first_one_s_lock_stays(tmp_path):
-    with claimed(tmp_path / "out", tmp_path):
+    with claim(tmp_path / "out", tmp_path):
         for _ in range(2):
             with pytest.raises(BlockingIOError, match=f"process {os.getpid()} on"):
-                claim(tmp_path)
+                claim_briefly(tmp_path)
         assert names(tmp_path) == [".out.lock"]
-    assert claim(tmp_path)
+    assert claim_briefly(tmp_path)
 
 
 def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_path, monkeypatch):
@@ -75,11 +75,11 @@ def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_
         usual(lock, how)
 
     monkeypatch.setattr(fcntl, "flock", late)
-    with claimed(tmp_path / "out", tmp_path) as certain:
+    with claim(tmp_path / "out", tmp_path) as certain:
         assert certain
         assert names(tmp_path) == [".out.lock"]
         with pytest.raises(BlockingIOError):
-            claim(tmp_path)
+            claim_briefly(tmp_path)
 
 
 def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkeypatch):
@@ -92,13 +92,13 @@ def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkey
         return usual(path, flags, *rest)
 
     monkeypatch.setattr(os, "open", forbidden)
-    with claimed(tmp_path / "out", tmp_path) as certain:
+    with claim(tmp_path / "out", tmp_path) as certain:
         assert certain
         with pytest.raises(BlockingIOError, match="process 1 on elsewhere"):
-            claim(tmp_path)
+            claim_briefly(tmp_path)
     assert names(tmp_path) == []
     with pytest.raises(PermissionError):
-        claim(tmp_path)
+        claim_briefly(tmp_path)
 
 
 def no_locks_of_the_system(monkeypatch):
@@ -115,12 +115,12 @@ def no_locks_of_the_disk(monkeypatch):
 @pytest.mark.parametrize("without", [no_locks_of_the_system, no_locks_of_the_disk])
 def test_without_locks_nothing_is_certain(without, tmp_path, monkeypatch):
     without(monkeypatch)
-    with claimed(tmp_path / "out", tmp_path) as one, claimed(tmp_path / "out", tmp_path) as other:
+    with claim(tmp_path / "out", tmp_path) as one, claim(tmp_path / "out", tmp_path) as other:
         assert (one, other) == (False, False)
     assert names(tmp_path) == []
 
 
 def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, monkeypatch):
     monkeypatch.setattr("time.sleep", lambda _seconds: (other.kill(), other.wait()))
-    with claimed(tmp_path / "out", tmp_path, wait=True) as certain:
+    with claim(tmp_path / "out", tmp_path, wait=True) as certain:
         assert certain

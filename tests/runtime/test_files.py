@@ -99,10 +99,10 @@ def test_a_partial_name_is_found_again_and_no_two_are_the_same(tmp_path):
 
 
 def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
-    with files.claimed_file(tmp_path / "new" / "deep" / "file"):
+    with files.claim_file(tmp_path / "new" / "deep" / "file"):
         assert (tmp_path / "new" / "deep").is_dir()
     assert names(tmp_path) == []
-    with files.claimed_file(tmp_path / "new" / "deep" / "file"):
+    with files.claim_file(tmp_path / "new" / "deep" / "file"):
         (tmp_path / "new" / "other").touch()
     assert names(tmp_path / "new") == ["other"]
 
