@@ -101,11 +101,11 @@ class Network:
             values = scores[number].astype(np.float32)
             return resize_to_frame(values, frame, settings, cv2.INTER_LINEAR)
 
-        def coded(shares: Values) -> Probability:
+        def encode(shares: Values) -> Probability:
             return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
 
         total, single = road_probability(plane, len(scores), settings)
-        return coded(total), [*map(coded, single)]
+        return encode(total), [*map(encode, single)]
 
 
 HUGE: Final = 3e4
