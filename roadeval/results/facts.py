@@ -26,7 +26,7 @@ from roadeval.evaluation.tables import final_stages
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
 from roadeval.runtime.documents import LONGEST, VALUES, read_bounded, read_json
-from roadeval.runtime.text import elided, visible, visible_lines
+from roadeval.runtime.text import elide, visible, visible_lines
 
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
@@ -477,4 +477,4 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     value = str(value) if isinstance(value, Path) else value
-    return elided(value, LONGEST) if isinstance(value, str) and len(value) > LONGEST else value
+    return elide(value, LONGEST) if isinstance(value, str) and len(value) > LONGEST else value

@@ -9,7 +9,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.features import at_samples, names_of, opinions
+from roadeval.pipeline.beyond.features import names_of, opinion_features, sample_features
 from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, class_weights, grow
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import reach, scene_of
@@ -111,7 +111,7 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
     image[:, :10] = 20
     sample = TrainingSet((image,), *np.array([[0], [20], [3]]), np.array([True]))
     place = replace(SMALL, features=("place",))
-    straight, mirrored = at_samples(sample, partial(trees.see, place))
+    straight, mirrored = sample_features(sample, partial(trees.see, place))
     np.testing.assert_allclose(straight[0, 0], -mirrored[0, 0])
     np.testing.assert_allclose(straight[0, 1:], mirrored[0, 1:])
 
@@ -127,7 +127,7 @@ def test_a_mirrored_image_has_the_mirrored_opinion():
     opinion = opinion_of(np.indices((24, 32))[1] < 12)
     where = np.array([[0, 0], [20, 3], [2, 30]])
     sample = TrainingSet((image,), *where, np.array([True, False]), opinions=(opinion,))
-    straight, mirrored = at_samples(sample, partial(trees.see, replace(SMALL, opinion=True)))
+    straight, mirrored = sample_features(sample, partial(trees.see, replace(SMALL, opinion=True)))
     count = len(names_of(SMALL.features))
     sure = np.log(60000 / 5535)
     expected = [[sure, -sure], [-np.log(62535 / 3000), np.log(62535 / 3000)]]
@@ -138,9 +138,9 @@ def test_a_mirrored_image_has_the_mirrored_opinion():
 def test_a_mask_alone_says_how_far_its_edge_is():
     mask = np.zeros((24, 32), bool)
     mask[:, :12] = True
-    (signed,) = opinions(Output(mask=Packed.of(mask)), (24, 32))
+    (signed,) = opinion_features(Output(mask=Packed.of(mask)), (24, 32))
     np.testing.assert_array_equal(signed[5, [0, 11, 12, 31]], [12, 1, -1, -20])
-    everywhere = opinions(Output(mask=Packed.of(np.ones_like(mask))), (24, 32))
+    everywhere = opinion_features(Output(mask=Packed.of(np.ones_like(mask))), (24, 32))
     assert np.isfinite(everywhere).all()
 
 
@@ -236,7 +236,9 @@ def test_what_stands_on_top_sees_the_base_as_its_last_feature(sample, learnt):
     adapted = trees.adapt(learnt, sample, SMALL)
     assert adapted.base is learnt
     assert adapted.inputs == learnt.inputs
-    values = np.ascontiguousarray(np.concatenate(at_samples(sample, partial(trees.see, SMALL))).T)
+    values = np.ascontiguousarray(
+        np.concatenate(sample_features(sample, partial(trees.see, SMALL))).T
+    )
     odds = learnt.log_odds(values, 0.5)
     top = replace(adapted, base=None)
     expected = top.log_odds(np.concatenate([values, odds[None]]), 0.5)
