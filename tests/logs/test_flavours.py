@@ -29,10 +29,10 @@ def cases(*shows: str) -> pytest.MarkDecorator:
 def expected(log: Path, *, grey: bool) -> list[Rgb]:
     """Return the frames that a log was made from: those beside it, or ours."""
     beside = sorted(log.parent.glob("expected_*.png"))
-    found = [cv2.imread(str(path))[..., ::-1] for path in beside] if beside else scenes()
+    images = [cv2.imread(str(path))[..., ::-1] for path in beside] if beside else scenes()
     if not grey:
-        return found
-    return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)[..., None].repeat(3, axis=2) for rgb in found]
+        return images
+    return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)[..., None].repeat(3, axis=2) for rgb in images]
 
 
 @pytest.mark.parametrize("folder", shared("mcap", "flavours"))
@@ -42,10 +42,10 @@ def test_every_shared_flavour_is_among_ours(folder: Path) -> None:
 
 @cases("colour", "grey")
 def test_frames_are_those_expected(log: Path) -> None:
-    flavour, found = FLAVOURS[log.stem], frames(log)
-    assert len(found) == 5
-    for frame, wanted in zip(found, expected(log, grey=flavour.shows == "grey"), strict=True):
-        assert np.abs(frame.image.astype(int) - wanted).mean() <= flavour.error
+    flavour, decoded = FLAVOURS[log.stem], frames(log)
+    assert len(decoded) == 5
+    for frame, image in zip(decoded, expected(log, grey=flavour.shows == "grey"), strict=True):
+        assert np.abs(frame.image.astype(int) - image).mean() <= flavour.error
 
 
 @cases("colour", "grey", "video")

@@ -77,11 +77,11 @@ def twelve_bits(channels: int) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("channels", [1, 3, 4], ids=["grey", "RGB", "RGBA"])
 @pytest.mark.parametrize(
-    ("white", "expected", "said"),
+    ("white", "expected", "shown"),
     [(None, 200 // 16, "4095"), (1023, 200 // 4, "1023"), (65535, 0, "")],
 )
 def test_the_sample_that_is_white_is_the_topics_whatever_the_range(
-    tmp_path: Path, white: float | None, expected: int, said: str, channels: int
+    tmp_path: Path, white: float | None, expected: int, shown: str, channels: int
 ) -> None:
     path = camera(tmp_path, twelve_bits(channels))
     frames = FrameSettings(max_frames=1, white=white)
@@ -89,7 +89,7 @@ def test_the_sample_that_is_white_is_the_topics_whatever_the_range(
         selection = log.select()
         assert next(log.frames(selection)).decode().image[0, 0].tolist() == [expected] * 3
         assert selection.notes == (
-            (f"a sample of {said} is white; `frames.white` sets another",) if said else ()
+            (f"a sample of {shown} is white; `frames.white` sets another",) if shown else ()
         )
 
 
@@ -107,8 +107,8 @@ def test_a_packed_image_that_is_damaged_is_refused_in_bounded_memory(pack, harm:
 @pytest.mark.parametrize(("level", "word"), [(0, "black"), (9, "black"), (250, "white")])
 def test_a_camera_whose_images_are_blank_is_told(tmp_path: Path, level: int, word: str) -> None:
     path = camera(tmp_path, [compressed(at, jpeg(grey(level))) for at in STAMPS])
-    (told,) = describe(path).picks[-1:]
-    assert told.startswith(f"10 of the 10 images are {word} (frames 0, 2, 4, 6, 8 and 5 more)")
+    (pick,) = describe(path).picks[-1:]
+    assert pick.startswith(f"10 of the 10 images are {word} (frames 0, 2, 4, 6, 8 and 5 more)")
 
 
 def test_a_blank_image_among_many_is_not_told(tmp_path: Path) -> None:

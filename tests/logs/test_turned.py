@@ -46,9 +46,9 @@ def test_an_orientation_turns_an_image_as_exif_defines_it(name: str, orientation
     expected = Image.fromarray(stored)
     expected.info["exif"] = exif(orientation).tobytes()
     shown = np.array(ImageOps.exif_transpose(expected))
-    found = to_rgb(data, Limits(turn=True))
-    np.testing.assert_array_equal(found, shown)
-    assert size_of(data, Limits(turn=True)) == found.shape[1::-1]
+    pixels = to_rgb(data, Limits(turn=True))
+    np.testing.assert_array_equal(pixels, shown)
+    assert size_of(data, Limits(turn=True)) == pixels.shape[1::-1]
     assert size_of(data, Limits()) == stored.shape[1::-1]
 
 
@@ -78,9 +78,9 @@ def test_a_display_matrix_turns_each_pixel_to_its_place(quarters: int, flip: int
 @pytest.mark.parametrize(("name", "turns"), [("quarter_turn", -1), ("upside_down", 2)])
 def test_pack_turns_a_video_as_players_do_and_says_so(tmp_path, videos, name, turns):
     shown = []
-    for each in ("plain", name):
-        packed = pack(videos / f"{each}.mp4", tmp_path / f"{each}.mcap")
-        assert bool(packed.warnings) == (each != "plain")
+    for video in ("plain", name):
+        packed = pack(videos / f"{video}.mp4", tmp_path / f"{video}.mcap")
+        assert bool(packed.warnings) == (video != "plain")
         with open_log(packed.path) as log:
             shown.append(next(log.frames(log.select())).decode().image)
     assert np.abs(np.rot90(shown[0], turns).astype(int) - shown[1]).mean() < 6
@@ -106,8 +106,8 @@ def test_a_replay_turns_images_unless_it_is_asked_not_to_and_says_both(tmp_path:
             shown.append(frame.image)
             # The viewer of a recording turns no JPEG.
             assert frame.media_type is None
-        said = describe(path, config).picks[0]
-        assert ("are as stored" if unturned else "are turned, as their EXIF") in said
+        pick = describe(path, config).picks[0]
+        assert ("are as stored" if unturned else "are turned, as their EXIF") in pick
     np.testing.assert_array_equal(shown[0], shown[1][::-1, ::-1])
 
 
@@ -125,5 +125,7 @@ def test_pack_names_images_that_their_orientation_turns(tmp_path: Path) -> None:
     (tmp_path / "images").mkdir()
     for number in (1, 6):
         (tmp_path / "images" / f"{number}.jpg").write_bytes(turned(number))
-    (told,) = pack(tmp_path / "images", tmp_path / "a.mcap").warnings
-    assert told.startswith("images that their EXIF orientation turns, in replay as in viewers: 6")
+    (warning,) = pack(tmp_path / "images", tmp_path / "a.mcap").warnings
+    assert warning.startswith(
+        "images that their EXIF orientation turns, in replay as in viewers: 6"
+    )

@@ -40,10 +40,10 @@ def read(tmp_path: Path, data: bytes) -> tuple[int, list[str]]:
 @pytest.mark.parametrize("logs", [1, 2, 3])
 def test_logs_joined_end_to_end_are_read_one_after_the_other(tmp_path, logs):
     parts = [logged(tmp_path / f"{n}.mcap", 12, first=12 * n) for n in range(logs)]
-    count, told = read(tmp_path, b"".join(parts))
+    count, damage_texts = read(tmp_path, b"".join(parts))
     assert count == 12 * logs
-    assert sum("another log begins here" in damage for damage in told) == logs - 1
-    assert "are missing" not in " ".join(told)
+    assert sum("another log begins here" in damage for damage in damage_texts) == logs - 1
+    assert "are missing" not in " ".join(damage_texts)
 
 
 def test_a_chunk_that_lies_in_a_message_is_no_chunk_of_the_log(tmp_path):
@@ -84,27 +84,27 @@ def test_bombs_take_seconds(tmp_path, bomb, seconds):
     data, chunks = logged(tmp_path / "whole.mcap", 4), bomb()
     at = broken.chunk(0, data)
     began = process_time()
-    count, told = read(tmp_path, data[:at] + chunks + data[at:])
+    count, damage_texts = read(tmp_path, data[:at] + chunks + data[at:])
     assert process_time() - began < seconds
     assert count == 4
-    assert told
+    assert damage_texts
 
 
 @pytest.mark.parametrize("folder", shared("failures"))
 @pytest.mark.parametrize(
-    ("name", "frames", "said"),
+    ("name", "frames", "reason"),
     [
         ("hole_in_chunk_0", 15, "lost: 4 of /camera/image"),
         ("schema_byte_changed", 6, "that is believed; messages fit it better"),
         ("schema_byte_intact", 6, ""),
     ],
 )
-def test_each_known_failure_is_read_and_said(folder, name, frames, said):
+def test_each_known_failure_is_read_and_said(folder, name, frames, reason):
     began = process_time()
     with open_log(folder / f"{name}.mcap") as log:
         log.verify()
         assert {topic.count for topic in log.topics} == {frames}
-        told = " ".join(map(str, log.damage))
-    assert said in told
-    assert bool(said) == bool(told)
+        damage_text = " ".join(map(str, log.damage))
+    assert reason in damage_text
+    assert bool(reason) == bool(damage_text)
     assert process_time() - began < 10

@@ -8,7 +8,7 @@ from tests.fixtures import broken
 from tests.fixtures.broken import HEAD, chunk, data_end, good, length_of, mended, over, records
 
 LENGTH_AT = HEAD + 8 + 8 + 8
-"""Where a chunk index has the length of its chunk."""
+"""The offset of the chunk's length in a chunk index."""
 
 
 def without(number: int, data: bytes) -> bytes:
@@ -65,9 +65,9 @@ def of_wrong_records() -> tuple[bytes, str]:
     "damage", [left_out, repeated, without_an_end, without_a_summary, of_wrong_records]
 )
 def test_a_chunk_that_is_missing_repeated_or_wrong_is_told(tmp_path, damage):
-    data, told = damage()
+    data, loss = damage()
     path = tmp_path / "drive.mcap"
     path.write_bytes(data)
     with open_log(path) as log:
         log.verify()
-        assert told in " | ".join(log.losses)
+        assert loss in " | ".join(log.losses)

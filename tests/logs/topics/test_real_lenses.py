@@ -26,21 +26,21 @@ WRITTEN = (
 @pytest.mark.parametrize("name", WRITTEN)
 def test_the_lens_is_the_same_whoever_wrote_it(folder, name: str):
     with open_log(folder / "writers" / name, LogConfig(topics=TopicSettings(truth=""))) as log:
-        known = log.select().calibration
-    assert (known.matrix[0], known.matrix[2], known.width) == (80, 48, 96)
+        lens = log.select().calibration
+    assert (lens.matrix[0], lens.matrix[2], lens.width) == (80, 48, 96)
 
 
 @pytest.mark.parametrize("folder", FOLDER)
 @pytest.mark.parametrize(
-    ("name", "given", "expected"),
+    ("name", "pose", "expected"),
     [
         *((name, (1.5, 4.0), PLAIN) for name in ("plain", "binned", "roi", "tf_body")),
         *((name, (1.5, 4.0), PLAIN) for name in ("tf_optical", "rect_flat", "rect_nested")),
         ("fish_zero", (1.2, 20.0), [9692, 386, 192, 102]),
     ],
 )
-def test_pixels_lie_at_the_distances_at_which_they_were_drawn(folder, name, given, expected):
-    config = LogConfig(ground=GroundSettings(height=given[0], pitch=given[1]))
+def test_pixels_lie_at_the_distances_at_which_they_were_drawn(folder, name, pose, expected):
+    config = LogConfig(ground=GroundSettings(height=pose[0], pitch=pose[1]))
     with open_log(folder / "cameras" / f"{name}.mcap", config) as log:
         ground = log.select().ground
     pixels = np.indices((ground.width, ground.height)).reshape(2, -1).T.astype(float)

@@ -68,7 +68,7 @@ def test_labels_that_are_only_logged_at_other_times_are_taken(tmp_path, logged):
 
 
 @pytest.mark.parametrize(
-    ("camera", "late_ns", "unit", "said"),
+    ("camera", "late_ns", "unit", "words"),
     [
         *(
             # pymcap-cli 0.34 names exported pictures by each message's own log time.
@@ -80,14 +80,14 @@ def test_labels_that_are_only_logged_at_other_times_are_taken(tmp_path, logged):
     ],
 )
 def test_names_that_are_log_times_or_no_frame_s_stamps_are_told(
-    tmp_path, camera, late_ns, unit, said
+    tmp_path, camera, late_ns, unit, words
 ):
     path, folder = write(tmp_path / "a.mcap", {"/camera": camera}), tmp_path / "labels"
     folder.mkdir()
     for stamp, _ in times()[:30]:
         (folder / f"{(stamp + late_ns) // unit}.png").write_bytes(png(ROAD))
-    found, selection = labelled(path, truth=LabelPlace(str(folder)))
-    assert found == [*range(30)]
+    numbers, selection = labelled(path, truth=LabelPlace(str(folder)))
+    assert numbers == [*range(30)]
     (note,) = selection.truth.notes or [""]
-    assert said in note
-    assert bool(note) == bool(said)
+    assert words in note
+    assert bool(note) == bool(words)

@@ -108,8 +108,8 @@ CASES: dict[str, tuple[Any, list[int], int | None]] = {
 def test_a_frame_has_its_own_mask_or_none_whatever_was_lost_before_it(masks, tmp_path, case):
     made, expected, unsure = CASES[case]
     data = made() if callable(made) else broken.BROKEN[made][1]().data
-    found = paired(saved(tmp_path, data), masks)
-    assert found == (expected, found[1] if unsure is None else unsure)
+    result = paired(saved(tmp_path, data), masks)
+    assert result == (expected, result[1] if unsure is None else unsure)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_what_a_split_log_lost_at_the_end_of_a_file_shifts_no_number_before_it(m
 def test_masks_of_another_log_lose_their_numbers_too(tmp_path, later_ns):
     """Whatever the log times of the other log."""
     made = broken.log()
-    moved = [replace(each, log_time=each.log_time + later_ns) for each in made.messages]
+    moved = [replace(message, log_time=message.log_time + later_ns) for message in made.messages]
     data = replace(made, messages=tuple(moved)).bytes()
     begin, end = chunk(3, data), chunk(4, data)
     other = tmp_path / "other.mcap"

@@ -1,4 +1,4 @@
-"""What `pick.json` says of picked frames, and what contradicts itself."""
+"""The picked frames in `pick.json`, and its contradictions."""
 
 from dataclasses import replace
 
@@ -57,8 +57,8 @@ def test_what_contradicts_itself_is_refused(tmp_path, changes, problem):
     "rounded", [int, lambda stamp: int(float(stamp)), lambda n: n // 100 * 100]
 )
 def test_a_stamp_is_known_as_a_program_may_have_rounded_it(rounded):
-    picked = [replace(each, stamp_ns=rounded(each.stamp_ns)) for each in PICKED]
-    found = replace(PICKS, stamps=[*map(rounded, STAMPS)], picked=picked)
-    assert found.is_picked(STAMPS[1], Why.RANDOM)
-    assert not found.is_picked(STAMPS[2], Why.RANDOM)
-    assert found.places[float(STAMPS[7])] == 7
+    picked = [replace(frame, stamp_ns=rounded(frame.stamp_ns)) for frame in PICKED]
+    picks = replace(PICKS, stamps=[*map(rounded, STAMPS)], picked=picked)
+    assert picks.is_picked(STAMPS[1], Why.RANDOM)
+    assert not picks.is_picked(STAMPS[2], Why.RANDOM)
+    assert picks.places[float(STAMPS[7])] == 7

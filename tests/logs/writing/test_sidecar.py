@@ -52,34 +52,36 @@ def image(data: bytes) -> list[list[list[int]]]:
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels.ndim == 3:
         pixels = cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGBA)
-    found: list[list[list[int]]] = pixels.tolist()
-    return found
+    values: list[list[list[int]]] = pixels.tolist()
+    return values
 
 
-@pytest.mark.parametrize(("source", "kept"), [("cam_front", "cam_front"), ("", "camera")])
-def test_masks_are_in_the_frame_of_the_camera(tmp_path: Path, source: str, kept: str) -> None:
+@pytest.mark.parametrize(("source", "frame_id"), [("cam_front", "cam_front"), ("", "camera")])
+def test_masks_are_in_the_frame_of_the_camera(tmp_path: Path, source: str, frame_id: str) -> None:
     with write(tmp_path / "results.mcap", source, "/front").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        found = {
+        frame_ids = {
             channel.topic: message.frame_id
             for _, channel, _, message in reader.iter_decoded_messages(
                 ["/roadeval/front/filtered/post", "/roadeval/front/filtered/errors"]
             )
         }
-    assert found == {f"/roadeval/front/filtered/{name}": kept for name in ("post", "errors")}
+    assert frame_ids == {
+        f"/roadeval/front/filtered/{name}": frame_id for name in ("post", "errors")
+    }
 
 
 def test_masks_and_errors_bear_the_images_own_times(tmp_path: Path) -> None:
     with write(tmp_path / "results.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         topics = ["/roadeval/filtered/post", "/roadeval/filtered/errors"]
-        found = {
+        messages = {
             channel.topic: (message.log_time, decoded.timestamp.ToNanoseconds(), decoded.data)
             for _, channel, message, decoded in reader.iter_decoded_messages(topics)
         }
-    assert {times[:2] for times in found.values()} == {(LOGGED, STAMP)}
-    assert image(found[topics[0]][2]) == [[0, 255]]
-    assert image(found[topics[1]][2]) == [[[213, 94, 0, 220], [0, 158, 115, 160]]]
+    assert {times[:2] for times in messages.values()} == {(LOGGED, STAMP)}
+    assert image(messages[topics[0]][2]) == [[0, 255]]
+    assert image(messages[topics[1]][2]) == [[[213, 94, 0, 220], [0, 158, 115, 160]]]
 
 
 def test_metrics_are_json_with_a_schema_and_undefined_rates_are_null(tmp_path: Path) -> None:

@@ -24,12 +24,12 @@ def write(path: Path) -> Path:
 def test_foxgloves_own_decoder_reads_it(tmp_path: Path) -> None:
     with write(tmp_path / "a.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        found = [
+        messages = [
             (schema.name, channel.topic, decoded.timestamp.ToNanoseconds(), decoded.format)
             for schema, channel, _, decoded in reader.iter_decoded_messages()
         ]
     name = "foxglove.CompressedImage"
-    assert sorted(found) == [
+    assert sorted(messages) == [
         (name, "/camera", 10, "jpeg"),
         (name, "/camera", 20, "jpeg"),
         (name, "/truth/road", 10, "png"),
