@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from operator import itemgetter
 from typing import Any, Final
 
-from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Tally
-from roadeval.data.words import counted, defined, in_percent, interval, listing, number, percent
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
+from roadeval.data.words import counted, defined, in_percent, interval, number, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
-from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import FILTER, final_stages
-from roadeval.results.facts import EstimateFacts, FrameAccount, UnlabelledFacts
+from roadeval.evaluation.tables import FILTER
+from roadeval.results.facts import FrameAccount
 
 FINE: Final = 0.005
 """Levels that differ by less are given with two digits."""
@@ -24,14 +22,10 @@ ROUNDING: Final = 5e-4
 """Levels whose difference is farther from the paired one are of other frames."""
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are stated together."""
-NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 OVERCONFIDENT: Final = 0.01
 """Least difference of errors and stated errors that is told, see `overconfident`."""
-NAMED: Final = 5
-"""Frames without truth that a verdict names."""
 _OF_FILTER: Final = "The filter "
 """Begins the note on what the filter did to a frame."""
-BLIND: Final = f"{BASELINE}, which never looks at the image"
 
 
 Rates = Mapping[str, Any]
@@ -222,131 +216,6 @@ def _it(verb: str) -> str:
     return "it fits" if verb == "is" else "they fit"
 
 
-def verdict(
-    totals: Mapping[str, Rates],
-    effects: Sequence[Effect],
-    claims: Mapping[str, Mapping[str, int]] | None = None,
-    thresholds: Mapping[str, Mapping[str, Any]] | None = None,
-    *,
-    unlabelled: UnlabelledFacts | None = None,
-    estimated: EstimateFacts | None = None,
-) -> str:
-    """Return the verdict on a drive or a fleet, a few sentences.
-
-    Which variant is best, and whether it beats the baseline; what another threshold would bring to
-    a method; what tuning and the filter change; and which step adds most to the filtered
-    variant's errors.
-    ``totals`` are by variant and stage, empty where nothing was scored; ``effects`` are of final
-    masks at least; ``claims`` says in how many windows of a drive each claim of the paper holds,
-    ``thresholds`` what other thresholds would bring on it, see `at_thresholds`. Where nothing was
-    scored, ``unlabelled`` says which frames to look at. ``estimated`` is what frames that were
-    drawn at random say of the whole drive.
-    """
-    if not totals:
-        return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
-    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
-    rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
-    finals = {(each.base, each.variant): each for each in effects if each.final}
-    best = lowest({name: each for name, each in rates.items() if name != BASELINE})
-    if best is None:
-        return f"Nothing to compare: {TESTED} is undefined on every frame."
-    against = finals.get((BASELINE, best))
-    blind = None if against is None else against.rates[TESTED]
-    parts = [_best(best, rates, blind)]
-    if whole := [*from_labels(estimated, best)]:
-        parts = [*whole, f"On these alone: {parts[0]}"]
-    parts += at_thresholds(thresholds or {}, rates)
-    for base, variant in (pair for pair in finals if pair[1] == pair[0] + TUNED):
-        found, ends = finals[base, variant].rates[TESTED], (rates[base], rates[variant])
-        parts.append(sentence(found, f"tuning {base}", f"{TESTED} of {stages[variant]}", ends))
-    of_filter = finals.get((UNFILTERED, FILTERED))
-    if of_filter is not None and of_filter.rates[TESTED].units:
-        parts.append(
-            sentence(
-                *(of_filter.rates[TESTED], "the filter", f"{TESTED} of {of_filter.stage}"),
-                (rates[UNFILTERED], rates[FILTERED]),
-                windows=_in_windows(claims),
-                said=_doubt(blind) if blind else "",
-            )
-        )
-    return " ".join(filter(None, [*parts, _costs_most(totals)]))
-
-
-RANKED_BY: Final = {
-    "entropy": "{variant} is least sure where road is (entropy of its probability)",
-    "disagreement": "{variant} and the other variants differ most",
-    "flicker": "the mask of {variant} changes most from the frame before",
-}
-"""Why frames without truth come first, by what ranks them."""
-
-
-def without_truth(found: UnlabelledFacts | None) -> Iterator[str]:
-    """Yield what is known without truth: a bound on the greater of two error rates, and a rank."""
-    if found is None:
-        return
-    pairs = [(e, one, other) for one, own in found.differing.items() for other, e in own.items()]
-    if pairs:
-        share, one, other = max(pairs, key=itemgetter(0))
-        yield (
-            f"{one} and {other} differ on {percent(share, 1)} % of the pixels, so one of the two "
-            f"is wrong on at least {math.floor(share * 500) / 10:.1f} %."
-        )
-    if found.look_at and found.sign:
-        why = RANKED_BY[found.sign].format(variant=found.variant)
-        frames = listing([str(each) for each in found.look_at[:NAMED]])
-        yield f"Look first at frames {frames}: there {why}. That is a rank, and no error rate."
-
-
-def from_labels(found: EstimateFacts | None, variant: str) -> Iterator[str]:
-    """Yield a variant's error rate on the whole drive, from its labelled frames, in a sentence."""
-    own = found.rates.get(variant, {}).get(TESTED) if found else None
-    if found is None or own is None:
-        return
-    ends = "no interval yet"
-    if own.low is not None and own.high is not None:
-        ends = f"{percent(own.low, 1)} to {percent(own.high, 1)}"
-    more = ""
-    if own.to_halve:
-        more = f"; {number(own.to_halve)} more drawn at random would halve that interval"
-    yield (
-        f"{variant}: {TESTED} {percent(own.mean, 1)} % ({ends}) from {number(own.labels)} labelled "
-        f"frames, drawn at random, of {number(own.frames)}{more}. Errors on up to "
-        f"{percent(own.missed, 0)} % of the frames may be missed by so few."
-    )
-    if own.unseen:
-        yield (
-            f"{number(own.unseen)} frames are far more in doubt than any that was drawn: the upper "
-            "end takes them for wrong altogether. More labels, drawn at random, would tell."
-        )
-    worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in found.apart.items())
-    if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:
-        yield f"Frames that were picked by rank are not in it; the worst: {listing(shown)}."
-
-
-def at_thresholds(
-    thresholds: Mapping[str, Mapping[str, Any]], rates: Mapping[str, Rates]
-) -> Iterator[str]:
-    """Yield what the threshold of the training frames would bring to each method, in a sentence.
-
-    Parameters
-    ----------
-    thresholds
-        As in `roadeval.results.facts.Facts`.
-    rates
-        Those of final masks by variant. Where ERR would hardly change nothing is said.
-    """
-    for name, found in thresholds.items():
-        now = rates.get(name, {}).get(f"pooled_{TESTED}", math.nan)
-        if abs(now - found[TESTED]) >= ROUNDING:
-            digits = 1 if abs(now - found[TESTED]) >= FINE else 2
-            lines = "` and `".join(found.get("lines", "").splitlines())
-            yield (
-                f"{name} at {found['threshold']:.2g} instead of {found['own']:.2g}, which the "
-                f"training frames choose: {in_percent(found[TESTED]):.{digits}f} instead of "
-                f"{in_percent(now):.{digits}f} %{f' (write `{lines}`)' if lines else ''}."
-            )
-
-
 def overconfident(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
     """Yield a sentence on each variant that errs twice as often as its probabilities say, or more.
 
@@ -360,73 +229,6 @@ def overconfident(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iter
                 f"{variant} is over-confident: by its probabilities {percent(stated, 1)} % of the "
                 f"pixels are wrong, and {percent(wrong, 1)} % are."
             )
-
-
-def lowest(rates: Mapping[str, Rates]) -> str | None:
-    """Return the variant with the lowest error rate, of those that have masks of all frames.
-
-    ``rates`` are those of final masks by variant, with their number of ``frames``. None if no error
-    rate is defined.
-    """
-    most = max((each.get("frames", 0) for each in rates.values()), default=0)
-    full = {
-        name: each[TESTED]
-        for name, each in rates.items()
-        if each.get("frames", 0) == most and defined(each[TESTED])
-    }
-    return min(full, key=full.__getitem__, default=None)
-
-
-def _best(best: str, rates: Mapping[str, Rates], blind: Difference | None) -> str:
-    """Return how wrong the best variant is, and whether it is better than the baseline."""
-    several, wrong = len({*rates} - {BASELINE}) > 1, f"{in_percent(rates[best][TESTED]):.1f} %"
-    if blind is not None and blind.mean > 0:
-        name = (
-            f"Nothing here beats {BLIND}: the nearest, {best},"
-            if several
-            else (f"{best} does not beat {BLIND}: it")
-        )
-        more = f"{_size(blind.mean, _digits(blind))} pp more{_counted(blind)}"
-        return f"{name} gets {wrong} of the pixels wrong, {more}; {_doubt(blind)}."
-    lead = f"Best here is {best}: " if several else f"{best}: "
-    lead += f"{wrong} of the pixels are wrong"
-    if blind is None:
-        return f"{lead}. No frame with truth was trained on, so {BASELINE} is unknown."
-    if not blind.units or blind.is_zero:
-        return f"{lead}, as many as with {BLIND}."
-    by = f"That is {_size(blind.mean, _digits(blind))} pp better than {BLIND}{_counted(blind)}"
-    return f"{lead}. {by}; {_doubt(blind)}."
-
-
-def _in_windows(claims: Mapping[str, Mapping[str, int]] | None) -> str:
-    """Return in how many windows the filter lowers the error rate, in brackets."""
-    found = (claims or {}).get("filter_ERR", {})
-    if not found.get("windows"):
-        return ""
-    return f" (lower in {found['held']} of {counted(found['windows'], 'window')})"
-
-
-def _costs_most(totals: Mapping[str, Rates]) -> str:
-    """Return how the filtered variant's error rate comes about, and which step adds most to it.
-
-    The first mask's own error is what the steps after it start from, and no step's addition.
-    Empty without an unfiltered variant of the same stages, or where a rate is undefined.
-    """
-    own, without = totals.get(FILTERED, {}), totals.get(UNFILTERED, {})
-    *_, before, last = [None, *own] if len(own) > 1 else [None, None]
-    if before is None or last is None or before not in without:
-        return ""
-    plain, filtered, final = (
-        in_percent(each[TESTED]) for each in (without[before], own[before], own[last])
-    )
-    if math.isnan(plain + filtered + final) or not final:
-        return ""
-    parts = {before: plain, FILTER: filtered - plain, last: final - filtered}
-    most = max((FILTER, last), key=parts.__getitem__)
-    costs = f"{'the ' * (most == FILTER)}{most} costs most"
-    if round(parts[most], 1) <= 0:
-        costs = f"no later step adds errors, so {before} costs most"
-    return f"Step by step: {step_by_step(parts)}; {costs}."
 
 
 def step_by_step(parts: Mapping[str, float]) -> str:

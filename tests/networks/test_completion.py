@@ -1,4 +1,4 @@
-"""What is read from a network's file, and what is asked for."""
+"""Settings read from a network's file, and errors that ask for settings."""
 
 import pytest
 from onnx import TensorProto
@@ -11,28 +11,28 @@ def read(path, **settings) -> NetSettings:
     return Network.of(NetSettings(file=str(path), **settings)).settings
 
 
-def asked(path, **settings) -> str:
+def refusal(path, **settings) -> str:
     with pytest.raises(NetworkError) as caught:
         read(path, **settings)
-    said = str(caught.value)
-    assert said.startswith(f"{path}: ")
-    assert "\n" not in said
-    return said
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message
 
 
 def test_everything_is_stated_of_a_network_of_two_classes(tmp_path):
-    found = read(network(tmp_path / "n.onnx"))
-    assert (found.size, found.layout, found.channels) == ((16, 12), "NCHW", "rgb")
-    assert (found.scale, found.mean, found.deviation) == (1 / 255, (0.0,), (1.0,))
-    assert (found.outputs, found.road, found.decide) == (("road",), (1,), "argmax")
-    assert found.activation == "softmax"
+    settings = read(network(tmp_path / "n.onnx"))
+    assert (settings.size, settings.layout, settings.channels) == ((16, 12), "NCHW", "rgb")
+    assert (settings.scale, settings.mean, settings.deviation) == (1 / 255, (0.0,), (1.0,))
+    assert (settings.outputs, settings.road, settings.decide) == (("road",), (1,), "argmax")
+    assert settings.activation == "softmax"
 
 
 def test_another_file_than_the_stated_one_is_refused(tmp_path):
-    found = read(network(tmp_path / "n.onnx"))
+    settings = read(network(tmp_path / "n.onnx"))
     network(tmp_path / "n.onnx", last="Softmax")
     with pytest.raises(NetworkError, match="another network than was asked for"):
-        Network.of(found)
+        Network.of(settings)
 
 
 # --- What is asked for ----------------------------------------------------------------------------
@@ -59,15 +59,15 @@ ASKED = {
 
 @pytest.mark.parametrize("what", ASKED)
 def test_what_a_network_leaves_open_or_cannot_take_is_said(what, tmp_path):
-    made, settings, said = ASKED[what]
-    assert said in asked(network(tmp_path / "n.onnx", **made), **settings)
+    made, settings, message = ASKED[what]
+    assert message in refusal(network(tmp_path / "n.onnx", **made), **settings)
 
 
 def test_a_size_that_is_left_open(tmp_path):
     path = network(tmp_path / "n.onnx", input_shape=("n", 3, "h", "w"))
-    said = asked(path)
-    assert "`net.size`" in said
-    assert "image float32 (?, 3, ?, ?)" in said
+    message = refusal(path)
+    assert "`net.size`" in message
+    assert "image float32 (?, 3, ?, ?)" in message
     assert read(path, size=(32, 24)).size == (32, 24)
 
 

@@ -78,12 +78,12 @@ def test_every_drive_has_every_replay_with_every_seed():
 def demo():
     """Numbers of two frames and their pixels; some trees are enough to be counted."""
     few = {"frames": {"max_frames": 5}, "training": {"frames": 3}}
-    return overlap.replayed(**few, trees={"trees": 15})
+    return overlap.replay_demo(**few, trees={"trees": 15})
 
 
 def test_libraries_of_others_compute_the_overlap_numbers_that_are_printed(demo):
-    """`compared` refuses two values that are not equal."""
-    found = overlap.compared(*demo)
+    """`compare_libraries` refuses two values that are not equal."""
+    found = overlap.compare_libraries(*demo)
     assert found["evaluated"] == 2
     assert {*found["values"]} == {*load()["overlap"]["values"]}
 
@@ -92,4 +92,4 @@ def test_a_library_that_computes_another_number_is_told(demo, monkeypatch):
     wrong = overlap.NUMBERS[0]._replace(again=lambda _: 0.5)
     monkeypatch.setattr(overlap, "NUMBERS", (wrong,))
     with pytest.raises(overlap.DifferentNumberError, match=r"0\.5 by a library"):
-        overlap.compared(*demo)
+        overlap.compare_libraries(*demo)

@@ -30,11 +30,11 @@ def every_colour(red):
 
 
 def test_every_colour_is_decided_as_by_the_definition():
-    asked = []
-    table = table_of((margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
+    counts = []
+    table = table_of((margin, 20.0), lambda c: counts.append(len(c)) or decide(c))
     for red in (0, 29, 30, 31, 90, 147, 150, 255):
         colours = every_colour(red)
         np.testing.assert_array_equal(
             KERNELS.look_up_colours(planes(colours), table)[0], decide(colours)
         )
-    assert 0 < sum(asked) < FEW
+    assert 0 < sum(counts) < FEW

@@ -1,4 +1,4 @@
-"""What a stage of somebody else may hand out, and what costs its frame."""
+"""Outputs that a stage from outside may return, and those that cost its frame."""
 
 import numpy as np
 import pytest
@@ -39,6 +39,6 @@ def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
 
 
 def test_a_layer_of_another_size_is_named():
-    found = r"its layer 'mask' is uint8 \(3, 6\): it must be bool or integer \(4, 6\)"
-    with pytest.raises(StageError, match=found):
+    message = r"its layer 'mask' is uint8 \(3, 6\): it must be bool or integer \(4, 6\)"
+    with pytest.raises(StageError, match=message):
         run(MASK, IMAGE[:3, :, 0])

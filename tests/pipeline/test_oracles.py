@@ -1,4 +1,4 @@
-"""What a chain makes of an image once one of its stages is replaced by the truth."""
+"""Masks of a chain with one of its stages replaced by the truth."""
 
 import numpy as np
 import pytest
@@ -25,8 +25,8 @@ def chain(request):
     return chain_of(NAMES, request.param)
 
 
-def assert_same(found, expected, name=""):
-    np.testing.assert_array_equal(found.pixels(), expected.pixels(), err_msg=name)
+def assert_same(mask, expected, name=""):
+    np.testing.assert_array_equal(mask.pixels(), expected.pixels(), err_msg=name)
 
 
 def oracles(chain, shadow_truth=TRULY_DARK):
@@ -43,24 +43,24 @@ def masks(steps_of, image):
 
 
 def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_post(chain):
-    given = Packed.of(ROAD == 1)
+    truth = Packed.of(ROAD == 1)
     post = chain.steps[-1]
     expected = STAGES["post"].bind(post.settings, None)
-    told = oracles(chain)["svm"]
-    assert list(told) == ["post"]
-    assert_same(told["post"], expected(SEEN.after(Output(mask=given))).mask)
+    replaced = oracles(chain)["svm"]
+    assert list(replaced) == ["post"]
+    assert_same(replaced["post"], expected(SEEN.after(Output(mask=truth))).mask)
 
 
 def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
     settings = chain.steps[0].settings
     image, _ = shadow.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
     assert (image != IMAGE).any()
-    own = {step.stage.name: step.settings for step in chain.steps}
-    after = chain_of(NAMES[1:], own)
-    told = oracles(chain)["shadow"]
-    assert list(told) == ["similarity", "svm", "post"]
+    settings = {step.stage.name: step.settings for step in chain.steps}
+    after = chain_of(NAMES[1:], settings)
+    replaced = oracles(chain)["shadow"]
+    assert list(replaced) == ["similarity", "svm", "post"]
     for name, mask in masks(after, image).items():
-        assert_same(told[name], mask, name)
+        assert_same(replaced[name], mask, name)
 
 
 def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
@@ -71,15 +71,15 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     outputs = [result.output for result in longer.run(SEEN)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
-    told = dict(longer.oracles(SEEN, outputs, ROAD, outputs[1].regions["shadow"].pixels()))
+    replaced = dict(longer.oracles(SEEN, outputs, ROAD, outputs[1].regions["shadow"].pixels()))
     for name, mask in masks(longer, IMAGE).items():
-        assert_same(told["shadow"][name], mask, name)
+        assert_same(replaced["shadow"][name], mask, name)
 
 
 def test_a_perfect_filter_leaves_a_frame_without_shadow_as_it_is(chain):
-    own = {step.stage.name: step.settings for step in chain.steps}
-    told = oracles(chain, np.zeros_like(TRULY_DARK))["shadow"]
-    expected = masks(chain_of(NAMES[1:], own), IMAGE)
-    assert list(told) == list(expected)
+    settings = {step.stage.name: step.settings for step in chain.steps}
+    replaced = oracles(chain, np.zeros_like(TRULY_DARK))["shadow"]
+    expected = masks(chain_of(NAMES[1:], settings), IMAGE)
+    assert list(replaced) == list(expected)
     for name, mask in expected.items():
-        assert_same(told[name], mask, name)
+        assert_same(replaced[name], mask, name)

@@ -43,8 +43,8 @@ def components_and_seconds(shape, runs):
             shadow = result.output.regions["shadow"]
             process(View.of(image).after(Output(mask=shadow)))
             seconds.append(thread_time() - start)
-    found = connected_components(shadow, 8)
-    return found.count, min(seconds)
+    components = connected_components(shadow, 8)
+    return components.count, min(seconds)
 
 
 @pytest.fixture(scope="module")

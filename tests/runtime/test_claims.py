@@ -43,11 +43,11 @@ def claim(folder, name="out"):
 def test_what_another_process_writes_is_refused_with_its_name_until_it_is_killed(other, tmp_path):
     with pytest.raises(BlockingIOError) as caught:
         claim(tmp_path)
-    found = re.fullmatch(
+    match = re.fullmatch(
         r"another run is writing it \(process (\d+) on \S+, since \d{4}-\d\d-\d\d \d\d:.*\)",
         caught.value.strerror,
     )
-    assert int(found[1]) == other.pid
+    assert int(match[1]) == other.pid
     assert claim(tmp_path, "another")
     other.send_signal(signal.SIGKILL)
     other.wait()

@@ -88,14 +88,14 @@ def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
     files.check_output(tmp_path / "new", folder=True)
 
 
-def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
+def test_a_partial_name_is_found_again_and_no_two_are_the_same(tmp_path):
     for name in ("out.rrd", "drive", "a[1].b", ".hidden"):
         for hidden in (False, True):
-            given = {files.own_name(tmp_path / name, hidden=hidden) for _ in range(4)}
-            for each in given:
-                each.touch()
-            assert set(files.own_names(tmp_path / name, hidden=hidden)) == given
-            assert len(given) == 4
+            names = {files.partial_name(tmp_path / name, hidden=hidden) for _ in range(4)}
+            for partial in names:
+                partial.touch()
+            assert set(files.find_partial(tmp_path / name, hidden=hidden)) == names
+            assert len(names) == 4
 
 
 def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):

@@ -9,7 +9,7 @@ from roadeval.runtime.files import Content, NewFolder
 
 
 def names(seal):
-    """What the seal lists, or else the names that are always of a content."""
+    """Return the names that the seal lists, or else those that always belong to a content."""
     try:
         return frozenset(json.loads(seal.read_text()))
     except OSError:
@@ -34,7 +34,7 @@ def write(path, **content):
 
 
 def read(path):
-    return {each.name: each.read_text() for each in path.iterdir() if each.name != "seal"}
+    return {file.name: file.read_text() for file in path.iterdir() if file.name != "seal"}
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_the_earlier_content_is_replaced_and_what_is_of_others_stays(folder):
     mine = {"notes": "mine", "link": "mine"}
     assert read(folder) == {"table": "new", "only_new": "new", **mine}
     assert (folder / "link").is_symlink()
-    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+    assert [file.name for file in folder.parent.iterdir()] == ["folder"]
 
 
 def test_a_folder_of_others_is_never_moved_nor_replaced(folder):
@@ -66,7 +66,7 @@ def test_a_folder_of_others_is_never_moved_nor_replaced(folder):
     new.discard()
     assert (folder / "table").read_text() == "new"
     assert (folder / "sub" / "notes").read_text() == "mine"
-    assert {each.name for each in folder.parent.iterdir()} == {"folder"}
+    assert {file.name for file in folder.parent.iterdir()} == {"folder"}
 
 
 def test_a_folder_stays_where_it_is(folder):
@@ -74,14 +74,14 @@ def test_a_folder_stays_where_it_is(folder):
     write(folder, table="new")
     assert read(folder) == {"table": "new"}
     assert os.path.samestat(folder.stat(), before)
-    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+    assert [file.name for file in folder.parent.iterdir()] == ["folder"]
 
 
 def test_a_folder_that_was_made_for_nothing_goes_and_an_empty_one_stays(tmp_path):
     (tmp_path / "mine").mkdir()
     for name in ("mine", "new"):
         begun(tmp_path / name, {"table": "new"}).discard()
-    assert [each.name for each in tmp_path.iterdir()] == ["mine"]
+    assert [file.name for file in tmp_path.iterdir()] == ["mine"]
 
 
 def test_a_link_stays_and_the_folder_behind_it_is_replaced(folder):

@@ -18,7 +18,9 @@ def test_a_fitted_variant_finds_the_road_in_a_new_frame():
     model = fit(FRAMES, {"unfiltered": pipeline}, TrainingSettings())
     chain = pipeline.bind(model.parameters["unfiltered"])
     fresh = frame(9)
-    masks = {each.stage: each.output.mask.pixels() for each in chain.run(View.of(fresh.image))}
+    masks = {
+        result.stage: result.output.mask.pixels() for result in chain.run(View.of(fresh.image))
+    }
     for name in ("similarity", "svm", "post"):
         wrong = (masks[name] != fresh.truth).mean()
         assert wrong < 0.06, name
@@ -108,12 +110,12 @@ def test_the_pavement_is_road_where_the_kerb_is_lowered():
 
 
 def test_the_further_one_may_reach_the_more_is_road():
-    found = [
+    shares = [
         (patch_truth(street(), TrainingSettings(far=far))[100:, 232:] == ROAD).mean()
         for far in (1.0, 20.0)
     ]
-    assert found[0] < 0.01
-    assert found[1] > 0.99
+    assert shares[0] < 0.01
+    assert shares[1] > 0.99
 
 
 @pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])

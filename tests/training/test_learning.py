@@ -24,9 +24,10 @@ from tests.training.making import frame, pipelines
 PIPELINES = {
     # A plane is fitted and tabulated in half the time, and no test asks what was learnt.
     name: replace(
-        each, settings={**each.settings, "svm": replace(each.settings["svm"], kernel="linear")}
+        pipeline,
+        settings={**pipeline.settings, "svm": replace(pipeline.settings["svm"], kernel="linear")},
     )
-    for name, each in pipelines().items()
+    for name, pipeline in pipelines().items()
 }
 
 
@@ -61,9 +62,9 @@ def roles(frames, schedule: Schedule) -> str:
 
 
 def learn(logged, *, labelled: bool = True, **settings):
-    wanted = TrainingSettings(**settings)
+    chosen = TrainingSettings(**settings)
     return from_log(
-        lambda only=None, **_: logged, PIPELINES, wanted, lambda done: None, labelled=labelled
+        lambda only=None, **_: logged, PIPELINES, chosen, lambda done: None, labelled=labelled
     )
 
 
@@ -147,7 +148,7 @@ BARE = [frame(n, labelled=False) for n in range(2, 4)]
 
 
 def of_drives(source: str, **frames):
-    drives = {Path(name): own for name, own in frames.items()}
+    drives = {Path(name): drive for name, drive in frames.items()}
     return from_drives(drives, PIPELINES, TrainingSettings(source=source))
 
 
@@ -175,11 +176,11 @@ def test_a_drive_without_truth_among_others_is_named(source, frames):
 
 def adapt(logged, path, pipelines, **settings):
     base, _ = from_file(path, pipelines)
-    wanted = TrainingSettings(model=str(path), adapt=True, **settings)
+    chosen = TrainingSettings(model=str(path), adapt=True, **settings)
     model, schedule = from_log(
         lambda only=None, **_: logged,
         pipelines,
-        wanted,
+        chosen,
         lambda done: None,
         labelled=True,
         base=base,
@@ -200,14 +201,14 @@ def robust(tmp_path):
 def test_an_adapted_model_has_learnt_from_both_and_says_so(robust):
     pipelines, path = robust
     base, model, schedule = adapt(log(8), path, pipelines, frames=2, gap=1)
-    own, taught = model.parameters["unfiltered"]["trees"], base.parameters["unfiltered"]["trees"]
-    assert own.base is taught
+    adapted = model.parameters["unfiltered"]["trees"]
+    assert adapted.base is base.parameters["unfiltered"]["trees"]
     assert base.digests < model.digests
     assert len(model.digests) == 4
     assert roles(log(8), schedule) == "ttgeeeee"
-    (told,) = [each for each in model.warnings if "adapted to this drive" in each]
-    assert "2 of its own labelled frames" in told
-    assert str(path) in told
+    (warning,) = [text for text in model.warnings if "adapted to this drive" in text]
+    assert "2 of its own labelled frames" in warning
+    assert str(path) in warning
 
 
 def test_frames_that_the_model_learnt_from_are_not_evaluated_after_adapting_either(robust):
@@ -223,7 +224,7 @@ def test_without_truth_the_patch_adapts_only_where_that_is_insisted_on(robust):
         adapt(logged, path, pipelines, frames=2)
     _, model, _ = adapt(logged, path, pipelines, frames=2, source="patch")
     assert model.source == "patch"
-    assert any("by the reference patch" in each for each in model.warnings)
+    assert any("by the reference patch" in text for text in model.warnings)
 
 
 def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):

@@ -28,7 +28,7 @@ from roadeval.logs.messages import encodings
 from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, TopicKind, parts_of
 from roadeval.logs.messages.frame_numbers import FrameNumbers
 from roadeval.logs.settings import parse_time
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ class Decoder:
 @cache
 def message_encodings() -> Mapping[str, Encoding]:
     """Return the message encodings of the folder, by name."""
-    return {encoding.name: encoding for encoding in chain(*found_in(encodings, "ENCODINGS"))}
+    return {encoding.name: encoding for encoding in chain(*collect(encodings, "ENCODINGS"))}
 
 
 def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:

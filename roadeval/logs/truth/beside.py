@@ -23,7 +23,7 @@ from roadeval.logs.truth import formats
 from roadeval.logs.truth.drawn import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.logs.truth.names import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
 
@@ -89,7 +89,7 @@ def _find_labels(
 def _formats() -> dict[str, list[LabelFormat]]:
     """Return the label formats by the endings of their files."""
     by_ending: dict[str, list[LabelFormat]] = {}
-    for format_ in chain(*found_in(formats, "FORMATS")):
+    for format_ in chain(*collect(formats, "FORMATS")):
         by_ending.setdefault(format_.ending, []).append(format_)
     return by_ending
 

@@ -34,8 +34,8 @@ def test_each_channel_is_multiplied_everywhere():
 
 def test_what_is_brighter_than_the_patch_is_compressed_and_keeps_its_order():
     # 96 + 159 (x - 96) / (x - 96 + 159), with x of 200, of 2 * 200, and of 1.
-    found = run(scene((48, 96, 192), elsewhere=(200, 200, 1))).image[0, 0].tolist()
-    assert found == [200, 159, 0]
+    colour = run(scene((48, 96, 192), elsewhere=(200, 200, 1))).image[0, 0].tolist()
+    assert colour == [200, 159, 0]
     greys = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)[None]
     tones = expose(greys, np.full(3, 3.0), LEVEL)[0, :, 0].astype(int)
     assert (np.diff(tones[:64]) >= 1).all()

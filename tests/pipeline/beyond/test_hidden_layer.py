@@ -73,7 +73,7 @@ def test_steps_of_one_length_are_those_of_scikit_learn_bit_for_bit(batch):
     passes = [(values, road), (-values, ~road), (values, road)]
     for pixels, labels in passes:
         machine.partial_fit(pixels, labels, classes=[False, True])
-    layers = descend(((*each, 0.001) for each in passes), 4, 8, batch, 3)
+    layers = descend(((*part, 0.001) for part in passes), 4, 8, batch, 3)
     for ours, theirs in zip(layers, (*machine.coefs_, *machine.intercepts_), strict=True):
         np.testing.assert_array_equal(ours, theirs)
 

@@ -13,10 +13,10 @@ CASES = [(numbers, name) for numbers, names in ROWS for name in re.findall(r"`(\
 
 def equations(text):
     """The numbers of all equations that a text names."""
-    found = set()
+    numbers = set()
     for first, last in re.findall(r"Eq\. (\d+)(?:-(\d+))?", text):
-        found |= set(range(int(first), int(last or first) + 1))
-    return found
+        numbers |= set(range(int(first), int(last or first) + 1))
+    return numbers
 
 
 def test_the_table_has_all_equations_of_the_pipeline():

@@ -52,7 +52,7 @@ def case(request):
 
 
 def road(stage, colours):
-    """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
+    """Return the mask of ``(n, 3)`` colours, as an image of one row."""
     return stage(View.of(colours[None])).mask.pixels()[0]
 
 
@@ -134,9 +134,9 @@ def test_a_machine_that_learnt_nothing_calls_nothing_road():
 
 def test_a_colour_is_decided_alike_whatever_is_decided_with_it(case):
     settings, machine, *_ = case
-    whole = svm.decision(COLOURS[:500], machine, settings)
+    together = svm.decision(COLOURS[:500], machine, settings)
     alone = [svm.decision(COLOURS[i : i + 1], machine, settings).item() for i in range(500)]
-    assert whole.tolist() == alone
+    assert together.tolist() == alone
 
 
 def test_the_machine_is_scikit_learns(case):
