@@ -24,7 +24,7 @@ import roadeval
 from benchmarks.tables import idd
 from benchmarks.world import RenderSettings, write_drive
 from roadeval.data import IGNORE, ROAD
-from roadeval.evaluation.score.unlabelled import chosen, entropy
+from roadeval.evaluation.score.unlabelled import choose_frames, entropy
 from roadeval.evaluation.stats.sampling import Estimate, draw_order, estimate
 from roadeval.pipeline.stage import View
 from roadeval.training.learning import fit
@@ -107,7 +107,7 @@ def try_strategies(drive: Drive, labels: int) -> dict[str, tuple[float, float, f
         draws.setdefault(name, []).append((low <= truth <= high, high - low, hits))
 
     for seed in range(DRAWS):
-        random, ranked = chosen(drive.stamps, drive.scores, labels, seed)
+        random, ranked = choose_frames(drive.stamps, drive.scores, labels, seed)
         random = np.sort(random)
         guess = estimate(drive.errors[random], drive.scores[random], drive.scores)
         note("pick", np.union1d(random, ranked), guess)

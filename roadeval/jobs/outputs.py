@@ -13,7 +13,7 @@ from roadeval.errors import RoadevalError
 from roadeval.recording.layout import RecordRule
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FILES
-from roadeval.results.folder import CONTENT, belonging
+from roadeval.results.folder import CONTENT, names_of_results
 from roadeval.runtime.files import (
     AnyPath,
     claimed_file,
@@ -95,7 +95,7 @@ def _places(path: Path) -> Iterator[Path]:
     if is_fleet(path):
         yield from (path / name for name in FILES)
     elif (path / SUMMARY).is_file():
-        yield from (path / name for name in belonging(path / SUMMARY))
+        yield from (path / name for name in names_of_results(path / SUMMARY))
 
 
 def _claim(claims: ExitStack, path: Path, claim: AbstractContextManager[bool]) -> bool:

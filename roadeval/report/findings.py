@@ -18,7 +18,7 @@ from roadeval.evaluation.metres import band_name
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
-from roadeval.evaluation.tables import grouped, only, values_of
+from roadeval.evaluation.tables import group_rows, only, values_of
 from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
@@ -156,7 +156,7 @@ class Findings:
     def heatmaps(self) -> Mapping[str, Floats]:
         """By variant ``(2, rows, columns)``, how often FP and FN are there; NaN if not labelled."""
         maps = {}
-        for (name,), cells in grouped(self.table("heat"), ["variant"]):
+        for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))
             maps[name] = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
             maps[name][:, rows, columns] = cells[["FP", "FN"]].div(cells["labelled"], axis=0).T

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
-from roadeval.data.words import counted, defined, in_percent, interval, number, percent
-from roadeval.evaluation.metrics import TESTED
+from roadeval.data.words import counted, interval, number, percent
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
@@ -17,107 +15,19 @@ from roadeval.evaluation.tables import FILTER
 from roadeval.results.facts import FrameAccount
 
 FINE: Final = 0.005
-"""Levels that differ by less are given with two digits."""
+"""Levels that differ by less have two digits."""
 ROUNDING: Final = 5e-4
-"""Levels whose difference is farther from the paired one are of other frames."""
+"""If the difference of two levels is farther from the paired one, they are of other frames."""
 MARK: Final = "*"
-"""Marks a difference that is significant after correction for all that are stated together."""
+"""Marks a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
-"""Least difference of errors and stated errors that is told, see `overconfident`."""
+"""Least difference between errors and stated errors that `describe_overconfidence` reports."""
 _OF_FILTER: Final = "The filter "
-"""Begins the note on what the filter did to a frame."""
+"""Beginning of the note on the filter's effect on a frame."""
 
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
-
-
-def sentence(
-    found: Difference,
-    what: str,
-    rate: str,
-    ends: tuple[Rates, Rates] | None = None,
-    *,
-    windows: str = "",
-    said: str = "",
-) -> str:
-    """Return what a difference says of these frames or drives, and then of others like them.
-
-    The difference is with ``what`` minus without: ``the filter``, or ``net instead of blind``;
-    ``rate`` is what changes, as ``ERR of post``. ``ends`` are the rates without and with it, which
-    are given where they are of the same frames or drives; ``windows`` says in how many it is lower,
-    in brackets; ``said`` is what a sentence before has said of others like them.
-
-    >>> found = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
-    >>> sentence(found, "the filter", "ERR")
-    'On these 91 frames the filter lowers ERR by 2.0 pp; on frames like these by 1.0 to 3.0 pp.'
-    """
-    unit = found.unit[:-1]
-    if not found.units:
-        return f"Nothing to compare: {rate} is undefined on every {unit}."
-    here = _here(found)
-    if found.is_zero:
-        return f"{here} {what} leaves {rate} of every {unit} as it is."
-    by = f"by {_size(found.mean, _digits(found))} pp"
-    before, after = (each.get(TESTED) for each in ends or ({}, {}))
-    if defined(before) and defined(after) and abs(after - before - found.mean) < ROUNDING:
-        digits = 1 if abs(found.mean) >= FINE else 2
-        by = f"from {_size(before, digits)} to {_size(after, digits)} %"
-    doubt = "" if _doubt(found) == said else f"; {_doubt(found)}"
-    verb = "raises" if found.mean > 0 else "lowers"
-    return f"{here} {what} {verb} {rate} {by}{windows or _counted(found)}{doubt}."
-
-
-def _doubt(found: Difference) -> str:
-    """Return what a difference says of other frames or drives, as a clause."""
-    if found.low is None or found.high is None:
-        return found.none_because
-    like, digits = f"on {found.unit} like these", _digits(found)
-    if is_sure(found):
-        least, most = sorted((abs(found.low), abs(found.high)))
-        return f"{like} by {_size(least, digits)} to {_size(most, digits)} pp"
-    family = ""
-    if is_sure(replace(found, p_holm=None)):
-        family = f" (corrected for {found.comparisons} comparisons)"
-    return f"{like} the effect is unclear: {_ends(found.low, found.high, digits)}{family}"
-
-
-def _ends(low: float, high: float, digits: int) -> str:
-    """Return an interval in words.
-
-    >>> _ends(-0.03, 0.01, 1), _ends(-0.03, -0.01, 1)
-    ('from 3.0 pp lower to 1.0 pp higher', 'from 1.0 to 3.0 pp lower')
-    """
-    if low < 0 < high:
-        return f"from {_size(low, digits)} pp lower to {_size(high, digits)} pp higher"
-    least, most = sorted((low, high), key=abs)
-    word = "lower" if high <= 0 else "higher"
-    return f"from {_size(least, digits)} to {_size(most, digits)} pp {word}"
-
-
-def _digits(found: Difference) -> int:
-    return 1 if max(abs(found.mean), -(found.low or 0.0), found.high or 0.0) >= 0.01 else 2
-
-
-def _size(fraction: float, digits: int) -> str:
-    return f"{abs(in_percent(fraction)):.{digits}f}"
-
-
-def _here(found: Difference) -> str:
-    if found.unit == "frames":
-        return "On this frame" if found.units == 1 else f"On these {found.units} frames"
-    groups = (
-        "" if found.groups in (None, found.units) else f" in {counted(found.groups or 0, 'group')}"
-    )
-    return f"Over {counted(found.units, 'drive')}{groups}"
-
-
-def _counted(found: Difference) -> str:
-    if found.worse is None:
-        return ""
-    if found.unit == "frames":
-        return f" (better on {found.better} of {found.units})"
-    return f" (worse on {found.worse}, better on {found.better})"
 
 
 _WHY: Final = {
@@ -130,7 +40,7 @@ _WHY: Final = {
     "gap after training": "in the gap after training",
     "gap beside training": "in the gap beside training",
 }
-"""Reasons of `roadeval.results.facts.FrameAccount`, as they follow a number."""
+"""Words behind a number of frames, by the reasons of `roadeval.results.facts.FrameAccount`."""
 
 
 def account(frames: FrameAccount, windows: int | None = None) -> str:
@@ -139,37 +49,37 @@ def account(frames: FrameAccount, windows: int | None = None) -> str:
     >>> account(FrameAccount(in_log=100, evaluated=90, skipped={"trained on": 10}), 9)
     '90 of 100 frames were evaluated, in 9 windows. Left out: 10 to train on.'
     """
-    whole = frames.evaluated if frames.in_log is None else frames.in_log
-    of = "" if frames.evaluated == whole else f"{number(frames.evaluated)} of "
+    total = frames.evaluated if frames.in_log is None else frames.in_log
+    of = "" if frames.evaluated == total else f"{number(frames.evaluated)} of "
     verb = "was" if frames.evaluated == 1 else "were"
     within = f", in {counted(windows, 'window')}" if windows else ""
-    told = f"{of}{counted(whole, 'frame')} {verb} evaluated{within}."
+    sentence_on_frames = f"{of}{counted(total, 'frame')} {verb} evaluated{within}."
     why = [f"{number(count)} {_WHY.get(name, name)}" for name, count in frames.skipped.items()]
-    return f"{told} Left out: {', '.join(why)}." if why else told
+    return f"{sentence_on_frames} Left out: {', '.join(why)}." if why else sentence_on_frames
 
 
-def is_sure(found: Difference) -> bool:
-    """Return whether a difference is there, by its corrected p-value where it has one."""
-    p = found.p if found.p_holm is None else found.p_holm
-    return p is not None and p < 1 - found.confidence
+def is_sure(difference: Difference) -> bool:
+    """Return whether a difference is sure, by its corrected p-value if it has one."""
+    p = difference.p if difference.p_holm is None else difference.p_holm
+    return p is not None and p < 1 - difference.confidence
 
 
-def is_significant(found: Difference) -> bool:
-    """Return whether a difference is there after Holm's correction."""
-    return found.p_holm is not None and is_sure(found)
+def is_significant(difference: Difference) -> bool:
+    """Return whether a difference is sure after Holm's correction."""
+    return difference.p_holm is not None and is_sure(difference)
 
 
-def marked_interval(found: Difference) -> str:
-    """Return the interval of a difference, with a mark where it excludes 0 after correction."""
-    mark = f" {MARK}" if is_significant(found) else ""
-    return interval(found.low, found.high) + mark
+def marked_interval(difference: Difference) -> str:
+    """Return the interval of a difference, with a mark if it excludes 0 after correction."""
+    mark = f" {MARK}" if is_significant(difference) else ""
+    return interval(difference.low, difference.high) + mark
 
 
 def correction(differences: Iterable[Difference]) -> str:
-    """Return what a mark on differences of ERR means; empty where none has one."""
-    shown = list(differences)
-    counts = sorted({each.comparisons for each in shown if each.comparisons})
-    if not any(map(is_significant, shown)):
+    """Return what a mark on differences of ERR means; empty if none has one."""
+    marked = list(differences)
+    counts = sorted({shown.comparisons for shown in marked if shown.comparisons})
+    if not any(map(is_significant, marked)):
         return ""
     if counts == [1]:
         return f"{MARK} excludes 0; it is the only one, so nothing is corrected."
@@ -181,21 +91,21 @@ def correction(differences: Iterable[Difference]) -> str:
     )
 
 
-def misfit(found: Finding, period_ms: float | None, remedy: str) -> str:
-    """Return what does not fit, and what to do, in two sentences.
+def misfit(finding: Finding, period_ms: float | None, remedy: str) -> str:
+    """Return two sentences: what does not fit, and what to do.
 
     ``period_ms`` is the time from one frame to the next, if it is known.
 
     >>> misfit(Finding("truth", Misfit.LAG, frames=3), 100, "Set `truth.first` to 3.")
     'The truth is 3 frames (300 ms) late: it fits earlier images better. Set `truth.first` to 3.'
     """
-    subject, verb = ("The truth", "is") if found.subject == TRUTH else (None, "are")
-    subject = subject or f"The masks of {found.subject}"
-    match found.misfit:
+    subject, verb = ("The truth", "is") if finding.subject == TRUTH else (None, "are")
+    subject = subject or f"The masks of {finding.subject}"
+    match finding.misfit:
         case Misfit.LAG:
-            size = abs(found.frames)
+            size = abs(finding.frames)
             time = f" ({size * period_ms:.0f} ms)" if period_ms else ""
-            word, which = ("late", "earlier") if found.frames > 0 else ("early", "later")
+            word, which = ("late", "earlier") if finding.frames > 0 else ("early", "later")
             what = f"{counted(size, 'frame')}{time} {word}: {_it(verb)} {which} images better"
         case Misfit.MIRRORED:
             what = f"mirrored: with left and right exchanged {_it(verb)} the images better"
@@ -206,7 +116,7 @@ def misfit(found: Finding, period_ms: float | None, remedy: str) -> str:
                 "inverted, or of another class: road is high in the image, not before the vehicle"
             )
         case _:
-            ways = ((found.right, "right", "left"), (found.down, "down", "up"))
+            ways = ((finding.right, "right", "left"), (finding.down, "down", "up"))
             parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]
             what = f"moved by {' and '.join(parts)}: moved back {_it(verb)} images and truth better"
     return f"{subject} {verb} {what}. {remedy}"
@@ -216,10 +126,10 @@ def _it(verb: str) -> str:
     return "it fits" if verb == "is" else "they fit"
 
 
-def overconfident(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
-    """Yield a sentence on each variant that errs twice as often as its probabilities say, or more.
+def describe_overconfidence(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
+    """Yield a sentence on each variant that errs at least twice as often as its probabilities say.
 
-    ``curves`` are as in `roadeval.results.facts.Facts`. Less than a point of difference is none.
+    ``curves`` are as in `roadeval.results.facts.Facts`. Less than a point of difference is ignored.
     """
     for variant, stages in curves.items():
         *_, last = stages.values()
@@ -234,7 +144,7 @@ def overconfident(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iter
 def step_by_step(parts: Mapping[str, float]) -> str:
     """Return how an error rate comes about, as a clause.
 
-    ``parts`` are in percent: the error of a first mask, and what each further step adds.
+    ``parts`` are in percent: the error of the first mask, and the addition of each further step.
 
     >>> step_by_step({"svm": 15.0, "filter": -1.2, "post": 0.6})
     'svm without the filter leaves 15.0 % wrong, the filter removes 1.2 pp, post adds 0.6 pp'
@@ -249,7 +159,7 @@ def step_by_step(parts: Mapping[str, float]) -> str:
 
 
 def without_filter(notes: Iterable[str]) -> list[str]:
-    """Return a frame's notes without that on the filter, where its part of ERR is shown."""
+    """Return a frame's notes without the one on the filter, whose effect is shown apart."""
     return [note for note in notes if not note.startswith(_OF_FILTER)]
 
 
@@ -289,4 +199,4 @@ CLAIMED: Final = {
     "svm_ERR": "ERR of the SVM is lower than that of the colour distance (section 4.3)",
     "post_ERR": "ERR after post-processing is lower than after the SVM (section 4.4)",
 }
-"""By the names of `CLAIMS` in the scoreboard; the last two are of the filtered variant."""
+"""Claims by the names of `CLAIMS` in the scoreboard; the last two are on the filtered variant."""

@@ -191,6 +191,7 @@ def test_the_lines_of_the_verdict_keep_their_promise(brought, folder, tmp_path):
         if not masks:
             own.write_text(f'file = "{network}"\n{lines}')
             config = config.with_variants([network_variant("mine", str(own))])
+        config = config.override({"only": ["mine", "unfiltered"]})
         outcome, _ = replay(folder / "drive.mcap", config, tmp_path / "r")
         *_, final = outcome.summary["totals"]["mine"].values()
         return outcome.summary["thresholds"]["mine"], final["pooled_ERR"]

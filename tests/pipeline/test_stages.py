@@ -5,9 +5,9 @@ import pytest
 
 from roadeval.config.run import configure
 from roadeval.config.tables import ConfigError
-from roadeval.data import Moment, Packed
-from roadeval.pipeline.stage import Output, StageError, View
-from roadeval.pipeline.stages import UnknownStageError, stages_of
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Moment, Output, Packed, mask_spec
+from roadeval.pipeline.stage import Stage, StageError, View
+from roadeval.pipeline.stages import UnknownStageError, guard, stages_of
 from tests.pipeline.images import noise
 from tests.pipeline.making import default
 
@@ -113,3 +113,40 @@ def test_after_an_image_the_channels_are_its_own():
     np.testing.assert_array_equal(np.dstack(view.planes), image)
     assert later.original is image
     assert later.mask is MASK
+
+
+CLASSES = tuple(LabelClass(i, str(i), (i, 0, 0, 255)) for i in range(3))
+SPEC = mask_spec("mask", "Mask")
+LABELS = LayerSpec("labels", LayerKind.LABELS, "Labels", CLASSES)
+RGB = LayerSpec("rgb", LayerKind.RGB, "Colours")
+BLACK = np.zeros((4, 6, 3), np.uint8)
+
+
+def run(spec, array):
+    def bind(_settings, _parameters):
+        road = Packed.of(BLACK[..., 0])
+        return lambda view: Output((Layer(spec, array),), mask=road)
+
+    stage = Stage("own", "Own", int, bind, (spec,))
+    return guard(stage).bind(0, None)(View.of(BLACK))
+
+
+@pytest.mark.parametrize("held", [bool, np.int64])
+def test_a_mask_may_hold_any_whole_numbers(held):
+    run(SPEC, BLACK[..., 0].astype(held))
+
+
+@pytest.mark.parametrize(
+    ("spec", "held"),
+    [(SPEC, np.float32), (LABELS, np.int64), (LABELS, bool), (RGB, np.float32), (RGB, np.uint16)],
+)
+def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
+    array = (BLACK if spec is RGB else BLACK[..., 0]).astype(held)
+    with pytest.raises(StageError, match=f"its layer '{spec.name}' is {np.dtype(held)}"):
+        run(spec, array)
+
+
+def test_a_layer_of_another_size_is_named():
+    message = r"its layer 'mask' is uint8 \(3, 6\): it must be bool or integer \(4, 6\)"
+    with pytest.raises(StageError, match=message):
+        run(SPEC, BLACK[:3, :, 0])

@@ -132,7 +132,9 @@ class FramePicker:
         """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
         pairs = tables.changes(self._result.rows, FILTERED, UNFILTERED)
         apart, besides = scene_ns(pairs["stamp_ns"]), [frame.stamp_ns for frame in shown]
-        rows = tables.most_changed(pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides)
+        rows = tables.most_changed_frames(
+            pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides
+        )
         columns = rows[["frame", "stamp_ns", "change"]].assign(variant=FILTERED)
         return [self._notable(*row) for row in columns.itertuples(index=False)]
 

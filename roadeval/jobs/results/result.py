@@ -434,7 +434,7 @@ def _compared_drives(fleet: FleetFolder) -> Iterator[ComparedDrive]:
             name=fleet.names[row["drive"]],
             digest=row["log_digest"] or None,
             frames=row["evaluated"] or 0,
-            asked=settings,
+            settings=settings,
             group=row["group"],
         )
 

@@ -135,7 +135,7 @@ def _estimate_rates(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
     rates: dict[str, dict[str, Estimate]] = {}
     problem = _why_not_random(run, picks)
     finals = tables.finals(frames.iloc[:0] if problem else frames)
-    for (variant,), rows in tables.grouped(finals, ["variant"]):
+    for (variant,), rows in tables.group_rows(finals, ["variant"]):
         for rate in (rate for rate in METRICS if rate in SHORT):
             defined = rows[rows[rate].notna()]
             if len(defined):
