@@ -1,4 +1,4 @@
-"""What tells one log from another without reading it, and reading all of it."""
+"""The identity of a log, without reading it, and the SHA-256 of a log that is read completely."""
 
 import hashlib
 import shutil
@@ -73,10 +73,10 @@ def test_a_byte_that_changed_inside_a_chunk_is_found_by_verifying(noise, tmp_pat
     other = tmp_path / "other.mcap"
     other.write_bytes(content)
     assert digest(other) == digest(noise)
-    whole, damaged = describe(noise, verify=True), describe(other, verify=True)
-    assert whole.sha256 == hashlib.sha256(noise.read_bytes()).hexdigest()
+    intact, damaged = describe(noise, verify=True), describe(other, verify=True)
+    assert intact.sha256 == hashlib.sha256(noise.read_bytes()).hexdigest()
     assert damaged.sha256 == hashlib.sha256(other.read_bytes()).hexdigest()
-    assert not whole.losses
+    assert not intact.losses
     assert damaged.losses
 
 
@@ -85,16 +85,16 @@ def test_of_a_large_log_the_messages_are_not_read_unless_asked(noise, monkeypatc
 
     class Counted(FileBytes):
         def __getitem__(self, part):
-            found = super().__getitem__(part)
-            read.append(len(found))
-            return found
+            data = super().__getitem__(part)
+            read.append(len(data))
+            return data
 
     for module in (records, file):
         monkeypatch.setattr(module, "FileBytes", Counted)
     monkeypatch.setattr(log, "SMALL", CHUNK)
-    found = describe(noise)
-    assert (found.verified, found.sha256) == (False, None)
-    assert [topic.count for topic in found.topics] == [FRAMES]
+    description = describe(noise)
+    assert (description.verified, description.sha256) == (False, None)
+    assert [topic.count for topic in description.topics] == [FRAMES]
     assert sum(read) < noise.stat().st_size / 4
     steps = []
     assert describe(noise, verify=True, on_bytes=lambda *step: steps.append(step)).verified

@@ -63,7 +63,7 @@ def test_a_range_is_half_open_and_keeps_the_numbers(
 
 
 @pytest.mark.parametrize(
-    ("images", "labels", "stamps", "told"),
+    ("images", "labels", "stamps", "reason"),
     [
         ([10, 20, 30], [12, 22, 32], [10, 20, 30], "in place of them: log times"),
         ([7, 7, 7], [9, 9, 9], [7, 7, 7], "in place of them: their order"),
@@ -71,7 +71,7 @@ def test_a_range_is_half_open_and_keeps_the_numbers(
     ],
 )
 def test_log_times_or_the_order_take_the_place_of_zero_stamps(
-    tmp_path: Path, images: list[int], labels: list[int], stamps: list[int], told: str
+    tmp_path: Path, images: list[int], labels: list[int], stamps: list[int], reason: str
 ) -> None:
     mask = png(grey(255))
     messages = [("/cam", time, compressed(0, jpeg(grey(9)))) for time in images]
@@ -79,7 +79,7 @@ def test_log_times_or_the_order_take_the_place_of_zero_stamps(
     path = ros2_log(tmp_path / "zero.mcap", sorted(messages, key=lambda message: message[1]))
     selection, frames = read(path)
     assert [frame.stamp_ns for frame in frames if frame.labelled] == stamps
-    assert any(told in reason for reason in selection.reasons)
+    assert any(reason in sentence for sentence in selection.reasons)
 
 
 @pytest.mark.parametrize("kind", list(CompressionType))
@@ -115,18 +115,18 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, ap
     messages.append(("/camera", 100, compressed(3, jpeg(grey(200)))))  # an old stamp
     path = ros2_log(tmp_path / "a.mcap", sorted(messages, key=lambda message: message[1]))
     (*_, last) = read(path)[1]
-    (told,) = last.accounting.notes
-    assert told.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
+    (note,) = last.accounting.notes
+    assert note.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
 
 
 def chunks_read(log: Log, monkeypatch: pytest.MonkeyPatch) -> set[int]:
     """Return a set that fills with the places of the chunks that are read from now on."""
-    read, whole = set[int](), records.ChunkReader.read
+    read, read_chunk = set[int](), records.ChunkReader.read
     log.containers[0].reader._cache.clear()
 
     def noted(reader: records.ChunkReader, chunk: records.Chunk) -> records.Bytes:
         read.add(chunk.offset)
-        return whole(reader, chunk)
+        return read_chunk(reader, chunk)
 
     monkeypatch.setattr(records.ChunkReader, "read", noted)
     return read
@@ -139,16 +139,18 @@ def test_labelled_frames_are_found_by_their_labels_alone(tmp_path, apart, delay,
     image, mask = jpeg(grey(9)), grey(0)
     mask[3:] = 255
     messages = [("/camera", stamp, compressed(stamp, image)) for stamp in stamps]
-    messages += [("/labels", each + delay, raw(each, mask, "mono8")) for each in stamps[3::apart]]
+    messages += [
+        ("/labels", stamp + delay, raw(stamp, mask, "mono8")) for stamp in stamps[3::apart]
+    ]
     messages.sort(key=lambda message: message[1])
     path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
     tolerance = TopicSettings(sync_tolerance_ms=1e-3)
     with open_log(path, LogConfig(topics=tolerance, frames=FrameSettings(every=2))) as log:
         selection = log.select()
-        expected = [each.number for each in log.frames(selection) if each.labelled]
+        expected = [frame.number for frame in log.frames(selection) if frame.labelled]
         read = chunks_read(log, monkeypatch)
-        found = [each.number for each in log.frames(selection, labelled=True)]
-    assert found == expected
+        numbers = [frame.number for frame in log.frames(selection, labelled=True)]
+    assert numbers == expected
     assert apart == 1 or len(read) < len(stamps)
 
 
@@ -167,8 +169,8 @@ def test_labels_are_paired_only_within_the_range(tmp_path, frames, monkeypatch):
     stamps = range(20_000_000, 20_024_000, 100)
     image, mask = jpeg(grey(9)), grey(0)
     mask[3:] = 255
-    messages = [("/camera", each, compressed(each, image)) for each in stamps]
-    messages += [("/labels", each + 50, raw(each, mask, "mono8")) for each in stamps[::4]]
+    messages = [("/camera", stamp, compressed(stamp, image)) for stamp in stamps]
+    messages += [("/labels", stamp + 50, raw(stamp, mask, "mono8")) for stamp in stamps[::4]]
     messages.sort(key=lambda message: message[1])
     path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
     topics = TopicSettings(sync_tolerance_ms=5e-5)
@@ -176,9 +178,9 @@ def test_labels_are_paired_only_within_the_range(tmp_path, frames, monkeypatch):
     with open_log(path, LogConfig(topics=topics, frames=frames)) as log:
         selection = log.select()
         read = chunks_read(log, monkeypatch)
-        found = [each.number for each in log.frames(selection, labelled=True)]
-        assert len(found) >= 3
-        assert all(number % 4 == 0 for number in found)
+        numbers = [frame.number for frame in log.frames(selection, labelled=True)]
+        assert len(numbers) >= 3
+        assert all(number % 4 == 0 for number in numbers)
         assert len(read) < len(messages) / 8
 
 
@@ -234,9 +236,9 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
     path = two_cameras(tmp_path / "a.mcap", names)
     _, frames = read(path)
     assert len(frames) == len(names)
-    (told,) = (note for note in frames[0].accounting.notes if "several cameras" in note)
-    assert f"{names[0]} ({names.count(names[0])})" in told
-    assert "`topics.frame_id` chooses one" in told
+    (note,) = (note for note in frames[0].accounting.notes if "several cameras" in note)
+    assert f"{names[0]} ({names.count(names[0])})" in note
+    assert "`topics.frame_id` chooses one" in note
     for name in {*names}:
         _, frames = read(path, topics=TopicSettings(frame_id=name, truth="/labels"))
         numbers = [number for number, other in enumerate(names) if other == name]
@@ -260,8 +262,10 @@ def test_a_label_under_several_stamps_is_told(tmp_path: Path, apart: int, repeat
         messages.append(("/camera", number + 1, compressed(number + 1, png(grey(number)))))
         messages.append(("/labels", number + 1, compressed(number + 1, png(mask))))
     _, frames = read(ros2_log(tmp_path / "a.mcap", messages))
-    told = [note for note in frames[-1].accounting.notes if "labels repeat" in note]
-    assert [note.split(" labels")[0] for note in told] == [f"{repeated} of the 12"] * (repeated > 0)
+    notes = [note for note in frames[-1].accounting.notes if "labels repeat" in note]
+    assert [note.split(" labels")[0] for note in notes] == [f"{repeated} of the 12"] * (
+        repeated > 0
+    )
 
 
 SECOND = 1_000_000_000

@@ -145,7 +145,7 @@ def find_keys(
         folder = Path(settings.images)
         images, _ = order_by_time(list_files(folder, IMAGES))  # the order of `pack`
         if len({image.stem for image in images}) < len(images):
-            raise LogError(f"{folder}: two of its images have the same name")
+            raise LogError("two of its images have the same name", where=folder)
     by, keys = _keys_of(names, settings, images)
     if images is not None and not keys:
         raise LogError(

@@ -38,8 +38,10 @@ def here(content: str, folder: Path) -> Suite:
     for name, data in conformance.variants(content):
         path = folder / f"{name}.mcap"
         path.write_bytes(data)
-        found = [(type(record).__name__, fields(record)) for record in conformance.records(data)]
-        suite.append((path, [record for record in found if record[0] != "MessageIndex"]))
+        found_records = [
+            (type(record).__name__, fields(record)) for record in conformance.records(data)
+        ]
+        suite.append((path, [record for record in found_records if record[0] != "MessageIndex"]))
     return suite
 
 
@@ -63,7 +65,7 @@ def test_every_message_topic_and_schema_is_found_and_nothing_is_called_damaged(s
     assert suite
     for path, expected in suite:
         (container,) = containers_in(path, lambda *_: True, lambda *_: 0)
-        found = [
+        found_records = [
             ("Message", fields(container.message(chunk, offset)))
             for log in container.logs.values()
             for chunk, entries in log.blocks
@@ -71,7 +73,7 @@ def test_every_message_topic_and_schema_is_found_and_nothing_is_called_damaged(s
         ]
         assert damage_of(container) == (), path.name
         container.close()
-        assert found == [record for record in expected if record[0] == "Message"], path.name
+        assert found_records == [record for record in expected if record[0] == "Message"], path.name
         for kind, described in (("Channel", container.channels), ("Schema", container.schemas)):
             records = {number: (kind, fields(record)) for number, record in described.items()}
             listed = {int(record[1]["id"]): record for record in expected if record[0] == kind}

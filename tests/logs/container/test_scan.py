@@ -26,7 +26,7 @@ from tests.logs.making import CAMERA, FRAMES, START, chunk_record, small_log
 FOOTER = HEAD + 20 + 8
 
 
-def kept(path: Path) -> list[int]:
+def kept_images(path: Path) -> list[int]:
     """Positions in the good log of the images that are kept whole."""
     with open_log(path, LogConfig(topics=TopicSettings(image=CAMERA, truth=""))) as log:
         frames = [frame.decode() for frame in log.frames(log.select())]
@@ -63,8 +63,8 @@ def test_an_image_of_wrong_length_costs_only_itself(unchunked: Path, longer: int
     data = unchunked.read_bytes()
     at = records(data, Opcode.MESSAGE)[6]
     length = length_of(data, at) - HEAD + longer
-    found = kept(changed(unchunked, at + LENGTH_AT, length.to_bytes(8, "little")))
-    assert set(range(FRAMES)) - set(found) <= {3}
+    images = kept_images(changed(unchunked, at + LENGTH_AT, length.to_bytes(8, "little")))
+    assert set(range(FRAMES)) - set(images) <= {3}
 
 
 def test_a_wrong_message_index_costs_nothing_and_no_order(chunked: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_wrong_message_index_costs_nothing_and_no_order(chunked: Path) -> None
     assert good[channel] == 1, "the second chunk's index of the camera"
     for byte in range(entries, entries + 3 * 16):
         chunked.write_bytes(good)
-        assert kept(changed(chunked, byte, bytes([good[byte] ^ 4]))) == [*range(FRAMES)]
+        assert kept_images(changed(chunked, byte, bytes([good[byte] ^ 4]))) == [*range(FRAMES)]
 
 
 def test_a_wrong_message_index_is_noted(chunked: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_wrong_message_index_is_noted(chunked: Path) -> None:
 @pytest.mark.parametrize("offset", range(8))
 def test_a_wrong_byte_at_the_very_beginning_is_forgiven(chunked: Path, offset: int) -> None:
     changed(chunked, offset, b"?")
-    assert kept(chunked) == [*range(FRAMES)]
+    assert kept_images(chunked) == [*range(FRAMES)]
     with open_log(chunked) as log:
         assert log.losses == ()
         assert "does not begin as it should" in str(log.damage[0])
@@ -105,7 +105,7 @@ def test_a_missing_record_at_the_end_of_the_data_is_no_loss(tmp_path: Path, cont
     # Writers that leave this record out give no checksums, and no offsets of summary sections.
     footer = over(data[-FOOTER:], HEAD, start.to_bytes(8, "little") + bytes(12))
     path.write_bytes(data[:at] + data[at + length_of(data, at) : -FOOTER] + footer)
-    assert kept(path) == [*range(FRAMES)]
+    assert kept_images(path) == [*range(FRAMES)]
     with open_log(path) as log:
         log.verify()
         assert log.losses == ()
@@ -116,7 +116,7 @@ def test_a_footer_that_points_into_the_data_ends_nothing(unchunked: Path) -> Non
     data = unchunked.read_bytes()
     start = records(data, Opcode.MESSAGE)[6].to_bytes(8, "little")
     path = changed(unchunked, len(data) - FOOTER + HEAD, start + bytes(12))
-    assert kept(path) == [*range(FRAMES)]
+    assert kept_images(path) == [*range(FRAMES)]
 
 
 SIZE = 9 * (2 << 20)
@@ -129,14 +129,14 @@ COMPRESSED_ZEROS = {
 
 @pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
 @pytest.mark.parametrize(
-    ("largest", "told"),
+    ("largest", "loss"),
     [
         (1 << 30, "a chunk whose records do not add up"),
         (10 << 20, "a chunk of more than 10485760 bytes"),
     ],
 )
 def test_zeros_in_place_of_records_are_told_and_given_up_if_they_grow_beyond_all_bounds(
-    tmp_path, monkeypatch, compression, largest, told
+    tmp_path, monkeypatch, compression, largest, loss
 ):
     """They lie in front of all other chunks, in a log without a summary."""
     monkeypatch.setattr("roadeval.logs.container.records.LARGEST_CHUNK", largest)
@@ -148,33 +148,33 @@ def test_zeros_in_place_of_records_are_told_and_given_up_if_they_grow_beyond_all
     chunk = chunk_record(COMPRESSED_ZEROS[compression], compression, SIZE, start=START)
     tail = b"\x0f" + struct.pack("<QI", 4, 0) + b"\x02" + struct.pack("<Q", 20) + bytes(20)
     path.write_bytes(log[:begin] + chunk + log[begin:end] + tail + log[:8])
-    assert kept(path) == [*range(FRAMES)]
+    assert kept_images(path) == [*range(FRAMES)]
     with open_log(path) as opened:
-        assert told in opened.losses[0]
+        assert loss in opened.losses[0]
 
 
 def test_two_descriptions_of_a_topic_outside_chunks_are_told(unchunked: Path) -> None:
     """Which is right nothing tells: the summary has a checksum, the data was what messages met."""
-    whole = unchunked.read_bytes()
+    content = unchunked.read_bytes()
     name = b"sensor_msgs/msg/CompressedImage"
-    last = whole.rindex(name)
-    wrong = whole[:last] + name.replace(b"sensor", b"tensor") + whole[last + len(name) :]
+    last = content.rindex(name)
+    wrong = content[:last] + name.replace(b"sensor", b"tensor") + content[last + len(name) :]
     unchunked.write_bytes(mended(wrong))
     with open_log(unchunked) as log:
-        told, *_ = log.losses
-    assert "a topic is described here in another way" in told
+        loss, *_ = log.losses
+    assert "a topic is described here in another way" in loss
 
 
 def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
     """The summary's copy of a definition may say something else under a checksum that is right."""
-    whole = chunked.read_bytes()
-    wrong = whole.replace(b"string format\nuint8[] data", b"string format\nuint8[] dota")
-    assert wrong != whole
+    content = chunked.read_bytes()
+    wrong = content.replace(b"string format\nuint8[] data", b"string format\nuint8[] dota")
+    assert wrong != content
     chunked.write_bytes(mended(wrong))
-    assert kept(chunked) == list(range(FRAMES))
+    assert kept_images(chunked) == list(range(FRAMES))
     with open_log(chunked) as log:
-        told, *_ = log.losses
-    assert "described here in another way than before" in told
+        loss, *_ = log.losses
+    assert "described here in another way than before" in loss
 
 
 def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchunked: Path) -> None:
@@ -182,7 +182,7 @@ def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchun
     at = records(data, Opcode.MESSAGE)[6]
     short = b"\x05" + (10).to_bytes(8, "little") + data[at + 9 : at + 19]
     unchunked.write_bytes(data[:at] + short + data[at:])
-    assert kept(unchunked) == [*range(FRAMES)]
+    assert kept_images(unchunked) == [*range(FRAMES)]
     with open_log(unchunked) as log:
         assert "of a length that cannot be" in log.losses[0]
 
@@ -190,18 +190,18 @@ def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchun
 @pytest.mark.parametrize("opcode", [0, 4, 5, 9, 0x0F, 0x87])
 def test_a_message_index_under_another_kind_costs_nothing(chunked: Path, opcode: int) -> None:
     at = records(chunked.read_bytes(), Opcode.MESSAGE_INDEX)[3]
-    assert kept(changed(chunked, at, bytes([opcode]))) == [*range(FRAMES)]
+    assert kept_images(changed(chunked, at, bytes([opcode]))) == [*range(FRAMES)]
 
 
 def test_a_chunk_that_calls_itself_an_attachment_is_read_without_any_summary(chunked: Path) -> None:
     data = chunked.read_bytes()
     chunked.write_bytes(data[: data_end(data)])
     at = records(data, Opcode.CHUNK)[1]
-    assert kept(changed(chunked, at, b"\x09")) == [*range(FRAMES)]
+    assert kept_images(changed(chunked, at, b"\x09")) == [*range(FRAMES)]
 
 
 CHUNK_LENGTH_AT = HEAD + 8 + 8 + 8
-"""Where a chunk index has the length of its chunk."""
+"""The offset of the chunk's length in a chunk index."""
 
 
 def without(number: int, data: bytes) -> bytes:
@@ -258,9 +258,9 @@ def of_wrong_records() -> tuple[bytes, str]:
     "damage", [left_out, repeated, without_an_end, without_a_summary, of_wrong_records]
 )
 def test_a_chunk_that_is_missing_repeated_or_wrong_is_told(tmp_path, damage):
-    data, told = damage()
+    data, reason = damage()
     path = tmp_path / "drive.mcap"
     path.write_bytes(data)
     with open_log(path) as log:
         log.verify()
-        assert told in " | ".join(log.losses)
+        assert reason in " | ".join(log.losses)
