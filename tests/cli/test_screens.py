@@ -1,4 +1,4 @@
-"""What a replay came to, on a screen."""
+"""What a replay came to, on a screen; progress at a terminal and elsewhere."""
 
 import io
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What can be seen to be wrong without opening a file is wrong usage: exit code 2."""
+"""What is wrong usage without opening a file: exit code 2; help and version at once."""
 
 import os
 import subprocess

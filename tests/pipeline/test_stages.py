@@ -1,4 +1,4 @@
-"""Stages of somebody else: found by their names, and guarded."""
+"""Stages of somebody else: found by their names, and guarded in what they hand out."""
 
 import numpy as np
 import pytest
