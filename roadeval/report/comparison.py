@@ -120,7 +120,7 @@ def overview(
         ("Not judged", None, "warning"),
         ("Limits kept", False, "plain"),
     ):
-        if lines := [told.judged(each) for each in judgements if each.holds is kind]:
+        if lines := [told.describe_judgement(each) for each in judgements if each.holds is kind]:
             yield BulletList(title, lines, tone)
     yield Text(told.verdict(comparison), "verdict")
     yield from (Text(line) for line in told.changed_settings(comparison, most))

@@ -12,7 +12,7 @@ from roadeval.evaluation.tables import final_stages
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
-from roadeval.results.sentences import marked_interval, overconfident
+from roadeval.results.sentences import describe_overconfidence, marked_interval
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != TESTED)
 """The rates whose differences stand beside that of ERR."""
@@ -169,7 +169,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
         text_columns=(0, 1),
         caption="Percent, and the threshold from 0 to 1. Of road's probability: average precision "
         "over all thresholds, the best F1 with its threshold, the expected calibration error, and "
-        "F1 of the mask as it is. " + " ".join(overconfident(curves)),
+        "F1 of the mask as it is. " + " ".join(describe_overconfidence(curves)),
         small=True,
     )
 

@@ -157,7 +157,7 @@ def test_the_cameras_of_a_log_are_drives_of_a_fleet_that_count_as_one(
         if (e.base, e.variant) == ("unfiltered", "filtered")
     ]
     assert (effect.units, effect.groups, effect.low) == (2, 1, None)
-    assert any("cameras of one log count as one drive" in each for each in fleet.facts.warnings)
+    assert any("averaged to one drive" in warning for warning in fleet.facts.warnings)
 
 
 def test_a_camera_without_labels_is_recorded_and_says_why(rig: Path, tmp_path: Path):

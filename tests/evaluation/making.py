@@ -108,7 +108,7 @@ def a_drive(errors: Wrong, drive: str = "street", digest: str | None = "d1", **m
     """A drive of a result that is compared, with ``tables`` beside ``frames``."""
     key = {"drive": drive, "camera": more.pop("camera", CAMERA)}
     tables = {"frames": a_table(errors, **key), **more.pop("tables", {})}
-    about = {"name": drive, "asked": {}, "frames": tables["frames"]["frame"].nunique()}
+    about = {"name": drive, "settings": {}, "frames": tables["frames"]["frame"].nunique()}
     return ComparedDrive(**key, digest=digest, **about | more), tables
 
 

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roadeval.data import IGNORE, Change, Packed, TruthBits
-from roadeval.evaluation.score import thresholds
-from roadeval.evaluation.score.counts import episodes, error_map
+from roadeval.evaluation.score import counts
+from roadeval.evaluation.score.counts import error_map
+from roadeval.evaluation.score.scoreboard import episodes
 from roadeval.evaluation.score.thresholds import HeatMap
 from tests.evaluation.making import pixels
 
@@ -20,7 +21,7 @@ def changes(masks, truth):
     """Count the changes between masks that are not packed yet."""
     packed = TruthBits.of(truth)
     bits = packed.bits_of(Packed.of(mask) for _, _, mask in masks)
-    return thresholds.changes([(variant, stage) for variant, stage, _ in masks], bits, packed)
+    return counts.changes([(variant, stage) for variant, stage, _ in masks], bits, packed)
 
 
 def heat_of(*masks, truth=TRUTH):

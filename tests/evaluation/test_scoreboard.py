@@ -11,7 +11,13 @@ from roadeval.data import Counts, Health, Output, Packed, Role, StageResult, Var
 from roadeval.evaluation import metrics, tables
 from roadeval.evaluation.score.frame import BlindPrior, judge
 from roadeval.evaluation.score.scoreboard import Scoreboard, drive_effects, evidence
-from roadeval.evaluation.score.unlabelled import Unlabelled, chosen, doubts_of, entropy, sign_of
+from roadeval.evaluation.score.unlabelled import (
+    Unlabelled,
+    choose_frames,
+    doubts_of,
+    entropy,
+    sign_of,
+)
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import joined
 from tests.evaluation.making import a_frame, a_table, a_variant, pixels, table_of
@@ -231,7 +237,7 @@ def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
 
 def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():
     stamps = np.arange(900) * 10**9 // 30
-    random, ranked = chosen(stamps, np.linspace(1, 2, 900), 60, seed=0)
+    random, ranked = choose_frames(stamps, np.linspace(1, 2, 900), 60, seed=0)
     assert len(random) == len(ranked) == 30
     places = np.sort(np.concatenate([random, ranked]))
     beside = np.minimum(np.diff(places, prepend=-900), np.diff(places, append=1800))

@@ -256,12 +256,12 @@ def test_every_drive_has_every_replay_with_every_seed():
 def demo():
     """Numbers of two frames and their pixels; some trees are enough to be counted."""
     few = {"frames": {"max_frames": 5}, "training": {"frames": 3}}
-    return overlap.replayed(**few, trees={"trees": 15})
+    return overlap.replay_demo(**few, trees={"trees": 15})
 
 
 def test_libraries_of_others_compute_the_overlap_numbers_that_are_printed(demo):
-    """`compared` refuses two values that are not equal."""
-    found = overlap.compared(*demo)
+    """`compare_libraries` refuses two values that are not equal."""
+    found = overlap.compare_libraries(*demo)
     assert found["evaluated"] == 2
     assert {*found["values"]} == {*load()["overlap"]["values"]}
 
@@ -270,7 +270,7 @@ def test_a_library_that_computes_another_number_is_told(demo, monkeypatch):
     wrong = overlap.NUMBERS[0]._replace(again=lambda _: 0.5)
     monkeypatch.setattr(overlap, "NUMBERS", (wrong,))
     with pytest.raises(overlap.DifferentNumberError, match=r"0\.5 by a library"):
-        overlap.compared(*demo)
+        overlap.compare_libraries(*demo)
 
 
 ROWS = re.findall(r"^\| ([\d-]+) \|.*\| (.*`.*) \|$", paper.__doc__, re.MULTILINE)
@@ -279,10 +279,10 @@ CASES = [(numbers, name) for numbers, names in ROWS for name in re.findall(r"`(\
 
 def equations(text):
     """The numbers of all equations that a text names."""
-    found = set()
+    numbers = set()
     for first, last in re.findall(r"Eq\. (\d+)(?:-(\d+))?", text):
-        found |= set(range(int(first), int(last or first) + 1))
-    return found
+        numbers |= set(range(int(first), int(last or first) + 1))
+    return numbers
 
 
 def test_the_table_has_all_equations_of_the_pipeline():

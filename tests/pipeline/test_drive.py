@@ -28,14 +28,14 @@ OTHER, ROAD, IGNORED = 0, 1, 2
 
 def messages(path, factory):
     """Return the decoded messages in use, by topic and frame number."""
-    found, numbers = {}, {}
+    by_topic, numbers = {}, {}
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[factory])
         for _, channel, _, message in reader.iter_decoded_messages():
             number = numbers[channel.topic] = numbers.get(channel.topic, -1) + 1
             if number in TRAINING + CHECKED:
-                found.setdefault(channel.topic, {})[number] = message
-    return found
+                by_topic.setdefault(channel.topic, {})[number] = message
+    return by_topic
 
 
 def decoded(message, flags):
@@ -48,22 +48,22 @@ def rgb(message):
 
 def demo():
     """The synthetic drive that ships, whose masks hold 0 and 255."""
-    found = messages(DEMO, Protobuf())
-    masks = found["/truth/road"]
+    by_topic = messages(DEMO, Protobuf())
+    masks = by_topic["/truth/road"]
     truths = {n: np.where(decoded(m, cv2.IMREAD_GRAYSCALE), ROAD, OTHER) for n, m in masks.items()}
-    return {n: rgb(m) for n, m in found["/camera/image"].items()}, truths
+    return {n: rgb(m) for n, m in by_topic["/camera/image"].items()}, truths
 
 
 def street():
     """A real drive whose truth is class ids."""
     (path,) = shared("drives", "camvid_0016E5_15hz.mcap")
-    found = messages(path, Ros2())
+    by_topic = messages(path, Ros2())
     truths = {}
-    for number, message in found["/labels/semantic"].items():
+    for number, message in by_topic["/labels/semantic"].items():
         rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
         classes = rows[:, : message.width]
         truths[number] = np.select([classes == 3, classes == 11], [ROAD, IGNORED], OTHER)
-    return {n: rgb(m) for n, m in found["/camera/image_raw/compressed"].items()}, truths
+    return {n: rgb(m) for n, m in by_topic["/camera/image_raw/compressed"].items()}, truths
 
 
 @pytest.fixture(scope="module", params=[demo, street] if shared() else [demo])
@@ -72,15 +72,15 @@ def drive(request):
     return request.param()
 
 
-def sample(images, truths, each=40):
-    """As many road as other pixels of each frame."""
+def sample(images, truths, count=40):
+    """As many road as other pixels of count frame."""
     rng = np.random.default_rng(0)
     parts = []
     for frame, truth in enumerate(truths):
         for road in (True, False):
             where = np.argwhere(truth == (ROAD if road else OTHER))
-            rows, columns = where[rng.choice(len(where), each, replace=False)].T
-            parts.append((np.full(each, frame), rows, columns, np.full(each, road)))
+            rows, columns = where[rng.choice(len(where), count, replace=False)].T
+            parts.append((np.full(count, frame), rows, columns, np.full(count, road)))
     return TrainingSet(tuple(images), *map(np.concatenate, zip(*parts, strict=True)))
 
 
@@ -149,8 +149,8 @@ def components_and_seconds(shape, runs):
             shadow = result.output.regions["shadow"]
             process(View.of(image).after(Output(mask=shadow)))
             seconds.append(thread_time() - start)
-    found = connected_components(shadow, 8)
-    return found.count, min(seconds)
+    components = connected_components(shadow, 8)
+    return components.count, min(seconds)
 
 
 @pytest.fixture(scope="module")

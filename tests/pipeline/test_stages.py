@@ -1,4 +1,4 @@
-"""Stages of somebody else: found by their names, and guarded in what they hand out."""
+"""Stages from outside the package: imported by their names, and guarded in what they hand out."""
 
 import numpy as np
 import pytest
@@ -35,9 +35,9 @@ def test_a_functions_settings_are_those_of_its_default():
 
 
 def test_floats_are_probabilities():
-    found = output_of("gradual")
-    assert found.probability[:, 0].tolist() == [round(65535 * row / 7) for row in range(8)]
-    assert np.array_equal(found.mask.pixels(), found.probability > 32768)
+    output = output_of("gradual")
+    assert output.probability[:, 0].tolist() == [round(65535 * row / 7) for row in range(8)]
+    assert np.array_equal(output.mask.pixels(), output.probability > 32768)
 
 
 def test_a_function_can_ask_for_the_moment():
@@ -53,16 +53,16 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "message"),
     [("wrong_size", r"its mask is \(2, 2\)"), ("LAYERS", "a layer 'level' that it does not")],
 )
-def test_an_output_that_cannot_be_is_an_error(name, said):
-    with pytest.raises(StageError, match=said):
+def test_an_output_that_cannot_be_is_an_error(name, message):
+    with pytest.raises(StageError, match=message):
         output_of(name)
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "message"),
     [
         (somebodys("nothing"), "has no attribute 'nothing'"),
         (somebodys("wrong_argument"), "its argument frame is none of image, moment, settings"),
@@ -75,10 +75,10 @@ def test_an_output_that_cannot_be_is_an_error(name, said):
         (":", "there is no stage ':'; choose"),
     ],
 )
-def test_what_is_no_stage_is_named_with_the_reason(name, said):
-    with pytest.raises(UnknownStageError, match=said):
+def test_what_is_no_stage_is_named_with_the_reason(name, message):
+    with pytest.raises(UnknownStageError, match=message):
         stages_of([name])
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=message):
         configure({"chain": [name, "post"]})
 
 
@@ -147,6 +147,6 @@ def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
 
 
 def test_a_layer_of_another_size_is_named():
-    found = r"its layer 'mask' is uint8 \(3, 6\): it must be bool or integer \(4, 6\)"
-    with pytest.raises(StageError, match=found):
+    message = r"its layer 'mask' is uint8 \(3, 6\): it must be bool or integer \(4, 6\)"
+    with pytest.raises(StageError, match=message):
         run(SPEC, BLACK[:3, :, 0])

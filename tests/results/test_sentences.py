@@ -8,18 +8,16 @@ import pytest
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison.conditions import Condition
-from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.stats.difference import Difference
 from roadeval.results import comparison
 from roadeval.results.comparison import (
     changed_settings,
+    describe_judgement,
     headline,
-    judged,
 )
 from roadeval.results.sentences import (
     notes,
     sentence,
-    verdict,
 )
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
@@ -93,100 +91,6 @@ def test_rates_of_other_frames_than_the_difference_are_not_given():
 # --- The verdict ----------------------------------------------------------------------------------
 
 
-def against(base, **found):
-    return [
-        Effect(base, variant, "post", True, {"ERR": difference})
-        for variant, difference in found.items()
-    ]
-
-
-GAIN = replace(HARM, mean=-0.092, low=-0.11, high=-0.071)
-FEW = replace(UNSURE, low=None, high=None, p=None, units=3, needed=10)
-
-
-def total(error, frames=91):
-    return {"ERR": error, "frames": frames}
-
-
-def drive(**errors):
-    return {name: {"post": total(error)} for name, error in errors.items()}
-
-
-FILTER_CHAIN = {
-    "filtered": {"svm": total(0.18), "post": total(0.154)},
-    "unfiltered": {"svm": total(0.08), "post": total(0.062)},
-    "blind": {"post": total(0.07)},
-}
-CASES = {
-    "one variant": (
-        drive(unfiltered=0.02, blind=0.112),
-        against("blind", unfiltered=GAIN),
-        "unfiltered: 2.0 % of the pixels are wrong. That is 9.2 pp better than blind, which never "
-        "looks at the image; on frames like these by 7.1 to 11.0 pp.",
-    ),
-    "the filter costs most": (
-        FILTER_CHAIN,
-        against("unfiltered", filtered=HARM),
-        "Best here is unfiltered: 6.2 % of the pixels are wrong. No frame with truth was trained "
-        "on, so blind is unknown. On these 91 frames the filter raises ERR of post from 6.2 to "
-        "15.4 % (lower in 2 of 9 windows); on frames like these by 7.1 to 11.0 pp. Step by step: "
-        "svm without the filter leaves 8.0 % wrong, the filter adds 10.0 pp, post removes 2.6 pp; "
-        "the filter costs most.",
-    ),
-    "none beats blind": (
-        drive(net=0.162, wide=0.2, blind=0.07),
-        against("blind", net=HARM, wide=HARM),
-        "Nothing here beats blind, which never looks at the image: the nearest, net, gets 16.2 % "
-        "of the pixels wrong, 9.2 pp more; on frames like these by 7.1 to 11.0 pp.",
-    ),
-    "a reason said once": (
-        drive(filtered=0.067, unfiltered=0.1, blind=0.1),
-        [*against("unfiltered", filtered=FEW), *against("blind", filtered=FEW, unfiltered=HARM)],
-        "Best here is filtered: 6.7 % of the pixels are wrong. That is 3.3 pp better than blind, "
-        "which never looks at the image; 3 frames are too few for an interval (10 are needed). On "
-        "these 3 frames the filter lowers ERR of post from 10.0 to 6.7 %.",
-    ),
-    "a tie with the baseline": (
-        drive(net=0.054, blind=0.054),
-        against("blind", net=a_difference(0, 0, 0, p=1.0, units=91)),
-        "net: 5.4 % of the pixels are wrong, as many as with blind, which never looks at the "
-        "image.",
-    ),
-    "masks of some frames": (
-        drive(unfiltered=0.1) | {"half": {"post": total(0.01, frames=40)}},
-        [],
-        "Best here is unfiltered: 10.0 % of the pixels are wrong. No frame with truth was trained "
-        "on, so blind is unknown.",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_verdict_says_the_best_its_doubt_the_filter_and_what_costs_most(case):
-    totals, effects, told = CASES[case]
-    claims = {"filter_ERR": {"held": 2, "windows": 9}} if case == "the filter costs most" else {}
-    assert verdict(totals, effects, claims) == told
-
-
-@pytest.mark.parametrize(
-    ("plain", "filtered", "final", "costs"),
-    [
-        pytest.param(0.132, 0.245, 0.154, "the filter costs most", id="the filter harms most"),
-        pytest.param(0.132, 0.112, 0.145, "post costs most", id="post harms, the filter helps"),
-        pytest.param(0.132, 0.162, 0.172, "the filter costs most", id="both harm, the filter more"),
-        pytest.param(
-            0.15, 0.138, 0.028, "no later step adds errors, so svm costs most", id="both help"
-        ),
-    ],
-)
-def test_what_costs_most_is_the_step_that_adds_most(plain, filtered, final, costs):
-    totals = {
-        "filtered": {"svm": total(filtered), "post": total(final)},
-        "unfiltered": {"svm": total(plain), "post": total(plain)},
-    }
-    assert verdict(totals, []).endswith(f" pp; {costs}.")
-
-
 # --- Notes on a frame -----------------------------------------------------------------------------
 
 
@@ -258,5 +162,5 @@ def test_the_headline_says_whether_limits_were_kept(holds, said):
 )
 def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):
     judgement = Condition.parse(text).judge(a_change(WORSE))
-    assert judged(judgement) == f"post.filtered.ERR of new {told.format(text)}"
-    assert " over 8 drives" in judged(replace(judgement, drives=8))
+    assert describe_judgement(judgement) == f"post.filtered.ERR of new {told.format(text)}"
+    assert " over 8 drives" in describe_judgement(replace(judgement, drives=8))

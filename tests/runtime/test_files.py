@@ -96,14 +96,14 @@ def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
     files.check_output(tmp_path / "new", folder=True)
 
 
-def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
+def test_a_partial_name_is_found_again_and_no_two_are_the_same(tmp_path):
     for name in ("out.rrd", "drive", "a[1].b", ".hidden"):
         for hidden in (False, True):
-            given = {files.own_name(tmp_path / name, hidden=hidden) for _ in range(4)}
-            for each in given:
-                each.touch()
-            assert set(files.own_names(tmp_path / name, hidden=hidden)) == given
-            assert len(given) == 4
+            names = {files.partial_name(tmp_path / name, hidden=hidden) for _ in range(4)}
+            for partial in names:
+                partial.touch()
+            assert set(files.find_partial(tmp_path / name, hidden=hidden)) == names
+            assert len(names) == 4
 
 
 def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
@@ -153,11 +153,11 @@ def claim(folder, name="out"):
 def test_what_another_process_writes_is_refused_with_its_name_until_it_is_killed(other, tmp_path):
     with pytest.raises(BlockingIOError) as caught:
         claim(tmp_path)
-    found = re.fullmatch(
+    match = re.fullmatch(
         r"another run is writing it \(process (\d+) on \S+, since \d{4}-\d\d-\d\d \d\d:.*\)",
         caught.value.strerror,
     )
-    assert int(found[1]) == other.pid
+    assert int(match[1]) == other.pid
     assert claim(tmp_path, "another")
     other.send_signal(signal.SIGKILL)
     other.wait()
@@ -237,7 +237,7 @@ def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, mon
 
 
 def names_in(seal):
-    """What the seal lists, or else the names that are always of a content."""
+    """Return the names that the seal lists, or else those that always belong to a content."""
     try:
         return frozenset(json.loads(seal.read_text()))
     except OSError:
@@ -262,7 +262,7 @@ def write(path, **content):
 
 
 def read(path):
-    return {each.name: each.read_text() for each in path.iterdir() if each.name != "seal"}
+    return {file.name: file.read_text() for file in path.iterdir() if file.name != "seal"}
 
 
 @pytest.fixture
@@ -279,7 +279,7 @@ def test_the_earlier_content_is_replaced_and_what_is_of_others_stays(folder):
     mine = {"notes": "mine", "link": "mine"}
     assert read(folder) == {"table": "new", "only_new": "new", **mine}
     assert (folder / "link").is_symlink()
-    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+    assert [file.name for file in folder.parent.iterdir()] == ["folder"]
 
 
 def test_a_folder_of_others_is_never_moved_nor_replaced(folder):
@@ -294,7 +294,7 @@ def test_a_folder_of_others_is_never_moved_nor_replaced(folder):
     new.discard()
     assert (folder / "table").read_text() == "new"
     assert (folder / "sub" / "notes").read_text() == "mine"
-    assert {each.name for each in folder.parent.iterdir()} == {"folder"}
+    assert {file.name for file in folder.parent.iterdir()} == {"folder"}
 
 
 def test_a_folder_stays_where_it_is(folder):
@@ -302,14 +302,14 @@ def test_a_folder_stays_where_it_is(folder):
     write(folder, table="new")
     assert read(folder) == {"table": "new"}
     assert os.path.samestat(folder.stat(), before)
-    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+    assert [file.name for file in folder.parent.iterdir()] == ["folder"]
 
 
 def test_a_folder_that_was_made_for_nothing_goes_and_an_empty_one_stays(tmp_path):
     (tmp_path / "mine").mkdir()
     for name in ("mine", "new"):
         begun(tmp_path / name, {"table": "new"}).discard()
-    assert [each.name for each in tmp_path.iterdir()] == ["mine"]
+    assert [file.name for file in tmp_path.iterdir()] == ["mine"]
 
 
 def test_a_link_stays_and_the_folder_behind_it_is_replaced(folder):

@@ -102,9 +102,9 @@ def test_json_that_nests_too_deep_is_refused(deep):
 
 
 def test_what_is_written_is_read():
-    kept = {"a": "x" * LONGEST, "b": ["w" * 1_000] * 900, "c": [1.5, None, True], "d\n": {}}
-    assert read_json(json.dumps(kept)) == kept
-    assert read_json(json.dumps(kept).encode()) == kept
+    document = {"a": "x" * LONGEST, "b": ["w" * 1_000] * 900, "c": [1.5, None, True], "d\n": {}}
+    assert read_json(json.dumps(document)) == document
+    assert read_json(json.dumps(document).encode()) == document
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from roadeval.runtime.threads import AHEAD, ended, ordered
+from roadeval.runtime.threads import AHEAD, ordered, time_limit
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
@@ -58,7 +58,7 @@ def test_work_without_end_is_ended_where_the_map_is_stopped_early():
 
     def work(item: int) -> int:
         if item:
-            with ended(endless.set, 600):
+            with time_limit(endless.set, 600):
                 endless.wait()
         return item
 

@@ -30,9 +30,10 @@ from tests.training.making import frame, pipelines
 PIPELINES = {
     # A plane is fitted and tabulated in half the time, and no test asks what was learnt.
     name: replace(
-        each, settings={**each.settings, "svm": replace(each.settings["svm"], kernel="linear")}
+        pipeline,
+        settings={**pipeline.settings, "svm": replace(pipeline.settings["svm"], kernel="linear")},
     )
-    for name, each in pipelines().items()
+    for name, pipeline in pipelines().items()
 }
 
 
@@ -67,9 +68,9 @@ def roles(frames, schedule: Schedule) -> str:
 
 
 def learn(logged, *, labelled: bool = True, **settings):
-    wanted = TrainingSettings(**settings)
+    chosen = TrainingSettings(**settings)
     return from_log(
-        lambda only=None, **_: logged, PIPELINES, wanted, lambda done: None, labelled=labelled
+        lambda only=None, **_: logged, PIPELINES, chosen, lambda done: None, labelled=labelled
     )
 
 
@@ -153,7 +154,7 @@ BARE = [frame(n, labelled=False) for n in range(2, 4)]
 
 
 def of_drives(source: str, **frames):
-    drives = {Path(name): own for name, own in frames.items()}
+    drives = {Path(name): drive for name, drive in frames.items()}
     return from_drives(drives, PIPELINES, TrainingSettings(source=source))
 
 
@@ -181,11 +182,11 @@ def test_a_drive_without_truth_among_others_is_named(source, frames):
 
 def adapt(logged, path, pipelines, **settings):
     base, _ = from_file(path, pipelines)
-    wanted = TrainingSettings(model=str(path), adapt=True, **settings)
+    chosen = TrainingSettings(model=str(path), adapt=True, **settings)
     model, schedule = from_log(
         lambda only=None, **_: logged,
         pipelines,
-        wanted,
+        chosen,
         lambda done: None,
         labelled=True,
         base=base,
@@ -206,14 +207,14 @@ def robust(tmp_path):
 def test_an_adapted_model_has_learnt_from_both_and_says_so(robust):
     pipelines, path = robust
     base, model, schedule = adapt(log(8), path, pipelines, frames=2, gap=1)
-    own, taught = model.parameters["unfiltered"]["trees"], base.parameters["unfiltered"]["trees"]
-    assert own.base is taught
+    adapted = model.parameters["unfiltered"]["trees"]
+    assert adapted.base is base.parameters["unfiltered"]["trees"]
     assert base.digests < model.digests
     assert len(model.digests) == 4
     assert roles(log(8), schedule) == "ttgeeeee"
-    (told,) = [each for each in model.warnings if "adapted to this drive" in each]
-    assert "2 of its own labelled frames" in told
-    assert str(path) in told
+    (warning,) = [text for text in model.warnings if "adapted to this drive" in text]
+    assert "2 of its own labelled frames" in warning
+    assert str(path) in warning
 
 
 def test_frames_that_the_model_learnt_from_are_not_evaluated_after_adapting_either(robust):
@@ -229,7 +230,7 @@ def test_without_truth_the_patch_adapts_only_where_that_is_insisted_on(robust):
         adapt(logged, path, pipelines, frames=2)
     _, model, _ = adapt(logged, path, pipelines, frames=2, source="patch")
     assert model.source == "patch"
-    assert any("by the reference patch" in each for each in model.warnings)
+    assert any("by the reference patch" in text for text in model.warnings)
 
 
 def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
@@ -249,7 +250,9 @@ def test_a_fitted_variant_finds_the_road_in_a_new_frame():
     model = fit(FRAMES, {"unfiltered": pipeline}, TrainingSettings())
     chain = pipeline.bind(model.parameters["unfiltered"])
     fresh = frame(9)
-    masks = {each.stage: each.output.mask.pixels() for each in chain.run(View.of(fresh.image))}
+    masks = {
+        result.stage: result.output.mask.pixels() for result in chain.run(View.of(fresh.image))
+    }
     for name in ("similarity", "svm", "post"):
         wrong = (masks[name] != fresh.truth).mean()
         assert wrong < 0.06, name
@@ -339,12 +342,12 @@ def test_the_pavement_is_road_where_the_kerb_is_lowered():
 
 
 def test_the_further_one_may_reach_the_more_is_road():
-    found = [
+    shares = [
         (patch_truth(street(), TrainingSettings(far=far))[100:, 232:] == ROAD).mean()
         for far in (1.0, 20.0)
     ]
-    assert found[0] < 0.01
-    assert found[1] > 0.99
+    assert shares[0] < 0.01
+    assert shares[1] > 0.99
 
 
 @pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])

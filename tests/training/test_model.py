@@ -161,8 +161,8 @@ def filled(value):
     """Damage one number of an array."""
 
     def damage(array):
-        whole = array.dtype.kind in "iu"  # no whole number is any of these
-        spoilt = array.astype(np.float64) if whole else array.copy()
+        is_integer = array.dtype.kind in "iu"  # no integer is any of these
+        spoilt = array.astype(np.float64) if is_integer else array.copy()
         with np.errstate(over="ignore"):  # half precision makes infinity of a huge number
             spoilt[(0,) * array.ndim] = value
         return spoilt
@@ -186,7 +186,7 @@ DAMAGES = {
 HARMLESS = {("huge", "threshold"), ("missing", "prior"), ("a column less", "prior")}
 """A threshold may be of any size, and a prior too, or there is none."""
 NEIGHBOURS = {"lowest": "scale"}
-"""What is named in place of an array: its length says how long this one must be."""
+"""The array that an error names in place of another: its length decides that of the other."""
 
 
 @pytest.fixture(scope="module")
@@ -223,8 +223,8 @@ def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
             continue
         spoilt = DAMAGES[damage](array)
         rest = {other: arrays[other] for other in arrays if other != name}
-        told = refusal(rest if spoilt is None else {**rest, name: spoilt}, tmp_path)
-        assert field in told or NEIGHBOURS.get(field, field) in told
+        message = refusal(rest if spoilt is None else {**rest, name: spoilt}, tmp_path)
+        assert field in message or NEIGHBOURS.get(field, field) in message
 
 
 @pytest.mark.parametrize(

@@ -20,10 +20,10 @@ from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.pdf.typeset import pdf, write_file
-from roadeval.results.comparison import as_dict, judged, junit_xml
+from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
-from roadeval.runtime.files import Paths, listed
+from roadeval.runtime.files import Paths, list_paths
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -53,12 +53,16 @@ class Compared:
     @property
     def held(self) -> list[str]:
         """The sentences of the conditions that hold."""
-        return [judged(judgement) for judgement in self.judgements if judgement.holds]
+        return [describe_judgement(judgement) for judgement in self.judgements if judgement.holds]
 
     @property
     def unjudged(self) -> list[str]:
         """Why conditions could not be judged."""
-        return [judged(judgement) for judgement in self.judgements if judgement.holds is None]
+        return [
+            describe_judgement(judgement)
+            for judgement in self.judgements
+            if judgement.holds is None
+        ]
 
 
 def compare(
@@ -81,7 +85,7 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [Path(path) for path in listed(results)]
+    paths = [Path(path) for path in list_paths(results)]
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from roadeval.config.run import RunConfig, run_toml
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.score.unlabelled import chosen, sign_of
+from roadeval.evaluation.score.unlabelled import choose_frames, sign_of
 from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
@@ -191,7 +191,7 @@ def _pick_frames(drive: DriveResult, request: _Request) -> Outcome:
         scores = np.array([now.get(float(stamp), np.nan) for stamp in picks_before.stamps])
     taken = [picks_before.places[stamp] for stamp in picks_before.by_stamp]
     stamps = np.array(picks_before.stamps, np.int64)
-    places = chosen(
+    places = choose_frames(
         stamps, scores, request.count, picks_before.seed, drawn=picks_before.drawn, taken=taken
     )
     random, ranked = (numbers.tolist() for numbers in places)

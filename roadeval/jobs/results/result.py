@@ -39,7 +39,7 @@ from roadeval.results.rows import (
     scores,
     table_of,
 )
-from roadeval.results.sentences import verdict
+from roadeval.results.verdict import verdict
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -434,7 +434,7 @@ def _compared_drives(fleet: FleetFolder) -> Iterator[ComparedDrive]:
             name=fleet.names[row["drive"]],
             digest=row["log_digest"] or None,
             frames=row["evaluated"] or 0,
-            asked=settings,
+            settings=settings,
             group=row["group"],
         )
 

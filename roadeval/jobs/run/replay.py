@@ -130,7 +130,7 @@ def _replay_log(
         if config.output.figures:
             from roadeval.report.figures import write_figures
 
-            with results.explained():
+            with results.explain_errors():
                 names = short_names([*cameras])
                 for camera, end in zip(cameras, ended, strict=True):
                     windows, shown = end.sums.windows, drawn[camera]

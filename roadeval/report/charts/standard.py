@@ -16,7 +16,7 @@ from roadeval.evaluation.metrics import METRICS, SHORT, TESTED
 from roadeval.evaluation.score.thresholds import LEVELS, Thresholds
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import MASK, finals, grouped, merged, only, values_of
+from roadeval.evaluation.tables import MASK, finals, group_rows, merge_names, only, values_of
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import (
     BETTER,
@@ -30,7 +30,7 @@ from roadeval.report.chart import (
     looks,
     thinned,
 )
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
             lambda rows: over_windows(rows, ["FPR", "FNR"]),
         ),
         OverDrive("Further rates over the drive.", _further_rates),
-        *found_in(charts, "FIGURE"),
+        *collect(charts, "FIGURE"),
     )
 
 
@@ -105,7 +105,7 @@ def over_frames(
 
 def stages(totals: Totals) -> list[Chart]:
     """Return a chart a rate: each stage's mask, a line a variant."""
-    names = merged(own for variant, own in totals.items() if variant != BASELINE)
+    names = merge_names(own for variant, own in totals.items() if variant != BASELINE)
 
     def line(variant: str, look: Look, rate: str) -> Series:
         own = {stage: in_percent(total.get(rate)) for stage, total in totals[variant].items()}
@@ -298,7 +298,7 @@ def reliability(levels: pd.DataFrame, totals: Totals) -> Chart:
     """
     drawn = looks([*totals])
     lines = [series("as it says", Look(FAINT, "dotted"), [0, 100], [0, 100])]
-    for (name, _), rows in grouped(levels, MASK):
+    for (name, _), rows in group_rows(levels, MASK):
         pixels = rows["other"] + rows["road"]
         stated = rows["level"] / (LEVELS - 1) * pixels
         sums = rows.assign(pixels=pixels, stated=stated).groupby(rows["level"] * BINS // LEVELS)
@@ -316,7 +316,7 @@ def precision_over_recall(levels: pd.DataFrame, totals: Totals) -> Chart:
     the masks lie.
     """
     drawn, curves = looks([*totals]), []
-    for (name, _), rows in grouped(levels, MASK):
+    for (name, _), rows in group_rows(levels, MASK):
         curve = Thresholds.of(rows[["other", "road"]].to_numpy().T)
         if curve.road:
             curves.append(series(name, drawn[name], 100 * curve.recall, 100 * curve.precision))

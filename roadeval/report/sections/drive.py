@@ -15,7 +15,7 @@ from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.score.scoreboard import Effect
-from roadeval.evaluation.tables import merged, only, perfect_stages
+from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import figures_over_drive
@@ -232,7 +232,7 @@ def stages(findings: Findings) -> Iterator[Block]:
 
 def _parts_table(findings: Findings) -> Table:
     """Tabulate the mean ERR of each final mask as a sum over its stages."""
-    columns = merged(findings.error_parts.values())
+    columns = merge_names(findings.error_parts.values())
     return Table(
         ["final mask", *columns, TESTED],
         [

@@ -14,7 +14,6 @@ from statsmodels.stats.multitest import multipletests
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import cosine_variances, mean_distribution
 from roadeval.evaluation.stats.difference import (
-    CameraRates,
     Difference,
     benjamini_hochberg,
     holm,
@@ -34,9 +33,10 @@ INDEPENDENT = np.random.default_rng(3).normal(0.01, 0.02, 200)
 # --- Within a drive
 
 
-def within(rates, base, settings=SETTINGS, **options) -> Difference:
+def within(rates, base, settings=SETTINGS, rate="ERR") -> Difference:
     """The difference of a drive of one camera."""
-    return within_drive([CameraRates(np.arange(len(rates)), rates, base)], settings, **options)
+    columns = {rate: rates, f"{rate}_base": base, "stamp_ns": np.arange(len(rates))}
+    return within_drive(pd.DataFrame({**columns, "camera": "front"}), rate, settings)
 
 
 def from_30_percent(differences: np.ndarray, settings=SETTINGS) -> Difference:
@@ -49,7 +49,7 @@ def test_frames_are_counted_as_worse_and_better_by_the_rate_s_direction():
     rates = base + np.array([0.1] * 7 + [-0.1] * 3 + [0.0, math.nan])
     lower = within(rates, base)
     assert (lower.worse, lower.better, lower.equal, lower.units) == (7, 3, 1, 11)
-    higher = within(rates, base, higher_is_better=True)
+    higher = within(rates, base, rate="ACC")
     assert (higher.worse, higher.better, higher.equal) == (3, 7, 1)
 
 
@@ -161,7 +161,7 @@ def test_drives_are_counted_by_the_direction_in_which_they_changed():
     means = drives([0.1, 0.2, 0.3, -0.1, 0.0, 0.0])
     lower = over_drives(means, 0.95)
     assert (lower.worse, lower.better, lower.equal) == (3, 1, 2)
-    higher = over_drives(means, 0.95, higher_is_better=True)
+    higher = over_drives(means, 0.95, "ACC")
     assert (higher.worse, higher.better, higher.equal) == (1, 3, 2)
 
 

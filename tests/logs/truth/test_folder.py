@@ -14,7 +14,7 @@ from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth.beside import labels_in, npy_picture
 from roadeval.logs.truth.labels import Confidence, log_and_topic
-from roadeval.logs.truth.names import NamedLabels, with_keys
+from roadeval.logs.truth.names import NamedLabels, find_keys
 from roadeval.logs.truth.picks import Picked, Picks, Why
 from tests.logs.making import png
 
@@ -29,7 +29,7 @@ def folder(tmp_path, *names):
 
 def opened(path: Path, size=None, **settings) -> NamedLabels:
     settings = {"first": None if "images" in settings else 0, **settings}
-    return with_keys(
+    return find_keys(
         labels_in(path, size), str(path), MaskSettings(str(path), **settings), Limits()
     )
 

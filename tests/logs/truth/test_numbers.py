@@ -18,7 +18,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.settings import LabelPlace, LogConfig, MaskSettings
 from roadeval.logs.topics.choose import check_names
 from roadeval.logs.topics.reader import TopicInfo
-from roadeval.logs.truth.names import LabelSet, NamedLabel, with_keys
+from roadeval.logs.truth.names import LabelSet, NamedLabel, find_keys
 from tests.fixtures import broken
 from tests.fixtures.broken import (
     FRAMES,
@@ -38,7 +38,7 @@ from tests.logs.making import png
 def frames_of(labelled, frames, **settings):
     """Return the frame of each label, by its name."""
     labels = [NamedLabel(Path(name), bytes, None) for name in labelled]
-    found = with_keys(LabelSet(labels), "labels", LabelPlace(**settings), Limits(), frames)
+    found = find_keys(LabelSet(labels), "labels", LabelPlace(**settings), Limits(), frames)
     paths = (str(label.path) for label in found.labels)
     return dict(zip(paths, found.log_times.tolist(), strict=True))
 

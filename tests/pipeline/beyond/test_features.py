@@ -45,8 +45,8 @@ def planes(group, scene):
     return [*GROUPS[group](scene).values()]
 
 
-def close(found, expected, tolerance=1e-4):
-    np.testing.assert_allclose(found, expected, rtol=tolerance, atol=tolerance)
+def close(values, expected, tolerance=1e-4):
+    np.testing.assert_allclose(values, expected, rtol=tolerance, atol=tolerance)
 
 
 def slopes(plane):
@@ -71,10 +71,10 @@ def test_the_working_image_is_the_mean_of_four_pixels_of_the_fine_one(scene):
 
 def test_tones_are_logarithms_and_their_differences(scene):
     red, green, blue = np.moveaxis(np.log(scene.image + 8.0), 2, 0)
-    for found, expected in zip(
+    for values, expected in zip(
         scene.tones, ((red + green + blue) / 3, red - green, blue - green), strict=True
     ):
-        close(found, expected)
+        close(values, expected)
 
 
 def test_distance_to_the_patch_is_in_its_own_deviations_from_its_medians():
@@ -92,11 +92,11 @@ def test_distance_to_the_patch_is_in_its_own_deviations_from_its_medians():
 
 def test_every_group_gives_the_features_that_it_names(scene):
     for name, group in GROUPS.items():
-        assert names_of((name,)) == tuple(f"{name}.{each}" for each in group(scene))
-    found = features(scene, ALL)
-    assert found.shape == (len(names_of(ALL)), HEIGHT, WIDTH)
-    assert np.isfinite(found).all()
-    assert len(set(names_of(ALL))) == len(found)
+        assert names_of((name,)) == tuple(f"{name}.{feature}" for feature in group(scene))
+    values = features(scene, ALL)
+    assert values.shape == (len(names_of(ALL)), HEIGHT, WIDTH)
+    assert np.isfinite(values).all()
+    assert len(set(names_of(ALL))) == len(values)
 
 
 def test_an_image_of_one_colour_has_no_feature_that_is_not_finite():
@@ -109,19 +109,19 @@ def test_colour_is_projected_relative_to_the_patch(scene):
     *channels, _, red, blue = planes("colour", scene)[:6]
     np.testing.assert_array_equal(np.stack(channels, axis=2), scene.image)
     inside = scene.patch > 0
-    for angle, found in zip((30, 45, 60), planes("colour", scene)[6:9], strict=True):
+    for angle, values in zip((30, 45, 60), planes("colour", scene)[6:9], strict=True):
         way = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        own = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
-        close(found, way[0] * red + way[1] * blue - own)
+        light = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
+        close(values, way[0] * red + way[1] * blue - light)
 
 
 def test_light_is_held_against_the_lower_half_and_the_row(scene):
-    own = scene.tones[0].astype(float)
+    light = scene.tones[0].astype(float)
     half, bright, row, far = planes("light", scene)
-    lower = np.sort(own[HEIGHT // 2 :].ravel())
-    close(own - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
-    assert np.mean(own[HEIGHT // 2 :] < (own - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
-    close(row[5], own[5] - np.mean(own[5]))
+    lower = np.sort(light[HEIGHT // 2 :].ravel())
+    close(light - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
+    assert np.mean(light[HEIGHT // 2 :] < (light - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
+    close(row[5], light[5] - np.mean(light[5]))
     close(far[5], np.median(scene.colour[5]))
 
 
@@ -133,26 +133,26 @@ def test_place_is_the_pixels_centre(scene):
 
 
 def test_texture_is_the_root_of_the_mean_slope(scene):
-    found = planes("texture", scene)
+    values = planes("texture", scene)
     for place_, (side, way) in enumerate((side, way) for side in (3, 9, 21) for way in (0, 1)):
         mean = averaged(np.abs(slopes(scene.tones[0])[way]), side)
-        close(found[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
+        close(values[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
     deviation = ndimage.generic_filter(scene.tones[0].astype(float), np.std, 9)
-    close(found[6][INNER], deviation[INNER], 1e-3)
+    close(values[6][INNER], deviation[INNER], 1e-3)
 
 
 def test_surroundings_are_means_and_their_changes(scene):
-    found = planes("surroundings", scene)
+    values = planes("surroundings", scene)
     for place_, (side, tone) in enumerate((s, t) for s in (7, 19, 41) for t in scene.tones):
-        close(found[place_][INNER], averaged(tone, side)[INNER], 1e-3)
-    mean = found[0]
-    close(found[9][:, 14:], mean[:, 14:] - mean[:, :-14])  # 14 columns to the left
-    close(found[13][:-20], mean[:-20] - mean[20:])  # 20 rows down
-    close(found[9][:, :14], mean[:, :14] - mean[:, :1])  # beyond the border lies the border
+        close(values[place_][INNER], averaged(tone, side)[INNER], 1e-3)
+    mean = values[0]
+    close(values[9][:, 14:], mean[:, 14:] - mean[:, :-14])  # 14 columns to the left
+    close(values[13][:-20], mean[:-20] - mean[20:])  # 20 rows down
+    close(values[9][:, :14], mean[:, :14] - mean[:, :1])  # beyond the border lies the border
 
 
 def test_a_column_is_walked_from_below_and_from_above(scene):
-    found = planes("scans", scene)
+    values = planes("scans", scene)
     steep = np.sqrt(averaged(np.abs(slopes(scene.tones[0])[1]), 3, 5))
     bright, colours = averaged(scene.tones[0], 5), averaged(scene.colour, 3)
     hue, edge = averaged(scene.hue, 3), averaged(np.hypot(*slopes(scene.tones[0])), 3, 5)
@@ -167,26 +167,26 @@ def test_a_column_is_walked_from_below_and_from_above(scene):
                 hue[rows, x].max(),
                 edge[rows, x].sum(),
             ]
-            close([plane[y, x] for plane in found[first : first + 6]], expected, 1e-3)
+            close([plane[y, x] for plane in values[first : first + 6]], expected, 1e-3)
 
 
 @pytest.mark.parametrize("width", [1, 2, 7, 8])
 def test_a_row_is_walked_from_the_middle_outwards(width):
     plane = np.random.default_rng(width).random((3, width)).astype(np.float32)
-    found, half = outwards(plane), width // 2
+    values, half = outwards(plane), width // 2
     for y, x in np.ndindex(plane.shape):
         met = plane[y, half : x + 1] if x >= half else plane[y, x:half]
-        assert found[y, x] == met.max()
+        assert values[y, x] == met.max()
 
 
 def test_paths_are_the_integrals_of_their_costs_along_the_cheapest_path(scene):
     edge = np.hypot(*slopes(scene.tones[0]))
     hue, distance = np.minimum(scene.hue, 10), np.minimum(scene.colour, 15)
     costs = edge, edge / 2 + hue / 20, 0.03 * distance
-    for cost, found in zip(costs, planes("paths", scene), strict=True):
+    for cost, values in zip(costs, planes("paths", scene), strict=True):
         expected, _ = MCP_Geometric(0.005 + cost).find_costs(np.argwhere(scene.patch))
         # A step aslant is 1 % shorter than the root of 2, and a cost is rounded to 1e-4.
-        close(found, expected, 0.02)
+        close(values, expected, 0.02)
 
 
 def test_barriers_are_the_greatest_of_four_pixels(scene):
@@ -201,26 +201,26 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
         np.maximum(averaged(yellow, 3) - averaged(yellow, 15), 0),
         np.maximum(averaged(tones[0], 15) - averaged(tones[0], 3), 0),
     ]
-    found = planes("barriers", scene)
-    for mine, plane in zip(found, expected, strict=False):
+    values = planes("barriers", scene)
+    for mine, plane in zip(values, expected, strict=False):
         close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
-    for mine, plane in zip(found[10:15], found[:5], strict=True):
+    for mine, plane in zip(values[10:15], values[:5], strict=True):
         np.testing.assert_array_equal(mine, outwards(plane))
 
 
 def test_squared_barriers_are_costs_of_a_path(scene):
     edge, relative, *_, around, relative_around = planes("barriers", scene)
-    for cost, found in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
+    for cost, values in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
         expected, _ = MCP_Geometric(0.005 + np.minimum(cost, 6.5)).find_costs(
             np.argwhere(scene.patch)
         )
-        close(found, expected, 0.02)
+        close(values, expected, 0.02)
 
 
 def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
-    found = features(scene, ALL)
+    values = features(scene, ALL)
     names = names_of(ALL)
-    over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
+    over, around = (values[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
     close(reach(scene), (over / 1.0 + around / 1.5) / 2)
 
 

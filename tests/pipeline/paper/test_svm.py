@@ -54,7 +54,7 @@ def case(request):
 
 
 def road(stage, colours):
-    """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
+    """Return the mask of ``(n, 3)`` colours, as an image of one row."""
     return stage(View.of(colours[None])).mask.pixels()[0]
 
 
@@ -136,9 +136,9 @@ def test_a_machine_that_learnt_nothing_calls_nothing_road():
 
 def test_a_colour_is_decided_alike_whatever_is_decided_with_it(case):
     settings, machine, *_ = case
-    whole = svm.decision(COLOURS[:500], machine, settings)
+    together = svm.decision(COLOURS[:500], machine, settings)
     alone = [svm.decision(COLOURS[i : i + 1], machine, settings).item() for i in range(500)]
-    assert whole.tolist() == alone
+    assert together.tolist() == alone
 
 
 def test_the_machine_is_scikit_learns(case):
@@ -196,11 +196,11 @@ def every_colour(red):
 
 
 def test_every_colour_is_decided_as_by_the_definition():
-    asked = []
-    table = table_of((margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
+    counts = []
+    table = table_of((margin, 20.0), lambda c: counts.append(len(c)) or decide(c))
     for red in (0, 29, 30, 31, 90, 147, 150, 255):
         colours = every_colour(red)
         np.testing.assert_array_equal(
             KERNELS.look_up_colours(planes(colours), table)[0], decide(colours)
         )
-    assert 0 < sum(asked) < FEW
+    assert 0 < sum(counts) < FEW

@@ -245,7 +245,7 @@ def test_a_page_has_the_sections_of_the_report():
     frames = FrameBrowser([], [], [])
     paper, page = (headings(made) for made in (document(drive), page_document(drive, frames)))
     assert "Over thresholds" in page
-    assert {*paper} - {*page} == {"The worst frames"}
+    assert {*paper} - {*page} == {"The worst frames of filtered"}
 
 
 @pytest.mark.parametrize(("frames", "size", "rows"), [(50, 10, 5), (301, 20, 16)])
