@@ -1,4 +1,4 @@
-"""A drive's score, from its frames to its sums; a frame's health; the paper's claims."""
+"""A drive's score: sums, health, claims, differences, and doubts about frames without truth."""
 
 import math
 

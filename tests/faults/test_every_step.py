@@ -1,4 +1,4 @@
-"""A run that is killed, or whose disk is full, at any of its steps on the file system."""
+"""A run or a fleet that is killed, or whose disk is full, at any of its steps on files."""
 
 import os
 import shutil

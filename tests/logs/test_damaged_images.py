@@ -1,4 +1,4 @@
-"""Images that are damaged, too large or otherwise not to be trusted: left out, and told."""
+"""Images that are damaged, too large, turned, or of samples that a log leaves open."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""What the documents name is there: paths, anchors of the version, and the licence."""
+"""What documents name is there, what pages and tables say is what code and measurements say."""
 
 import re
 import runpy

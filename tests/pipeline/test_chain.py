@@ -1,4 +1,4 @@
-"""Stages in a row: what each sees, and that a chain is a pure function of the image."""
+"""Stages in a row: what each sees, and what is made of an image where one is the truth."""
 
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor

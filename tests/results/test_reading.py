@@ -1,4 +1,4 @@
-"""Tables read back: what each column is, whatever stands in it."""
+"""Tables read back, what each column is; and rows that are made of sums."""
 
 import hashlib
 import math

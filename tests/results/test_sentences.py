@@ -1,4 +1,4 @@
-"""What a difference tells: how sure it is, in words."""
+"""What a difference and a comparison tell: how sure it is, in words."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Files that appear under their name only when they are complete."""
+"""Files and folders that appear when they are complete, and claims on where they go."""
 
 import errno
 import fcntl

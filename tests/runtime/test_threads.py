@@ -1,4 +1,4 @@
-"""An ordered, bounded map over threads that stops at the first error."""
+"""An ordered, bounded map over threads that stops at the first error; memory that is kept."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Chunks that are intact are read, whatever is damaged beside them, and nothing unverified is."""
+"""Chunks that are intact are read, whatever is damaged beside them; what earlier ones misread."""
 
 import zlib
 from collections.abc import Callable

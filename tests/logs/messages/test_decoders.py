@@ -1,4 +1,4 @@
-"""Messages in every encoding, to the picture they carry."""
+"""Messages in every encoding: pictures and their pixels, calibrations and transforms."""
 
 import json
 import re

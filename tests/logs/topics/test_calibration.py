@@ -1,4 +1,4 @@
-"""The calibration of a camera and its mounting, in the messages of three kinds of writers."""
+"""The calibration of a camera and its mounting, in messages made here and of real writers."""
 
 import json
 import math

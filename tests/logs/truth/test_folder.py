@@ -1,4 +1,4 @@
-"""Which mask of a folder belongs to which frame, by its name."""
+"""Which mask of a folder belongs to which frame, by its name; and what `pick.json` may say."""
 
 import io
 from dataclasses import replace

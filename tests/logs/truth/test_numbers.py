@@ -1,4 +1,4 @@
-"""Which digits of the names number the frames, from which number on, and of which camera."""
+"""Which digits of the names number the frames, of which camera; and where images are lost."""
 
 import random
 import uuid

@@ -1,4 +1,4 @@
-"""Which label belongs to which image."""
+"""Which label belongs to which image, of the same clock and of another."""
 
 from collections.abc import Sequence
 

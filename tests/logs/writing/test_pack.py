@@ -1,4 +1,4 @@
-"""Folders of images and videos become logs."""
+"""Folders of images and videos become logs, and results are written back to MCAP."""
 
 import errno
 import json

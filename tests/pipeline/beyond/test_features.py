@@ -1,4 +1,4 @@
-"""Each group of features, held against SciPy, scikit-image or a plain loop."""
+"""Each group of features, held against SciPy, scikit-image or a plain loop; and exposure."""
 
 import cv2
 import numpy as np
