@@ -18,7 +18,7 @@ from roadeval.runtime.files import (
     AnyPath,
     claimed_file,
     claimed_folder,
-    own_names,
+    find_partial,
     remove,
     target_of,
 )
@@ -57,7 +57,7 @@ class Outputs:
         """Hold them all, as `holding` does; at the end partial recordings of earlier runs go."""
         with holding(self.recording, self.mcap, folder=self.reports, inputs=inputs) as certain:
             ours = certain and self.recording
-            there = own_names(target_of(ours), hidden=False) if ours else []
+            there = find_partial(target_of(ours), hidden=False) if ours else []
             yield
             for partial in there:
                 remove(partial)

@@ -31,7 +31,7 @@ LOGS: Final = np.log(np.arange(256) + 8.0).astype(np.float32)
 pixels."""
 
 THIN, WIDE = 3, 15
-"""Sides of the squares whose means differ where there is a thin line."""
+"""Sides of the squares with different means at a thin line."""
 SURROUNDINGS: Final = 31
 """Side of the square that an edge is compared with: on a smooth pavement a low kerb is steep."""
 FAINT: Final = 0.02

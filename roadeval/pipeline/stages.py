@@ -1,4 +1,4 @@
-"""Every stage that a chain may name: roadeval's own, those of other packages, and of modules.
+"""Every stage that a chain may name: roadeval's own, those of other packages and of modules.
 
 Code from outside runs only if a ``chain`` names it: as an entry point of the group
 ``roadeval.stages``, or as ``module:name``, which Python must be able to import.
@@ -24,16 +24,14 @@ from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
-from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.discovery import by_name, collect
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import visible
 
 GROUP: Final = "roadeval.stages"
 """The group of entry points by which a package adds stages."""
 
-STAGES: Final[Mapping[str, Stage]] = by_name(
-    (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
-)
+STAGES: Final[Mapping[str, Stage]] = by_name((*collect(beyond, "STAGE"), *collect(paper, "STAGE")))
 """The stages of this package, one per file of their folders."""
 
 
@@ -92,7 +90,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _import_object(name: str) -> Any:
-    """Import what an entry point or ``module:name`` stands for."""
+    """Import the object of an entry point or of ``module:name``."""
     module, _, attributes = name.partition(":")
     if not attributes:
         points = [*entry_points(group=GROUP, name=name)]
@@ -130,8 +128,8 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     A `TypeError` if it has other arguments. The function's arguments are passed by name: ``image``,
     ``(H, W, 3)`` uint8 RGB; ``moment``, a `roadeval.data.Moment`, or None for an image by itself;
     and ``settings``, whose default is an instance of a dataclass. It returns ``(H, W)`` bool or
-    whole numbers, nonzero for road; or floats from 0 to 1, the probability of road, whose mask is
-    where it is above one half.
+    integers, nonzero for road; or floats from 0 to 1, the probability of road, which is road above
+    one half.
     """
     arguments = inspect.signature(function).parameters
     for argument, about in arguments.items():

@@ -23,6 +23,7 @@ from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
 from roadeval.results.tables import read_table
+from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,8 +58,8 @@ class NotableFrame:
 
     @property
     def error(self) -> float:
-        """The ERR of the first variant, or its first doubt; below 0 where none is defined."""
-        rates = next(iter(self.rates.values()), {})
+        """The ERR of the focus, or its first doubt; below 0 if none is defined."""
+        rates = self.rates.get(focus_of(self.rates) or "", {})
         return next((rates[by] for by in (TESTED, *SIGNS) if defined(rates.get(by))), -1.0)
 
 

@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, is_plain
+from roadeval.data import is_plain
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import is_final, joined, only
+from roadeval.evaluation.tables import is_final, joined, only, values_of
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -51,6 +51,7 @@ from roadeval.results.tables import (
     read_table,
     write_parquet,
 )
+from roadeval.results.verdict import focus_of
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, check_output, leads_outside, put, sha256_of, writing
 from roadeval.runtime.text import is_utf8, visible
@@ -221,10 +222,10 @@ class FleetFolder:
         return rows[rows["final"] & (rows["metric"] == TESTED) & rows["mean"].notna()]
 
     @cached_property
-    def first_scores(self) -> pd.DataFrame:
-        """The rows of ``scores`` of the first variant's final mask on all pixels, by drive."""
-        first = only(self.scores, final=True, region=ALL, variant=next(iter(self.finals), ""))
-        return first.set_index("drive", drop=False)
+    def focus_scores(self) -> pd.DataFrame:
+        """The rows of ``scores`` of the focus's final mask, on all pixels, by drive."""
+        scores = only(self.scores, final=True, region=ALL, variant=focus_of(self.finals))
+        return scores.set_index("drive", drop=False)
 
     @cached_property
     def regions(self) -> pd.DataFrame:
@@ -289,7 +290,7 @@ def cache(folder: Path, drive: str) -> None:
 
 def _frames_with_pictures(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of ``worst``: the frames of a drive that have pictures."""
-    rows = frames[frames["final"] & (frames["variant"] != BASELINE)]
+    rows = frames[frames["final"] & (frames["variant"] == focus_of(values_of(frames, "variant")))]
     place = Path(PICTURES, drive)
     stems = [path.stem for path in check_inside(folder / place, folder).glob("*.jpg")]
     numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]

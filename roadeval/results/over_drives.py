@@ -16,7 +16,7 @@ from roadeval.evaluation.tables import COUNTS, MASK, group_rows, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
-from roadeval.results.sentences import verdict
+from roadeval.results.verdict import verdict
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:

@@ -324,7 +324,7 @@ _ROWS: Final = {
     "drives": "A row per drive and camera, scored or not; a column `tag_<key>` for each tag.",
     "scores": "A row per drive, camera, variant, stage and region.",
     "effects": "A row per drive, camera, difference between two masks, and rate.",
-    "worst": "A row per frame among the worst of all, by ERR of the first variant's final mask.",
+    "worst": "A row per frame among the worst of all, by ERR of the final mask of the focus.",
 }
 """The meaning of a row of each table."""
 TABLES: Final[Mapping[str, TableSchema]] = {

@@ -231,21 +231,12 @@ def from_log(
 ) -> tuple[Model, Schedule]:
     """Train on some frames of a log; return the model and the schedule of the run.
 
-    A `TrainingError` if there is nothing to learn from, or no frame is left to evaluate.
-
-    Parameters
-    ----------
-    frames
-        The frames of the selected range; only as many are decoded as are needed.
-    on_frame
-        Receives the number of frames decoded so far.
-    labelled
-        Whether the log's truth may be used: then only labelled frames train, and some must be left
-        to evaluate. If no frame of the range is labelled, the first ones train.
-    base
-        The model of other drives, to learn further.
-    picks
-        The frames picked to be labelled: those picked by rank train.
+    A `TrainingError` if there is nothing to learn from, or no frame is left to evaluate. Only as
+    many ``frames`` of the selected range are decoded as are needed; ``on_frame`` receives their
+    number so far. With ``labelled`` the log's truth may be used: then only labelled frames train,
+    and some must be left to evaluate; if no frame of the range is labelled, the first ones train.
+    ``base`` is a model of other drives, to learn further. With ``picks`` the frames picked by rank
+    train.
     """
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
     if not learning:

@@ -1,4 +1,4 @@
-"""Methods as somebody else would write them, named by ``tests.pipeline.somebody:...``."""
+"""Methods as users write them, named by ``tests.pipeline.somebody:...``."""
 
 from dataclasses import dataclass
 

@@ -16,11 +16,11 @@ import numpy as np
 from roadeval.data import Counts
 from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation.metric import Metric, Shown
-from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.discovery import by_name, collect
 
 ALL: Final[Mapping[str, Metric]] = by_name(
     sorted(
-        chain(*found_in(sys.modules[__name__], "METRICS")),
+        chain(*collect(sys.modules[__name__], "METRICS")),
         key=lambda metric: (metric.order, metric.name),
     )
 )

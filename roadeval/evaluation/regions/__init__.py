@@ -12,14 +12,14 @@ from typing import Final
 
 from roadeval.data.arrays import Bits
 from roadeval.evaluation.region import LabelledFrame, Region
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 ALL: Final = "all"
 """The name of the whole frame in sums by region."""
 HALVES: Final = ("boundary", "interior")
 """Regions that together are the whole frame."""
 REGIONS: Final[tuple[Region, ...]] = tuple(
-    sorted(chain(*found_in(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
+    sorted(chain(*collect(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
 )
 
 

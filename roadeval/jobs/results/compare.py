@@ -23,7 +23,7 @@ from roadeval.report.pdf.typeset import pdf, write_file
 from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
-from roadeval.runtime.files import Paths, listed
+from roadeval.runtime.files import Paths, list_paths
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [Path(path) for path in listed(results)]
+    paths = [Path(path) for path in list_paths(results)]
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1

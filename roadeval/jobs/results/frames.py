@@ -24,6 +24,7 @@ from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, faded
 from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
 from roadeval.results.sentences import notes
+from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,11 +82,11 @@ class FramePicker:
         self._recording = result.recording
         self._finals = finals(result.rows)
         self._all = values_of(result.rows, "variant")
-        self._variants = [name for name in self._all if name != BASELINE]
+        self._focus = focus_of(self._all)
         self._scored = frozenset(result.rows["frame"])
         self._parts: dict[Any, Any] = {}
-        for first in self._variants[:1]:
-            self._parts = tables.causes(result.rows, first).to_dict("index")
+        if self._focus:
+            self._parts = tables.causes(result.rows, self._focus).to_dict("index")
 
     def examples(self, numbers: Sequence[int]) -> Iterator[ExampleFrame]:
         """Yield frames for figure 2."""
@@ -101,29 +102,30 @@ class FramePicker:
             yield ExampleFrame(frame, recording.image(frame), truth, masks)
 
     def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
-        """Yield a picture of each frame: the first variant's errors, or without truth its mask."""
+        """Yield a picture of each frame: the errors of the focus, or without truth its mask."""
         recording = self._recording
         for frame in numbers if recording else ():
             assert recording is not None
-            first = recording.variants[0]
-            final = next(spec for spec in first.layers if spec.name == first.stages[-1])
+            named = {variant.name: variant for variant in recording.variants}
+            focus = named[focus_of(named) or ""]
+            final = next(spec for spec in focus.layers if spec.name == focus.stages[-1])
             spec = ERRORS if frame in self._scored else final
-            layer = recording.layer(first.name, spec.name, frame)
+            layer = recording.layer(focus.name, spec.name, frame)
             yield LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
 
     def worst(self) -> list[NotableFrame]:
-        """Return the worst frames of the first variant, one a scene, all worse than the mean.
+        """Return the worst frames of the focus, one a scene, all worse than the mean.
 
         Without truth those that are most in doubt, as far as they have pictures.
         """
-        if not self._variants:
+        if self._focus is None:
             unlabelled = self._result.facts.unlabelled
             look_at = unlabelled.look_at if unlabelled else []
             there = [frame for frame in look_at if frame in self._result.pictured]
             return [*map(self._pictured, there[:WORST])]
-        first_masks = only(self._finals, variant=self._variants[0])
-        rows = tables.worst(first_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
-        rows = rows[rows[TESTED] >= first_masks[TESTED].mean()]
+        focus_masks = only(self._finals, variant=self._focus)
+        rows = tables.worst(focus_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
+        rows = rows[rows[TESTED] >= focus_masks[TESTED].mean()]
         return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
@@ -133,7 +135,7 @@ class FramePicker:
         rows = tables.most_changed_frames(
             pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides
         )
-        columns = rows[["frame", "stamp_ns", "change"]]
+        columns = rows[["frame", "stamp_ns", "change"]].assign(variant=FILTERED)
         return [self._notable(*row) for row in columns.itertuples(index=False)]
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
@@ -159,22 +161,24 @@ class FramePicker:
         assert self._recording is not None
         return self._notable(frame, self._recording.stamps[frame])
 
-    def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
-        """Return a frame, with its pictures where they are there; without truth, too."""
+    def _notable(
+        self, frame: int, stamp_ns: int, change: float | None = None, variant: str | None = None
+    ) -> NotableFrame:
+        """Return a frame of a variant, by default the focus, with its pictures if there are any."""
         result, seen = self._result, self._recording
         if frame not in result.pictured:
             seen = None
         layers = [*self._layers(seen, frame)] if seen and change is None else []
-        if not self._variants or frame not in self._scored:
+        if (variant := variant or self._focus) is None or frame not in self._scored:
             assert seen is not None
             images, notes = [LayerImage("camera", seen.image(frame))], seen.notes(frame)
             return NotableFrame(frame, stamp_ns, "", {}, notes=notes, images=images, layers=layers)
-        first, masks = self._variants[0], only(self._finals, frame=frame).set_index("variant")
+        masks = only(self._finals, frame=frame).set_index("variant")
         return NotableFrame(
-            *(frame, stamp_ns, first, dict[Any, Any](masks[[*SHORT]].to_dict("index"))),
-            parts=self._parts.get(frame, {}),
+            *(frame, stamp_ns, variant, dict[Any, Any](masks[[*SHORT]].to_dict("index"))),
+            parts=self._parts.get(frame, {}) if variant == self._focus else {},
             change=change,
-            notes=result.notes(frame, first),
+            notes=result.notes(frame, variant),
             images=[*self._outcomes_of(seen, frame)] if seen else [],
             layers=layers,
         )
@@ -251,19 +255,19 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
 def _frame_conditions(
     rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
 ) -> Iterator[str]:
-    """Yield what is true of a frame, in words: the first variant's health, and the filter."""
-    first = next(iter(rates), None)
-    if first is None:
+    """Yield what is true of a frame, in words: the health of the focus, and the filter."""
+    focus = focus_of(rates)
+    if focus is None:
         return
-    health = judge(rates[first], blind)
+    health = judge(rates[focus], blind)
     if health is not Health.OK:
-        yield f"{first} {health}"
+        yield f"{focus} {health}"
     if FILTERED in rates and UNFILTERED in rates:
         change = rates[FILTERED][TESTED] - rates[UNFILTERED][TESTED]
         if abs(change) >= NOTEWORTHY:
             yield "the filter harms" if change > 0 else "the filter helps"
-    if blind is not None and rates[first][TESTED] > blind[TESTED]:
-        yield f"{first} worse than {BASELINE}"
+    if blind is not None and rates[focus][TESTED] > blind[TESTED]:
+        yield f"{focus} worse than {BASELINE}"
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
@@ -292,19 +296,19 @@ def _choose_frames(result: DriveResult, count: int) -> list[int]:
     scored_frames = {*rows["frame"]}
     there = [number for number in result.pictured if number in scored_frames]
     pictured = there or [*result.pictured]
-    variants = [name for name in values_of(rows, "variant") if name != BASELINE]
+    focus = focus_of(values_of(rows, "variant"))
     count = min(count, len(pictured))
     spread = evenly(pictured, count)
-    if not variants:
+    if focus is None:
         unlabelled = result.facts.unlabelled
         doubtful = [
             frame for frame in (unlabelled.look_at if unlabelled else ()) if frame in pictured
         ]
         return list(dict.fromkeys([*doubtful, *spread]))[:count]
-    first_masks = finals(only(rows, variant=variants[0]))
-    first_masks = first_masks[first_masks["frame"].isin(pictured)]
-    worst = tables.worst(first_masks, count)["frame"].tolist()
-    best = tables.worst(first_masks, len(first_masks), apart_ns=0)["frame"].tolist()[::-1]
+    masks = finals(only(rows, variant=focus))
+    masks = masks[masks["frame"].isin(pictured)]
+    worst = tables.worst(masks, count)["frame"].tolist()
+    best = tables.worst(masks, len(masks), apart_ns=0)["frame"].tolist()[::-1]
     turns: list[int] = []
     for place in range(count):
         turns += worst[2 * place : 2 * place + 2]

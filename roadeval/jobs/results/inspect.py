@@ -19,6 +19,7 @@ from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
+from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -57,10 +58,10 @@ def worst_frames(
 ) -> list[WorstFrame]:
     """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
 
-    Where nothing was scored, they are ranked by how much the mask is in doubt, one a scene.
-    Of a fleet the frames of all drives are ranked together, all that are known by default, and
-    always of the first variant. A `RoadevalError` if there is nothing to rank by, as where ERR is
-    undefined on every frame, or there is no such variant.
+    The mask is that of the focus by default. If nothing was scored, frames are ranked by how much
+    it is in doubt, one a scene. Of a fleet the frames of all drives are ranked together, all that
+    are known by default, and always of the focus. A `RoadevalError` if there is nothing to rank by,
+    as when ERR is undefined on every frame, or there is no such variant.
     """
     if fleet := result.fleet:
         if fleet.worst.empty:
@@ -75,7 +76,7 @@ def worst_frames(
         if not (scored := _scored(cameras[0])):
             raise _nothing_scored(path)
         raise RoadevalError(
-            f"{path}: ERR of {variant or scored[0]} is undefined on "
+            f"{path}: ERR of {variant or focus_of(scored)} is undefined on "
             "every frame, so no frame is the worst"
         )
     return frames
@@ -102,7 +103,7 @@ def _ranked(
         names, rates = values_of(rows, "variant"), tuple(SIGNS)
     if not names:
         raise _nothing_scored(drive.path)
-    chosen = variant or names[0]
+    chosen = variant or focus_of(names) or names[0]
     if chosen not in names:
         raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
     masks = finals(only(rows, variant=chosen))
@@ -178,7 +179,7 @@ def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame
 
 
 def worst(drive: DriveResult, variant: str | None = None) -> WorstFrame | None:
-    """Return the worst frame that has pictures, of a variant or else of the first one.
+    """Return the worst frame that has pictures, of a variant or else of the focus.
 
     None if no frame with pictures was scored. A `RoadevalError` if the variant was not scored.
     """

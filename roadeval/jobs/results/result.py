@@ -39,7 +39,7 @@ from roadeval.results.rows import (
     scores,
     table_of,
 )
-from roadeval.results.sentences import verdict
+from roadeval.results.verdict import verdict
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:

@@ -39,7 +39,7 @@ from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
+from roadeval.runtime.files import AnyPath, Paths, list_paths, sha256_of
 from roadeval.version import VERSION
 
 
@@ -95,7 +95,7 @@ def replay_fleet(
         Called in the caller's thread as drives are done.
     """
     config = (config or RunConfig()).resolved()
-    entries = find_drives([str(drive) for drive in listed(drives)])
+    entries = find_drives([str(drive) for drive in list_paths(drives)])
     if config.cameras:
         entries = cameras_apart(
             [camera for entry in entries for camera in entry.of_cameras(config.cameras)]

@@ -20,7 +20,7 @@ import numpy as np
 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import FleetSettings, OutputSettings
-from roadeval.data import BASELINE, ERRORS, Frame, FrameResult
+from roadeval.data import ERRORS, Frame, FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import TESTED
 from roadeval.fleet.drives import DriveEntry, FleetError
@@ -47,9 +47,10 @@ from roadeval.results.fleet import (
 )
 from roadeval.results.rows import drive_row
 from roadeval.results.schema import FAILED
+from roadeval.results.verdict import focus_of
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, own_names, put, sha256_of
+from roadeval.runtime.files import alone, find_partial, put, sha256_of
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import save_model
@@ -229,7 +230,7 @@ def _remove(task: DriveTask, *folders: str) -> None:
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
     }
-    partial = own_names(recording, hidden=False) if recording.parent.exists() else []
+    partial = find_partial(recording, hidden=False) if recording.parent.exists() else []
     chosen = [paths[name] for name in folders]
     for path in (*chosen, *(partial if RECORDINGS in folders else ())):
         if path.is_dir():
@@ -386,7 +387,7 @@ WIDTH: Final = 320
 
 
 class WorstPictures:
-    """Keeps pictures of the worst frames of a drive, by the first variant's final mask."""
+    """Keeps pictures of the worst frames of a drive, by the final mask of its focus."""
 
     def __init__(self) -> None:
         self._worst: list[tuple[float, int, int, bytes]] = []
@@ -400,7 +401,7 @@ class WorstPictures:
     def offer(self, result: FrameResult) -> None:
         """Keep a frame as long as it is one of the worst; one without a rate is ignored."""
         frame = result.frame
-        variant = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
+        variant = focus_of(tally.variant for tally in result.tallies)
         errors = [t.rates[TESTED] for t in result.tallies if t.variant == variant]
         if variant is None or math.isnan(error := errors[-1]):
             return

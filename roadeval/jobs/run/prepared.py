@@ -29,7 +29,7 @@ from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.logs.errors import FrameError
-from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, in_step
+from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, merge_streams
 from roadeval.logs.log import Log
 from roadeval.logs.truth.names import NamedLabels
 from roadeval.logs.truth.picks import Picks
@@ -377,7 +377,7 @@ def process(
 
     def numbered() -> Iterator[tuple[Run, int, LoggedFrame]]:
         """Yield the frames, each with its position among its camera's."""
-        for place, logged in in_step([run.frames for run in runs]):
+        for place, logged in merge_streams([run.frames for run in runs]):
             read[place] += 1
             yield runs[place], read[place], logged
 

@@ -38,8 +38,9 @@ from roadeval.results.facts import (
     TrainingFacts,
     UnlabelledFacts,
 )
-from roadeval.results.sentences import misfit, verdict
+from roadeval.results.sentences import misfit
 from roadeval.results.tables import TableFacts
+from roadeval.results.verdict import verdict
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -64,22 +65,17 @@ def make_facts(
     parts, effects = sums.parts, sums.effects
     settings = run.config.training
     is_given = settings.model is not None and not settings.adapt
-    unlabelled, estimated = (
-        _unlabelled_facts(run.board.unlabelled),
-        _estimate_rates(run, sums.frames),
-    )
+    unlabelled = _unlabelled_facts(run.board.unlabelled)
+    estimated = _estimate_rates(run, sums.frames)
     thresholds = dict(_best_thresholds(run))
     varying = ["The images' sizes vary."] if run.frames.accounting.odd_sizes else []
     misfits = [*_misfit_sentences(run)]
-    sentences = verdict(
-        *(parts["totals"], effects, parts["claims"], thresholds),
-        unlabelled=unlabelled,
-        estimated=estimated,
-    )
+    totals = parts["totals"]
+    told = verdict(totals, effects, thresholds, unlabelled=unlabelled, estimated=estimated)
     return Facts(
         **parts,
         effects=[*effects],
-        verdict=" ".join([*misfits, sentences, *varying]),
+        verdict=" ".join([*misfits, told, *varying]),
         misfits=misfits,
         unlabelled=unlabelled,
         estimate=estimated,
@@ -104,7 +100,7 @@ def make_facts(
             None if is_given else "picked" if run.schedule.picks else settings.placement,
             settings.adapt,
         ),
-        warnings=list(warnings(run, parts["totals"])),
+        warnings=list(warnings(run, totals)),
         losses=list(losses(run)),
         run=run.config.as_dict(),
         settings={variant.name: variant.pipeline.as_dict() for variant in run.variants},
@@ -253,7 +249,7 @@ def join_cameras(
     return replace(
         first,
         effects=effects,
-        verdict=" ".join([*misfits, verdict(totals, effects, claims)]),
+        verdict=" ".join([*misfits, verdict(totals, effects)]),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),

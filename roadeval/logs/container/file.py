@@ -107,7 +107,7 @@ class Container:
         self.logs = self._place_messages() if self._settle_descriptions(logs) else logs
         """The places of messages, by the number of their channel."""
         self.looked_into = frozenset(scan.seen)
-        """Chunks whose messages were found by looking into them, not by message indexes."""
+        """Chunks that were searched for messages, because they have no right message indexes."""
         scan.seen.clear()
 
     @property
@@ -251,10 +251,7 @@ class Container:
         return bool(self.redefined) or before != ({*self.channels}, {*self.schemas})
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
-        """Count the messages that a description decodes, and sum up how near their stamps are.
-
-        The first messages of five chunks at most are tried.
-        """
+        """Count messages of five chunks that a description decodes, and add up their delays."""
         distances = []
         for channel_id, log in logs.items():
             channel, schema = self._described(channel_id)
@@ -363,7 +360,7 @@ def _damaged_places(container: Container) -> Iterator[Damage]:
 
 
 def _damaged_chunks(container: Container) -> Iterator[Damage]:
-    """Yield chunks that are unreadable, missing, or hold something else than their index says."""
+    """Yield chunks that are unreadable, missing, or have wrong indexes."""
     path, reader, summary = container.path, container.reader, container.scan.summary
     listed = Counter(chunk[1:4] for chunk in summary.chunks.values() if summary.checked)
     for number, chunk in enumerate(container.chunks):

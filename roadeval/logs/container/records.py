@@ -69,10 +69,10 @@ Entries = npt.NDArray[np.int64]
 
 
 class FileBytes:
-    """A part of a file, sliced like `bytes`; a `BadRecord` where the disk fails.
+    """A part of a file, sliced like `bytes`; a `BadRecord` if the disk fails.
 
-    Nothing is mapped: pages of a mapped file count as memory of the program, and a file that
-    shrinks while it is read would end the program with a bus error.
+    The file is not mapped: mapped pages count as memory of the program, and a file that shrinks
+    while it is read would end the program with a bus error.
     """
 
     def __init__(self, file: IO[bytes], begin: int = 0, size: int | None = None) -> None:
@@ -241,10 +241,7 @@ def record_at(records: Bytes, offset: int) -> Record:
 
 
 def walk(records: Bytes) -> Iterator[Record]:
-    """Yield the complete records of a chunk, up to the first zeros.
-
-    A million zeros would be many records without kind and length.
-    """
+    """Yield the complete records of a chunk, up to the first zeros, which are no records."""
     offset, size = 0, len(records)
     while offset + HEAD.size <= size:
         record = record_at(records, offset)
@@ -383,8 +380,6 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
 
 
 _FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
-_OTHER_INDEXES: Final = Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET
-"""Records of a summary that are checked, but not used."""
 
 
 @dataclass(slots=True)
@@ -416,8 +411,8 @@ class Summary:
                 (self.schemas if opcode == Opcode.SCHEMA else self.channels)[record.id] = record
             elif opcode == Opcode.STATISTICS:
                 self.statistics = parse(opcode, records[body:end])
-            elif opcode in _OTHER_INDEXES:
-                parse(opcode, records[body:end])
+            elif opcode in (Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET):
+                parse(opcode, records[body:end])  # they are only checked
             elif opcode < PRIVATE:
                 raise BadRecord("its summary is not where it should be")
         if end != len(records):

@@ -157,7 +157,7 @@ class Scan:
         return Record(END, record.end, record.end, record.end)
 
     def _resync(self, record: Record, reason: str) -> Record:
-        """Find where the walk continues behind a record that may be damaged, or be followed by it.
+        """Find the next record of the walk if a record, or what follows it, is doubtful.
 
         ::
 
@@ -338,7 +338,7 @@ class Scan:
         return parse_message_index(data) if opcode == MESSAGE_INDEX else parse(opcode, data)
 
     def _around(self, offset: int) -> tuple[float, float]:
-        """Return where the chunk here, or before, and the next one begin, by the summary."""
+        """Return the beginnings of the chunk at or before a byte and of the next one."""
         index = bisect_right(self._borders, offset)
         return self._borders[index - 1], self._borders[index]
 
@@ -409,7 +409,7 @@ class Scan:
         return Record(END, size, size, size)
 
     def _candidates(self, begin: int) -> Iterator[int]:
-        """Yield the bytes at or after ``begin`` where a record may begin."""
+        """Yield the positions from ``begin`` on at which a record may begin."""
         for at in range(begin, len(self.source), BLOCK):
             block = self.source[at : at + BLOCK + HEAD.size]
             offsets = {at + match.start() for match in _CANDIDATE.finditer(block)}

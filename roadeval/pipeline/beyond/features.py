@@ -129,7 +129,7 @@ def surroundings(scene: Scene) -> Named:
 
 
 def scans(scene: Scene) -> Named:
-    """Return the extremes of `_column` below and above, and those from the middle outwards.
+    """Return the summaries of `_column` below and above, and extremes from the middle outwards.
 
     In a row these are the root of the steepest slope across, and the furthest hue. A vehicle that
     drives up the column to the pixel meets no kerb and no shadow under a car while on the road.

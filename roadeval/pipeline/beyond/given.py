@@ -16,7 +16,7 @@ class GivenSettings:
     """Settings of another method's masks as a stage."""
 
     name: str = ""
-    """The variant whose masks they are, one of ``[masks]`` or ``topics.masks``."""
+    """Variant that the masks belong to, one of ``[masks]`` or ``topics.masks``."""
 
 
 @per_view

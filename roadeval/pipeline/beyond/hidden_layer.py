@@ -62,7 +62,7 @@ class HiddenLayer:
     weights: Values
     """``(K,)`` float32."""
     shift: float
-    """Where the sum begins."""
+    """Start of the sum."""
 
     def __post_init__(self) -> None:
         check_arrays(self, np.float32, lowest=("F",), scale=("F",), ranks=("F", CODES), shift=())
@@ -87,7 +87,7 @@ def train(values: Values, road: Flags, weights: Floats | None, seed: int) -> Hid
 
     Each pass draws pixels anew by their weights, and adds new noise to their ranks: in a few
     frames, a feature that is the same all over a frame has few values, and the network must not
-    depend on their exact digits. The arguments are those of `roadeval.pipeline.beyond.trees.grow`.
+    depend on their exact digits. The arguments are as in `roadeval.pipeline.beyond.trees.grow`.
     """
     from threadpoolctl import threadpool_limits
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
+from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.networks import NetSettings, Network, NetworkError
 from roadeval.pipeline.stage import Output, Stage, StageError, View
 
@@ -23,17 +24,13 @@ def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
 
     def run(view: View) -> Output:
         try:
-            road = network.road(view.image)
+            output = network.road(view.image)
         except NetworkError as error:
             raise StageError(f"net: {error}") from error
-        mask = Packed.of(road.mask)
-        levels = (road.codes >> 8).astype(np.uint8)
-        return Output(
-            (Layer(PROBABILITY, levels), Layer(NET, mask)),
-            mask=mask,
-            probability=road.codes if road.graded else None,
-            by_class=road.by_class,
-        )
+        assert output.mask is not None
+        codes = output.probability
+        levels = 255 * output.mask.pixels() if codes is None else (codes >> 8).astype(np.uint8)
+        return replace(output, layers=(Layer(PROBABILITY, levels), Layer(NET, output.mask)))
 
     return run
 

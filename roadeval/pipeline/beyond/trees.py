@@ -112,19 +112,9 @@ def grow(values: Values, road: Flags, weights: Floats | None, trees: int, seed: 
     """Grow trees with scikit-learn's gradient boosting on histograms.
 
     One thread grows them: the last digits of sums by many threads differ from run to run.
-
-    Parameters
-    ----------
-    values
-        ``(n, F)`` finite features.
-    road
-        ``(n,)`` labels; both occur.
-    weights
-        ``(n,)`` numbers above 0; None if all pixels weigh the same.
-    trees
-        Number of trees.
-    seed
-        Seed of the features among which a node chooses.
+    ``values`` are ``(n, F)`` finite features; ``road`` are ``(n,)`` labels, and both occur;
+    ``weights`` are ``(n,)`` and above 0, None if all pixels weigh the same. ``trees`` is their
+    number, ``seed`` that of the features among which a node chooses.
     """
     from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits
@@ -233,7 +223,7 @@ class TreesSettings:
     the shade. Default: 1 if images of the frame's size taught the trees, which are taken for the
     camera's own; 4 if other cameras taught them: there it may correct much."""
     threshold: Share = 0.5
-    """A pixel is road where it is more probable than this."""
+    """A pixel is road if its probability of road is above this."""
 
     @field_validator("features")
     @classmethod

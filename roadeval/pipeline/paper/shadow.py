@@ -257,10 +257,11 @@ def compensation(
     """Compute the linear map of Eq. 11 for every component, each channel by itself.
 
     Returns source, target and gain of ``target + (I - source) * gain``, ``(count, C)`` each.
-    ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 where sigma is 0),
+    ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 if sigma is 0),
     after which the component has its ring's mean and deviation. ``printed`` gives
-    ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 where the ring's variance is 0),
-    whose ratio is upside down: it flattens the region. Components without a ring stay unchanged.
+    ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 if the ring's variance is 0),
+    and flattens the region, since its ratio is upside down. Components without a ring stay
+    unchanged.
     """
     above, below = ring.deviation, inside.deviation
     if settings.statistic == "printed":

@@ -30,7 +30,7 @@ from roadeval.report.chart import (
     looks,
     thinned,
 )
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
             lambda rows: over_windows(rows, ["FPR", "FNR"]),
         ),
         OverDrive("Further rates over the drive.", _further_rates),
-        *found_in(charts, "FIGURE"),
+        *collect(charts, "FIGURE"),
     )
 
 

@@ -19,6 +19,7 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, is_significant, marked_interval
+from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import elided
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ _SHOWN: Final = (TESTED, "FPR", "FNR")
 def plots(findings: FleetFolder) -> Iterator[Block]:
     """Yield the plots of the filter and of the best variant against blind, and the worst drives."""
     chosen = list(plotted(findings))
-    if findings.first_scores.empty:
+    if findings.focus_scores.empty:
         return
     yield Heading("Drive by drive")
     for place, (effect, title) in enumerate(chosen):
@@ -70,13 +71,13 @@ def _plot(findings: FleetFolder, effect: Effect) -> Iterator[Block]:
 
 
 def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
-    """Return by base the differences by drive of the first variant, or the first that has any."""
+    """Return by base the differences by drive of the focus, or the first variant that has any."""
     differences = {}
     for base in BASES:
         rows = only(findings.effects, base=base)
         if variants := values_of(rows, "variant"):
-            first = next(iter(findings.finals))
-            rows = only(rows, variant=first if first in variants else variants[0])
+            focus = focus_of(findings.finals)
+            rows = only(rows, variant=focus if focus in variants else variants[0])
             differences[base] = rows.set_index("drive")["mean"]
     return differences
 
@@ -98,7 +99,7 @@ def table(findings: FleetFolder) -> Iterator[Block]:
     yield Heading("All drives")
     yield replace(drives_table(findings), find="Find drives, tags, states:")
     yield Text(
-        "Rates of the first variant's final mask in percent, differences in percentage points. A "
+        f"Rates of {focus_of(findings.finals)} in percent, differences in percentage points. A "
         "click on a title sorts.",
         "note",
     )
@@ -109,7 +110,7 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
 
     Or the ``worst`` ones, those with the highest ERR, without state and group.
     """
-    scores, tags, rows = findings.first_scores, _tags(findings), findings.drives
+    scores, tags, rows = findings.focus_scores, _tags(findings), findings.drives
     if worst is not None:
         ranked = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
         rows = rows.loc[ranked.index[:worst]]
@@ -239,7 +240,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     rows = records(findings.worst[:most])
     if not rows:
         return
-    yield Heading("The worst frames over all drives")
+    yield Heading(f"The worst frames of {focus_of(findings.finals)} over all drives")
     pictures = []
     for row in rows:
         title = f"{elided(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
@@ -251,7 +252,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     if more := pictures[SEEN:]:
         yield Details(f"{len(more)} more", [ImageGrid(more, across)])
     legend = (
-        "By ERR of the first variant's final mask; of a drive at most three, a second apart. "
+        f"By ERR of {focus_of(findings.finals)}; of a drive at most three, a second apart. "
         "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
         "grey: ignored."
     )

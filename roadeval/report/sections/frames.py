@@ -28,6 +28,7 @@ from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.tables import variant_cell
 from roadeval.results.sentences import step_by_step, without_filter
+from roadeval.results.verdict import focus_of
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -44,21 +45,21 @@ NO_COMMAND: Final = (
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, then those that the filter changed most."""
-    first = next(iter(findings.finals), None)
-    if first is None:
+    focus = focus_of(findings.finals)
+    if focus is None:
         if (found := findings.facts.unlabelled) and found.sign:
             rule = f"Highest {found.sign} of {found.variant}: {SIGNS[found.sign]}. One a scene."
             head = [Heading("Frames to look at"), Text(f"{rule} No error rate is known.", "note")]
             yield from _frames(findings, head, findings.worst)
         return
     if not findings.worst:
-        yield Heading("The worst frames")
-        yield Text(f"ERR of {first} is undefined on every frame, so no frame is the worst.")
-    rule = f"Highest ERR of {first}; of a scene only the worst, above the mean."
+        yield Heading(f"The worst frames of {focus}")
+        yield Text(f"ERR of {focus} is undefined on every frame, so no frame is the worst.")
+    rule = f"Highest ERR of {focus}; of a scene only the worst, above the mean."
     rows = (row for frame in findings.worst for row in frame.layers if row)
     if stepped := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
         rule += f" Below the errors are the steps of {listing(stepped)}, from left to right."
-    head = [Heading("The worst frames"), Text(rule, "note")]
+    head = [Heading(f"The worst frames of {focus}"), Text(rule, "note")]
     if not findings.inspect:
         head.append(Text(NO_COMMAND, "note"))
     yield from _frames(findings, head, findings.worst)

@@ -152,10 +152,10 @@ def test_the_threshold_itself_is_shadow_only_as_printed():
 @given(shadowed=masks)
 @settings(max_examples=60)
 def test_components_are_those_of_scikit_image(connectivity, shadowed):
-    found = shadow.connected_components(Packed.of(shadowed), connectivity)
+    components = shadow.connected_components(Packed.of(shadowed), connectivity)
     expected, count = label(shadowed, connectivity=connectivity // 4, return_num=True)
-    np.testing.assert_array_equal(found.labels(), expected)
-    assert found.count == count
+    np.testing.assert_array_equal(components.labels(), expected)
+    assert components.count == count
 
 
 def test_a_ring_by_hand():
@@ -176,10 +176,10 @@ def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed
     owner, pixel = shadow.ring_pairs(labels, union, width)
     np.testing.assert_array_equal(union, reference.rings(shadowed > 0, width))
     pairs = 0
-    for box, own, ring in reference.components(shadowed > 0, width, connectivity // 4):
+    for box, inside, ring in reference.components(shadowed > 0, width, connectivity // 4):
         alone = np.zeros(shadowed.shape, bool)
         alone[box] = ring
-        ours = owner == labels[box][own][0]
+        ours = owner == labels[box][inside][0]
         assert pixel[ours].tolist() == np.flatnonzero(alone).tolist()
         pairs += ring.sum()
     assert len(owner) == pairs
@@ -243,9 +243,9 @@ options = st.builds(
 
 def check_rgb(image, chosen):
     shadowed = run(image, chosen)[1]["shadow"]
-    found = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
+    components = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
     ring = shadow.buffer_ring(Packed.of(shadowed), chosen.ring_width)
-    result = shadow.compensate(View.of(image), found, ring, chosen)
+    result = shadow.compensate(View.of(image), components, ring, chosen)
     printed, connectivity = chosen.statistic == "printed", chosen.connectivity // 4
     more = {"connectivity": connectivity, "most": chosen.max_gain}
     exact = reference.transfer(image, shadowed > 0, chosen.ring_width, printed, **more)
