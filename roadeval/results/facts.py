@@ -139,7 +139,19 @@ class FactsFile:
     """Parts that are left out if they are empty."""
     VALUES: ClassVar[int] = VALUES
     """Greatest number of values that are read."""
+    totals: Totals
+    effects: list[Effect]
     run: dict[str, Any]
+
+    @cached_property
+    def finals(self) -> dict[str, str]:
+        """Each scored variant's final stage."""
+        return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
+
+    @property
+    def final_effects(self) -> list[Effect]:
+        """The differences of final masks."""
+        return [effect for effect in self.effects if effect.final]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of the file; undefined numbers become None."""
@@ -284,11 +296,6 @@ class Facts(FactsFile):
         *("cameras", "unlabelled", "estimate", "misfits"),
     )
 
-    @cached_property
-    def finals(self) -> dict[str, str]:
-        """Each scored variant's final stage."""
-        return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
-
     def content(self) -> dict[str, Any]:
         """Return the parts of the file, with differences by the variant that is subtracted.
 
@@ -336,11 +343,6 @@ class Facts(FactsFile):
             }
         except (AttributeError, KeyError, TypeError):
             return {**content, "effects": None}  # the parts tell what is wrong
-
-    @property
-    def final_effects(self) -> list[Effect]:
-        """The differences of final masks."""
-        return [effect for effect in self.effects if effect.final]
 
     @property
     def log_digest(self) -> str | None:
@@ -394,16 +396,6 @@ class FleetFacts(FactsFile):
     warnings: list[str]
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
-
-    @property
-    def finals(self) -> dict[str, str]:
-        """Each scored variant's final stage."""
-        return {variant: stage for variant in self.totals for stage in self.totals[variant]}
-
-    @property
-    def final_effects(self) -> list[Effect]:
-        """The differences, as `Facts` has them."""
-        return self.effects
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN

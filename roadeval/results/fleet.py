@@ -27,7 +27,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import is_final, joined, only, values_of
+from roadeval.evaluation.tables import concatenate, is_final, only, values_of
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -186,7 +186,7 @@ class FleetFolder:
         tables = (
             of_drive(results, name, drive) for results, drive in zip(folders, chosen, strict=True)
         )
-        return joined([read_table(name, ""), *tables])
+        return concatenate([read_table(name, ""), *tables])
 
     @cached_property
     def drives(self) -> pd.DataFrame:

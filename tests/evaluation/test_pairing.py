@@ -15,7 +15,7 @@ from roadeval.evaluation.comparison.pairing import (
     truth_differs,
 )
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import joined
+from roadeval.evaluation.tables import concatenate
 from tests.evaluation.making import a_drive, a_result, a_table, table_of
 
 
@@ -94,7 +94,7 @@ def test_frames_are_matched_by_stamp_and_equal_stamps_in_their_order():
 
 def test_of_several_drives_each_is_matched_with_its_own():
     one, other = (a_table({("a", "post"): [1, 2]}, drive=name) for name in ("one", "other"))
-    found = common_masks(joined([one, other]), joined([other, one]))
+    found = common_masks(concatenate([one, other]), concatenate([other, one]))
     assert found["drive"].tolist() == ["one", "one", "other", "other"]
     assert (found["frame"] == found["frame_base"]).all()
 
