@@ -131,7 +131,7 @@ def _problem(file: Path) -> str:
     try:
         _check(file)
     except LogError as error:
-        return str(error).removeprefix(f"{file}: ")
+        return error.reason
     return ""
 
 
@@ -147,7 +147,7 @@ def _check(path: Path) -> None:
         with path.open("rb") as file:
             check_content(path, file)
     except OSError as error:
-        raise LogError(f"{path}: {error.strerror or error}") from error
+        raise LogError(error.strerror or str(error), where=path) from error
 
 
 def check_content(path: Path, file: IO[bytes]) -> None:
@@ -158,7 +158,7 @@ def check_content(path: Path, file: IO[bytes]) -> None:
     file.seek(max(size - len(MAGIC), 0))
     tail = file.read(len(MAGIC))
     if not head:
-        raise LogError(f"{path}: the file is empty")
+        raise LogError("the file is empty", where=path)
     wrong = sum(ours != theirs for ours, theirs in zip(MAGIC, head, strict=False))
     if head.startswith(MAGIC) or (wrong <= 2 and len(head) >= len(MAGIC)) or tail == MAGIC:
         return

@@ -414,7 +414,9 @@ class FleetWriter:
             except ResultsError as error:
                 if again:  # its results are damaged: it is not done
                     made_path(self.folder, drive).unlink(missing_ok=True)
-                raise ResultsError(f"{error.args[0].partition(';')[0]}; {AGAIN}") from error
+                damaged = ResultsError.of(error)
+                damaged.remedy = AGAIN
+                raise damaged from error
         return {
             name: read_parquet([cached_path(self.folder, name, drive) for drive in drives], name)
             for name in ("scores", "worst")

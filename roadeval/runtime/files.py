@@ -51,13 +51,13 @@ def list_paths(paths: Paths) -> list[AnyPath]:
 
 
 @contextmanager
-def writing(place: object, kind: type[Exception], advice: str = "") -> Iterator[None]:
-    """Turn an OSError inside the block into an error of a room: where, why, and what to do."""
+def writing(place: object, kind: Callable[[str], Exception]) -> Iterator[None]:
+    """Turn an OSError inside the block into an error of a room, which ``kind`` makes."""
     try:
         yield
     except OSError as error:
         why = error.strerror or error
-        raise kind(f"{place}: cannot be written: {why}{advice}") from error
+        raise kind(f"{place}: cannot be written: {why}") from error
 
 
 def check_input(path: str | Path) -> None:

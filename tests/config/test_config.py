@@ -43,25 +43,28 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ("[frames]\nscale = 1.5", r"frames\.scale: .*\(given: 1.5\)"),
         ("[frames]\nstart = 'noon'", "'noon' is no time"),
         ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
-        ("[labels]\nroad_colors = [[1, 2]]", r"labels\.road_colors, item 1: is too short"),
-        ("[labels]\nroad = [3, -40000]", r"labels\.road, item 2: .*\(given: -40000\)"),
+        ("[labels]\nroad_colors = [[1, 2]]", r"labels\.road_colors: item 1 is too short"),
+        ("[labels]\nroad = [3, -40000]", r"labels\.road: item 2 .*\(given: -40000\)"),
         ("[training.patch]\nx = 1", r"training\.patch.x: .*choose bottom, bottom_width, top"),
         ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
         ("chain = [['post']]", r"no stage \['post'\]"),
         ("ring_width = 3", "ring_width is in no table; put it below one of .*shadow"),
-        ("[output]\nsave = 'g.toml'", r"output.save g.toml: name a file that ends in .rrd"),
+        ("[output]\nsave = 'g.toml'", r"output.save: g.toml does not end in .rrd"),
         ("[fleet]\nkeep = 'best:3'", r"fleet\.keep: must be 'all' or 'none'"),
         (
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = [3, -1]",
-            r"net\.road, item 2: must be at least 0",
+            r"net\.road: item 2 must be at least 0",
         ),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
-        ("[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5", "output.mcap and frames.scale do not"),
+        (
+            "[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5",
+            "output.mcap: does not go with frames.scale",
+        ),
         ("[topics.masks]\ntruth = '/x'", "variant 'truth': the name is reserved"),
         ("variants = 3", r"\[variants\] must hold a table for each variant"),
         ("[variants]\nwide = 3", r"\[variants.wide\] must be a table"),
         ("[variants.wide.svm]\nc = 0", r"\[variants.wide\]: svm\.c: "),
-        ("[variants.wide.training]\nframes = 3", r"\[training\] holds for the whole run"),
+        ("[variants.wide.training]\nframes = 3", r"\[training\] applies to all variants"),
         ("[variants.filtered]\nchain = ['svm', 'post']", "the name is taken"),
         ("chain = ['svm', 'blur', 'post']", r"no stage 'blur'; choose .*shadow"),
         ("chain = ['svm']", "chain must end with post"),
@@ -137,15 +140,15 @@ def test_no_stage_is_called_like_a_table_of_the_run():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("size = [8, 8]\n", "file must name the network"),
         ('file = "n.onnx"\nsise = [8, 8]\n', r"net\.sise: there is no such setting"),
-        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold says nothing"),
+        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold has no effect"),
     ],
 )
-def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, said):
-    with pytest.raises(ConfigError, match=said) as caught:
+def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, message):
+    with pytest.raises(ConfigError, match=message) as caught:
         network_variant("mine", str(write(tmp_path, text)))
     assert str(tmp_path / "c.toml") in str(caught.value)
 
@@ -156,14 +159,14 @@ def test_an_empty_topic_is_that_of_every_camera_but_of_those_that_name_one(name,
     named = {name: taken} if taken else {}
     cameras = [{"image": f"/{side}", **named} for side in ("left", "right")]
     config = configure({"topics": {name: ""}, "cameras": cameras})
-    assert {getattr(each.topics, name) for each in config.by_camera().values()} == {taken}
+    assert {getattr(camera.topics, name) for camera in config.by_camera().values()} == {taken}
 
 
 def test_masks_are_those_of_the_drive():
     config = configure({"masks": {"net": {"path": "net/{drive}", "threshold": 0.4}}})
     assert config.for_drive("logs/a.mcap").masks["net"].path == "net/a"
-    own = config.of_drive({"masks": {"net": {"path": "elsewhere"}}}).masks["net"]
-    assert (own.path, own.threshold) == ("elsewhere", 0.4)
+    masks = config.of_drive({"masks": {"net": {"path": "elsewhere"}}}).masks["net"]
+    assert (masks.path, masks.threshold) == ("elsewhere", 0.4)
 
 
 def test_what_holds_for_the_whole_run_is_refused_of_a_drive():

@@ -221,7 +221,7 @@ def test_a_drives_url_is_not_asked(fleet, server):
     url = server.url("whole/a.mcap?sig=geheim", user="me:geheim@")
     change(fleet, "source", url)
     runs, said, _ = looked_into(fleet)
-    assert server.asked == []
+    assert server.requests == []
     assert runs["worst"].returncode == 1
     assert f"make it with: roadeval replay {server.url('whole/a.mcap')} " in runs["worst"].stderr
     assert PASSWORD not in said

@@ -111,9 +111,10 @@ def test_a_topic_without_messages_that_was_named_is_refused(tmp_path: Path, topi
     path = ros2_log(tmp_path / "a.mcap", camera(JPEG), empty=("/empty",))
     with (
         open_log(path, LogConfig(topics=TopicSettings(**{topic: "/empty"}))) as log,
-        pytest.raises(LogError, match=rf"`topics\.{topic}` /empty: the topic holds no message"),
+        pytest.raises(LogError, match="/empty holds no message") as refused,
     ):
         log.select()
+    assert refused.value.setting == f"topics.{topic}"
 
 
 def test_labels_of_which_nothing_can_be_decoded_are_refused(tmp_path: Path) -> None:

@@ -32,16 +32,19 @@ def read(path: Path, **settings: Any) -> tuple[Selection, list[LoggedFrame]]:
 
 
 @pytest.mark.parametrize(
-    ("topics", "reason"),
+    ("topics", "setting", "reason"),
     [
-        ({"image": "/labels", "truth": "/labels"}, "`topics.truth` /labels: it is the image's own"),
-        ({"masks": {"net": "/labels"}}, "`topics.masks` net: /labels is the truth"),
+        ({"image": "/labels", "truth": "/labels"}, "topics.truth", "/labels is the image's own"),
+        ({"masks": {"net": "/labels"}}, "topics.masks.net", "/labels is the truth"),
     ],
 )
-def test_a_topic_is_not_scored_against_itself(tmp_path: Path, topics: Any, reason: str) -> None:
+def test_a_topic_is_not_scored_against_itself(
+    tmp_path: Path, topics: Any, setting: str, reason: str
+) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
-    with pytest.raises(LogError, match=reason):
+    with pytest.raises(LogError, match=reason) as refused:
         read(path, topics=TopicSettings(**topics))
+    assert (refused.value.where, refused.value.setting) == ("drive.mcap", setting)
 
 
 @pytest.mark.parametrize(
@@ -243,7 +246,7 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
 
 def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:
     path = two_cameras(tmp_path / "a.mcap", ["front", "rear"])
-    with pytest.raises(LogError, match="left: no image of the range has it; the first has front"):
+    with pytest.raises(LogError, match="no image of the range has left; the first has front"):
         read(path, topics=TopicSettings(frame_id="left", truth=""))
 
 

@@ -57,6 +57,7 @@ from roadeval.evaluation.tables import (
     rates_of,
     values_of,
 )
+from roadeval.runtime.sentence import Sentence, Setting
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -529,14 +530,17 @@ def _warnings(
                 "lacks them or trained on them"
             )
     of_the_log = [
-        f"`{name}` {setting(before)} and {setting(after)}"
+        Sentence("{} {} and {}", Setting(name), setting(before), setting(after))
         for name, (before, after) in changed.items()
         if name.startswith(_OF_THE_LOG)
     ]
     if of_the_log:
-        yield (
-            f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
-            " part of the change may be theirs"
+        yield Sentence(
+            "{} and {} were replayed with different settings ({}): part of the change may be "
+            "theirs",
+            base,
+            new,
+            Sentence(", ").join(of_the_log),
         )
     if relabelled := frames["relabelled"]:
         guess = "" if of_the_log else " (other labels or topics?)"

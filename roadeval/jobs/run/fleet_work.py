@@ -341,7 +341,7 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
     try:
         model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
     except TrainingError as error:
-        return FoldModel(task.fold, "", str(error))
+        return FoldModel(task.fold, "", error.sentence)
     save_model(model, task.path)
     digest = sha256_of(task.path)
     about_model = {

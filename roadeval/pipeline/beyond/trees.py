@@ -282,7 +282,8 @@ def see(settings: TreesSettings, image: Rgb, opinion: Output | None = None) -> t
     if not settings.opinion:
         return scene, planes
     if opinion is None:
-        raise StageError("trees: `opinion` asks for a stage before it that makes a road mask")
+        problem = "asks for a stage before it that makes a road mask"
+        raise StageError(problem, setting="trees.opinion")
     return scene, np.concatenate([planes, opinions(opinion, scene.shape)])
 
 

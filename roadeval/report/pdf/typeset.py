@@ -14,7 +14,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -63,7 +63,7 @@ def write_file(path: Path, content: bytes) -> Path:
 
     A `ReportError` if it cannot be written.
     """
-    with writing(path, ReportError, "; choose another place"):
+    with writing(path, partial(ReportError, remedy="choose another place")):
         put(path, content)
     return path
 

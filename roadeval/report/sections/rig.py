@@ -26,7 +26,7 @@ def each_camera(findings: Findings) -> Iterator[Block]:
         told = camera if names[camera] != camera.strip("/") else ""
         size = f"{own.facts.drive.width} \N{MULTIPLICATION SIGN} {own.facts.drive.height}"
         yield Text(", ".join(filter(None, (told, size))), "note")
-        yield Text(own.facts.verdict.replace("`", ""))
+        yield Text(own.facts.verdict)
         if own.totals:
             yield Details("Rates of every final mask", [rates_table(own.facts)])
         for frame in islice(own.worst, 1):

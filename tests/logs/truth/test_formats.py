@@ -106,17 +106,18 @@ def test_what_no_shape_covers_is_non_road():
 
 
 @pytest.mark.parametrize(
-    ("labels", "problem"),
+    ("labels", "setting", "problem"),
     [
-        (LabelSettings(("Road",)), "`labels.road` Road does not occur in labels, which has the"),
-        (LabelSettings(("road",), ("sky",)), "`labels.ignore` sky does not occur in labels, which"),
-        (LabelSettings(), "labels has the classes car (3 labels), road (3 labels), ego (1 label):"),
+        (LabelSettings(("Road",)), "labels.road", "Road does not occur in labels, which has the"),
+        (LabelSettings(("road",), ("sky",)), "labels.ignore", "sky does not occur in labels"),
+        (LabelSettings(), "", "labels has the classes car (3 labels), road (3 labels), ego (1"),
     ],
 )
-def test_a_class_that_does_not_occur_is_refused_with_the_list(labels, problem):
+def test_a_class_that_does_not_occur_is_refused_with_the_list(labels, setting, problem):
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
-    with pytest.raises(LogError, match=re.escape(problem)):
+    with pytest.raises(LogError, match=re.escape(problem)) as refused:
         understand_classes(labels, origin, "labels")
+    assert refused.value.setting == setting
     with pytest.raises(LogError, match=r"ego \(1 label\); 2 labels of it cannot be read"):
         understand_classes(LabelSettings(("Road",)), replace(origin, lost=2), "labels")
 

@@ -65,7 +65,7 @@ def test_what_the_numbers_say_of_the_first_frame_is_taken_or_else_asked_for(numb
     if first is not None:
         assert [*frames_of(names, frames).values()] == [number - first for number in numbers]
         return
-    with pytest.raises(LogError, match=r"give `truth\.first` 0 or `truth.first` 1"):
+    with pytest.raises(LogError, match=r"number 0 or 1; set `truth.first` to 0 or to 1"):
         frames_of(names, frames)
     for chosen in (0, 1):
         assert [*frames_of(names, frames, first=chosen).values()] == [n - chosen for n in numbers]
