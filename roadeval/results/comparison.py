@@ -12,7 +12,8 @@ from roadeval.data.words import listing, percent, plain_points, setting
 from roadeval.evaluation.comparison.compare import FALSE, Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
-from roadeval.results.sentences import is_significant, sentence
+from roadeval.results.sentences import is_significant
+from roadeval.results.verdict import describe_change
 from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
@@ -58,7 +59,7 @@ def verdict(comparison: Comparison) -> str:
     base = comparison.results[0].label
     several = len({change.variant for change in finals}) > 1
     changed = [change for change in finals if not change.unchanged] or finals[:1]
-    parts = [_sentence(change, base, several=several) for change in changed]
+    parts = [_describe(change, base, several=several) for change in changed]
     return " ".join([*parts, *unchanged(comparison, [c for c in finals if c not in changed])])
 
 
@@ -71,12 +72,9 @@ def unchanged(comparison: Comparison, masks: Iterable[MaskChange]) -> Iterator[s
         yield f"{listing([*names])}{of}: every frame as in {base}."
 
 
-def _sentence(change: MaskChange, base: str, *, several: bool) -> str:
-    what, rate = f"{change.result} instead of {base}", f"{TESTED} of {change.stage}"
-    text = sentence(change.difference[TESTED], what, rate, (change.base, change.new))
-    if change.result == change.variant or not several:
-        return text
-    return f"{change.variant}: {text[0].lower()}{text[1:]}"
+def _describe(change: MaskChange, base: str, *, several: bool) -> str:
+    new = _mask_name(change.result, change.variant) if several else change.result
+    return describe_change(change.difference[TESTED], new, base, (change.base, change.new))
 
 
 def where(comparison: Comparison) -> list[str]:

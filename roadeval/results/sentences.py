@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
-from roadeval.data.words import counted, defined, in_percent, interval, number, percent
-from roadeval.evaluation.metrics import TESTED
+from roadeval.data.words import counted, interval, number, percent
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
@@ -31,89 +29,6 @@ _OF_FILTER: Final = "The filter "
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
-
-
-def sentence(
-    difference: Difference,
-    what: str,
-    rate: str,
-    ends: tuple[Rates, Rates] | None = None,
-) -> str:
-    """Return what a difference means for these frames or drives, and then for others like them.
-
-    The difference is with ``what`` minus without it, as ``the filter`` or ``net instead of blind``;
-    ``rate`` is what changes, as ``ERR of post``. ``ends`` are the rates without and with it, which
-    are named if they are of the same frames or drives.
-
-    >>> difference = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
-    >>> sentence(difference, "the filter", "ERR")
-    'On these 91 frames the filter lowers ERR by 2.0 pp; on frames like these by 1.0 to 3.0 pp.'
-    """
-    unit = difference.unit[:-1]
-    if not difference.units:
-        return f"Nothing to compare: {rate} is undefined on every {unit}."
-    here = _here(difference)
-    if difference.is_zero:
-        return f"{here} {what} leaves {rate} of every {unit} as it is."
-    by = f"by {_size(difference.mean, _digits(difference))} pp"
-    before, after = (rates.get(TESTED) for rates in ends or ({}, {}))
-    if defined(before) and defined(after) and abs(after - before - difference.mean) < ROUNDING:
-        digits = 1 if abs(difference.mean) >= FINE else 2
-        by = f"from {_size(before, digits)} to {_size(after, digits)} %"
-    verb = "raises" if difference.mean > 0 else "lowers"
-    return f"{here} {what} {verb} {rate} {by}{_count_directions(difference)}; {_doubt(difference)}."
-
-
-def _doubt(difference: Difference) -> str:
-    """Return what a difference means for other frames or drives, as a clause."""
-    if difference.low is None or difference.high is None:
-        return difference.none_because
-    like, digits = f"on {difference.unit} like these", _digits(difference)
-    if is_sure(difference):
-        least, most = sorted((abs(difference.low), abs(difference.high)))
-        return f"{like} by {_size(least, digits)} to {_size(most, digits)} pp"
-    family = ""
-    if is_sure(replace(difference, p_holm=None)):
-        family = f" (corrected for {difference.comparisons} comparisons)"
-    return f"{like} the effect is unclear: {_ends(difference.low, difference.high, digits)}{family}"
-
-
-def _ends(low: float, high: float, digits: int) -> str:
-    """Return an interval in words.
-
-    >>> _ends(-0.03, 0.01, 1), _ends(-0.03, -0.01, 1)
-    ('from 3.0 pp lower to 1.0 pp higher', 'from 1.0 to 3.0 pp lower')
-    """
-    if low < 0 < high:
-        return f"from {_size(low, digits)} pp lower to {_size(high, digits)} pp higher"
-    least, most = sorted((low, high), key=abs)
-    word = "lower" if high <= 0 else "higher"
-    return f"from {_size(least, digits)} to {_size(most, digits)} pp {word}"
-
-
-def _digits(difference: Difference) -> int:
-    most = max(abs(difference.mean), -(difference.low or 0.0), difference.high or 0.0)
-    return 1 if most >= 0.01 else 2
-
-
-def _size(fraction: float, digits: int) -> str:
-    return f"{abs(in_percent(fraction)):.{digits}f}"
-
-
-def _here(difference: Difference) -> str:
-    units, groups = difference.units, difference.groups
-    if difference.unit == "frames":
-        return "On this frame" if units == 1 else f"On these {units} frames"
-    in_groups = "" if groups in (None, units) else f" in {counted(groups or 0, 'group')}"
-    return f"Over {counted(units, 'drive')}{in_groups}"
-
-
-def _count_directions(difference: Difference) -> str:
-    if difference.worse is None:
-        return ""
-    if difference.unit == "frames":
-        return f" (better on {difference.better} of {difference.units})"
-    return f" (worse on {difference.worse}, better on {difference.better})"
 
 
 _WHY: Final = {

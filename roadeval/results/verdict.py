@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from operator import itemgetter
 from typing import Any, Final
 
@@ -151,11 +152,55 @@ def _points(change: Difference, name: str, *, alone: bool = False) -> str:
         return f"exactly as good as {name}"
     doubt, digits = "", 1 if abs(change.mean) >= FINE else 2
     if not alone and change.low is not None and change.high is not None:
-        least, most = (_size(end, digits) for end in sorted((change.low, change.high), key=abs))
+        least, most = (_size(end, digits) for end in _ends(change))
         doubt = f" ({least} to {most} on others)"
         doubt = doubt if is_sure(change) else " (may be chance)"
     direction = "worse" if change.mean > 0 else "better"
     return f"{_size(change.mean, digits)} points{doubt} {direction} than {name}"
+
+
+def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, Rates]) -> str:
+    """Return how a new mask compares with a base, here and on other frames or drives.
+
+    ``ends`` are the rates of the base and of the new mask, which are named if their difference is
+    that of the same frames or drives.
+
+    >>> change = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 9)
+    >>> print(describe_change(change, "new", "old", ({"ERR": 0.05}, {"ERR": 0.03})))
+    new is better than old: 3.0 % wrong instead of 5.0 % (9 frames). On others by 1.0 to 3.0 points.
+    """
+    if not change.units:
+        return f"Nothing to compare: {TESTED} is undefined on every {change.unit[:-1]}."
+    here = counted(change.units, change.unit[:-1])
+    if change.groups not in (None, change.units):
+        here += f" in {counted(change.groups or 0, 'group')}"
+    if change.is_zero:
+        return f"{new} is exactly as good as {base} ({here})."
+    if change.better is not None:
+        here += f", better on {change.better}, worse on {change.worse}"
+    before, after = (rates.get(TESTED) for rates in ends)
+    digits = 1 if abs(change.mean) >= FINE else 2
+    if defined(before) and defined(after) and abs(after - before - change.mean) < ROUNDING:
+        size = f"{_size(after, digits)} % wrong instead of {_size(before, digits)} %"
+    else:
+        size = f"by {_size(change.mean, digits)} points"
+    direction, doubt = "worse" if change.mean > 0 else "better", _no_interval(change)
+    if not doubt and is_sure(change):
+        least, most = (_size(end, digits) for end in _ends(change))
+        doubt = f"On others by {least} to {most} points."
+    elif not doubt:
+        family = ""
+        if is_sure(replace(change, p_holm=None)):
+            family = f", as {change.comparisons} masks are compared"
+        doubt = f"This may be chance{family}."
+    return f"{new} is {direction} than {base}: {size} ({here}). {doubt}"
+
+
+def _ends(change: Difference) -> list[float]:
+    """Return the ends of an interval, the one nearer to 0 first."""
+    assert change.low is not None
+    assert change.high is not None
+    return sorted((change.low, change.high), key=abs)
 
 
 def _size(fraction: float, digits: int) -> str:

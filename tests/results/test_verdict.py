@@ -6,7 +6,7 @@ import pytest
 
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.results.facts import UnlabelledFacts
-from roadeval.results.verdict import focus_of, verdict
+from roadeval.results.verdict import describe_change, focus_of, verdict
 from tests.evaluation.making import a_difference
 
 WORDS = 60
@@ -173,3 +173,56 @@ def test_without_truth_it_says_where_to_look_first():
 )
 def test_the_focus_is_what_the_user_brought(variants, focus):
     assert focus_of(variants) == focus
+
+
+# --- Two masks compared ---------------------------------------------------------------------------
+
+SAME = {"ERR": 0.154}, {"ERR": 0.062}
+OTHER = {"ERR": 0.2}, {"ERR": 0.062}
+
+
+@pytest.mark.parametrize(
+    ("change", "ends", "sentence"),
+    [
+        (
+            BETTER,
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). On others by 7.1 "
+            "to 11.0 points.",
+        ),
+        (
+            WORSE,
+            OTHER,
+            "new is worse than old: by 9.2 points (91 frames). On others by 7.1 to 11.0 points.",
+        ),
+        (UNSURE, OTHER, "new is better than old: by 3.3 points (91 frames). This may be chance."),
+        (
+            replace(BETTER, p_holm=0.06, comparisons=5),
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). This may be "
+            "chance, as 5 masks are compared.",
+        ),
+        (
+            ONE_SCENE,
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). One drive says "
+            "little about others: 6 drives would tell.",
+        ),
+        (
+            SHORT,
+            OTHER,
+            "new is better than old: by 3.3 points (3 frames). 3 frames are too few for an "
+            "interval (10 are needed).",
+        ),
+        (ZERO, SAME, "new is exactly as good as old (91 frames)."),
+        (replace(ZERO, units=0), SAME, "Nothing to compare: ERR is undefined on every frame."),
+        (
+            replace(OF_DRIVES, groups=7, better=7, worse=1),
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (8 drives in 7 groups, better "
+            "on 7, worse on 1). On others by 7.1 to 11.0 points.",
+        ),
+    ],
+)
+def test_a_comparison_says_what_is_better_by_how_much_and_whether_elsewhere(change, ends, sentence):
+    assert describe_change(change, "new", "old", ends) == sentence
