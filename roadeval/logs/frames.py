@@ -212,12 +212,13 @@ def settle(
             pairing = by_time(reader, camera, settings.sync_offset_ms if is_truth else 0.0)
             check_size(label_topic.size, reader, 0, camera, pairing)
             values = MaskSettings(labels=config.labels if is_truth else LabelSettings())
-            meaning = meaning_of(reader, values, shown="shadow" if name == SHADOW else "road")
+            shown = "shadow" if name == SHADOW else "road"
+            meaning = meaning_of(reader, values, shown=shown)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     calibration = calibration_of(image, topics, readers)
     if any(calibration) and image.turned != 1 and camera.images.limits.turn:
-        turned = "it is of the sensor's rows, and the images are turned ("
-        calibration = None, Sentence("{}{frames.unturned})", turned)
+        reason = "it is of the sensor's rows, and the images are turned ({frames.unturned})"
+        calibration = None, Sentence(reason)
     ground, ground_why = ground_of(calibration[0], config.ground, image.size)
     if any(config.ground.distortion) and is_rectified(image.name):
         rectified = " is applied although the topic's name says rectified"

@@ -222,7 +222,7 @@ class Log:
         return replace(selection, labels={**selection.labels, **masks})
 
     def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> LabelSource:
-        """Read masks that lie beside the log; sentences on them name their variant's settings."""
+        """Read masks that lie beside the log; their messages name the settings of their variant."""
 
         def of_variant(setting: str) -> Setting:
             table, _, key = setting.partition(".")

@@ -27,7 +27,7 @@ Variant = Annotated[
     str | None,
     arguments.option(
         "--variant",
-        "Variant by which frames rank; by default what you brought, else `filtered`.",
+        "Variant by which frames rank. Default: what you brought, else filtered.",
         "NAME",
     ),
 ]

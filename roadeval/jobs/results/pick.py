@@ -210,8 +210,7 @@ def _pick_frames(drive: DriveResult, request: _Request) -> PickedFrames:
     _write_picks(drive, picks, [(frame, masks[frame.frame]) for frame in new], request)
     log = drive.facts.log
     repeats = request.folder / RUN if request.run else drive.path
-    name = log.path if log else drive.name
-    return PickedFrames(request.folder, picks, len(new), name, repeats)
+    return PickedFrames(request.folder, picks, len(new), log.path if log else drive.name, repeats)
 
 
 def _read_picks(drive: DriveResult, doubts: pd.DataFrame, variant: str, request: _Request) -> Picks:

@@ -104,9 +104,6 @@ def replay_fleet(
     if config.fleet.folds is not None and config.training.model is not None:
         problem = Sentence("does not go with {training.model}: folds train models")
         raise FleetError(problem, setting="fleet.folds")
-    if config.fleet.folds is not None and config.training.model is not None:
-        problem = Sentence("does not go with {training.model}: folds train models")
-        raise FleetError(problem, setting="fleet.folds")
     writer = FleetWriter(Path(output))
     writer.begin()
     run = FleetRun(

@@ -102,8 +102,7 @@ class Failures:
         for failures in self.by_error.values():
             frames = first_of([str(failure.frame) for failure in failures], KEPT)
             where = f"{len(failures)} frames ({frames})" if len(failures) > 1 else f"frame {frames}"
-            first = failures[0]
-            yield Sentence("{}: variant {}: {}", where, first.variant, first.reason)
+            yield Sentence("{}: variant {}: {}", where, failures[0].variant, failures[0].reason)
 
 
 SPARSE: Final = 5

@@ -301,12 +301,12 @@ def versions() -> dict[str, str]:
 def warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield what a user should know before believing the results."""
     if missing := run.selection.no_truth:
-        unlabelled = "there is no road truth to score against, only masks to look at: {}"
-        yield Sentence(unlabelled, missing)
+        no_truth = "there is no road truth to score against, only masks to look at: {}"
+        yield Sentence(no_truth, missing)
         yield from _ranking_warnings(run)
     yield from _label_warnings(run)
     yield from (str(damage) for damage in run.log.damage if not damage.lossy)
-    yield from (Sentence("{}: {}", run.selection.image.name, note) for note in run.selection.notes)
+    yield from (Sentence("{}: {}", run.selection.image.name, n) for n in run.selection.notes)
     yield from run.frames.accounting.notes
     yield from _size_warnings(run)
     yield from _network_warnings(run)

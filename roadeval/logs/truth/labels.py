@@ -59,8 +59,8 @@ NO_LABEL: Final = "values below 0 mean no label, and are ignored"
 _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
 """The values of masks that need no settings, and their meaning."""
 TWO_KINDS: Final = Sentence(
-    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what "
-    "means road with {labels.road}, both where both do"
+    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road "
+    "with {labels.road}, both where both do"
 )
 NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
@@ -507,9 +507,8 @@ def meaning_of(
 ) -> Meaning:
     """Find the meaning of labels by looking at some; check the size of labels beside the log, too.
 
-    Masks show road, or what ``shown`` is.
-
-    A `LogError` if their values have no clear meaning.
+    The masks show road, or what ``shown`` names. A `LogError` if their values have no clear
+    meaning.
     """
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []

@@ -138,8 +138,7 @@ def find_keys(
     shown = {label.path: shown_name(label.path, name) for label in origin.labels}
     names = {path: text for path, text in shown.items() if match_name(settings.names, text)}
     if not names:
-        theirs = first_names([*shown.values()])
-        problem = f"no label has a name as {settings.names}: {theirs}"
+        problem = f"no label has a name as {settings.names}: {first_names([*shown.values()])}"
         raise LogError(problem, where=name, setting="truth.names")
     images: list[Path] | None = None
     if settings.images is not None:
