@@ -164,7 +164,7 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
         for stage in _stages_of(chain)
     }
     pipeline = Pipeline(tuple(chain), settings)
-    for stage in pipeline.heard():
+    for stage in pipeline.heard_stages():
         if stage.fit is not None:
             problem = f"{stage.name} is trained; a later stage cannot train on its output"
             raise ConfigError(problem, where="chain")
@@ -260,7 +260,7 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     before: tuple[str, ...] = ("given",)
     settings = {"given": {"name": name}}
     if method is not None:
-        if learning := [stage for stage in method.learning() if stage != "threshold"]:
+        if learning := [stage for stage in method.learning_stages() if stage != "threshold"]:
             raise ConfigError(
                 f"{name} is trained itself ({', '.join(learning)}), so its output on its training "
                 "frames is over-confident",

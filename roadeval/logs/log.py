@@ -18,7 +18,7 @@ from roadeval.images.formats import Limits
 from roadeval.logs.container.file import Container, Damage, containers_in, damage_of
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, LogError, UnclearLabelsError
-from roadeval.logs.files import check_content, files_of
+from roadeval.logs.files import content_problem, files_of
 from roadeval.logs.frames import (
     TRUTH,
     FrameStream,
@@ -58,7 +58,8 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
         opened, source, path = path.file, path.source, path.path
-        check_content(path, opened)
+        if problem := content_problem(path, opened):
+            raise LogError(problem, where=path)
         files, damage = [path], list[Damage]()
     else:
         opened, source, path = None, str(path), Path(path)

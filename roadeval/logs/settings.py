@@ -16,7 +16,7 @@ from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import Checked, Flag
-from roadeval.runtime.text import elided
+from roadeval.runtime.text import elide
 
 NS: Final = 1_000_000_000
 _EPOCH: Final = datetime.fromisoformat("1970-01-01T00:00:00+00:00")
@@ -50,7 +50,7 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         if seconds_text or fraction:
             return start_ns + int(seconds_text or 0) * NS + int(fraction[:9].ljust(9, "0"))
     raise LogError(
-        f"{elided(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
+        f"{elide(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
         "2013-05-01T12:00:00Z"
     )
 

@@ -18,7 +18,7 @@ from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.runtime.text import visible
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.threads import map_ordered
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +103,11 @@ class Network:
             values = scores[number].astype(np.float32)
             return resize_to_frame(values, frame, settings, cv2.INTER_LINEAR)
 
-        def coded(shares: Values) -> Probability:
+        def encode(shares: Values) -> Probability:
             return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
 
         total, single = road_probability(plane, len(scores), settings)
-        return coded(total), [*map(coded, single)]
+        return encode(total), [*map(encode, single)]
 
 
 HUGE: Final = 3e4
@@ -330,7 +330,7 @@ def _samples(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
         return arrays
 
     # In a thread, so that a signal is heard meanwhile.
-    by_output = [*zip(*ordered(run, make_test_images(settings), 1), strict=True)]
+    by_output = [*zip(*map_ordered(run, make_test_images(settings), 1), strict=True)]
     for name, arrays in zip(outputs, by_output, strict=True):
         if len({array.shape for array in arrays}) > 1:
             raise file.error(_VARIES.format(name, arrays[1].shape, arrays[0].shape))

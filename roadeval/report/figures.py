@@ -26,8 +26,8 @@ from roadeval.report.chart import FAINT, thinned
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.images import ExampleFrame, finest_jpeg, pictures_of
 from roadeval.report.pdf.typeset import figure_as
-from roadeval.runtime.text import elided, visible
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.text import elide, visible
+from roadeval.runtime.threads import map_ordered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,7 +96,7 @@ def write_figures(
     # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
     # and beside the drawing of the next figure; Matplotlib's own ways draw a figure once for each,
     # and take ten times as long.
-    return [path for files in ordered(partial(_write, folder), drawn(), 1) for path in files]
+    return [path for files in map_ordered(partial(_write, folder), drawn(), 1) for path in files]
 
 
 def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
@@ -183,7 +183,7 @@ def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> 
     axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     axes[-1].set_xlabel("frame")
     handles, names = (found[::-1] for found in axes[0].get_legend_handles_labels())
-    names = [elided(_LABELS.get(name, name), _WIDEST) for name in names]
+    names = [elide(_LABELS.get(name, name), _WIDEST) for name in names]
     columns = 100 // (max(map(len, names)) + 10)
     axes[0].legend(
         handles,
@@ -241,7 +241,7 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
             sides = left / WIDTH, 1 - bottom / total, right / WIDTH, 1 - top / total
             Picture(figure, picture, Bbox.from_extents(*sides))
             if number == 0:
-                name = elided(title, max(int(11 * across), 3))
+                name = elide(title, max(int(11 * across), 3))
                 above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
                 write((left + right) / 2, TOP - GAP, name, **above)
     return figure

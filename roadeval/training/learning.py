@@ -21,7 +21,7 @@ from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.scene import expose_by_patch, reach, scene_of, stretch
 from roadeval.pipeline.stage import Output, TrainingSet, View
 from roadeval.runtime.sentence import Sentence
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.threads import map_ordered
 from roadeval.training.model import Model, load_cached_model
 from roadeval.training.settings import TrainingSettings
 
@@ -53,7 +53,7 @@ def fit(
     no road at all. The frames have truth, unless ``settings.source`` allows the patch. ``base`` is
     the model of other drives: stages that can learn further do so, the others stay unchanged.
     """
-    learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
+    learning = [name for name, pipeline in pipelines.items() if pipeline.learning_stages()]
     if learning and not frames:
         raise TrainingError("there is no frame to train on in the selected range")
     truths = [frame.truth for frame in frames if frame.truth is not None]
@@ -92,10 +92,10 @@ def fit(
             learnt = base.parameters.get(name, {}) if base else {}
             return fit_stages(frames, drawn, pipelines[name], learnt)
 
-        parameters |= zip(learning, ordered(learn, learning, _AT_ONCE), strict=True)
+        parameters |= zip(learning, map_ordered(learn, learning, _AT_ONCE), strict=True)
     return Model(
         parameters,
-        {name: pipeline.relevant() for name, pipeline in pipelines.items()},
+        {name: pipeline.relevant_settings() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
         pixels,
@@ -112,7 +112,7 @@ def fit_stages(
     its outputs.
     """
     parameters = dict(base)
-    heard = pipeline.heard()
+    heard = pipeline.heard_stages()
     for stage in pipeline.stages():
         settings = pipeline.settings[stage.name]
         if stage.fit is not None and stage.name not in base:
@@ -248,7 +248,7 @@ def from_log(
     ``base`` is a model of other drives, to learn further. With ``picks`` the frames picked by rank
     train.
     """
-    learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
+    learning = [name for name, pipeline in pipelines.items() if pipeline.learning_stages()]
     if not learning:
         return fit((), pipelines, settings), Schedule(picks=picks)
     if not settings.frames:

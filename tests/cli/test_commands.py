@@ -1,4 +1,4 @@
-"""``roadeval train`` in a terminal."""
+"""The commands `train`, `info` and `replay`: what they hand on, and what they say."""
 
 import cv2
 import numpy as np

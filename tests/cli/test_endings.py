@@ -1,4 +1,4 @@
-"""However a command ends: one line on stderr, no traceback, and the exit code for it."""
+"""However a command ends: a line on stderr, its exit code; signals, and streams that are closed."""
 
 import errno
 import json

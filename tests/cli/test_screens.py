@@ -1,4 +1,4 @@
-"""The result of a replay on one screen."""
+"""The result of a replay on one screen; progress at a terminal and elsewhere."""
 
 import io
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A mistake that no file can change is wrong usage: exit code 2."""
+"""Wrong usage, which no file can change: exit code 2; help and version at once."""
 
 import os
 import subprocess

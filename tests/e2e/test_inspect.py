@@ -1,4 +1,4 @@
-"""``roadeval inspect``: the worst frames, and the real viewer at one of them."""
+"""``roadeval inspect`` of a drive and of a fleet: the worst frames, and the viewer at one."""
 
 import json
 import shlex

@@ -1,4 +1,4 @@
-"""Which drives words name: logs, folders, rosbag2 folders, globs, URLs, manifests."""
+"""Which drives words name: logs, folders, globs, URLs, manifests; and the folds of them."""
 
 import os
 from dataclasses import replace

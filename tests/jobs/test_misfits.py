@@ -1,4 +1,4 @@
-"""What does not fit the images is the verdict's first sentence, and its remedy mends it."""
+"""What does not fit the images: told first, with what mends it; frames of several sizes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The main job, on a small log of our own."""
+"""The main job, on a small log of our own: outputs, identity, training of several."""
 
 import shutil
 from pathlib import Path

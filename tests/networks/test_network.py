@@ -1,4 +1,4 @@
-"""A network's mask: the one that NumPy computes, in the frame's size."""
+"""A network's mask, the one that NumPy computes; what is read of its file, and asked for."""
 
 from concurrent.futures import ThreadPoolExecutor
 

@@ -42,7 +42,7 @@ from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, reuse, trim
 from roadeval.runtime.sentence import Sentence
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.threads import map_ordered
 from roadeval.training import learning
 from roadeval.training.learning import Schedule
 from roadeval.training.model import Model, ModelError
@@ -387,7 +387,7 @@ def process(
 
     workers = runs[0].config.run.jobs or os.cpu_count() or 1
     work = partial(_process, encoder)
-    for position, (run, done) in enumerate(ordered(work, numbered(), workers), 1):
+    for position, (run, done) in enumerate(map_ordered(work, numbered(), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
             trim()

@@ -11,7 +11,7 @@ from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
 from roadeval.evaluation.score.scoreboard import DriveSums
-from roadeval.evaluation.tables import joined
+from roadeval.evaluation.tables import concatenate
 from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -179,7 +179,7 @@ def _finish_recording(
         recorder.finish(ended[0].texts)
         return ended[0].facts
     by_camera = {run.camera: end for run, end in zip(runs, ended, strict=True)}
-    frames = joined([end.sums.frames for end in ended])
+    frames = concatenate([end.sums.frames for end in ended])
     camera_facts = {name: end.facts for name, end in by_camera.items()}
     facts = summary.join_cameras(frames, camera_facts, results.tables)
     # The seconds differ from run to run, see `_recorded_texts`.

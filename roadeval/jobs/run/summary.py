@@ -219,7 +219,7 @@ def _best_thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
         stages = variant.pipeline.settings
         post = stages[FINAL_STAGE]
         is_final = all(getattr(post, key) == value for key, value in AS_IT_IS.items())
-        if is_final and not variant.pipeline.learning():
+        if is_final and not variant.pipeline.learning_stages():
             net = stages.get("net")
             lines_of[variant.name] = 0.5
             if net is not None and net.threshold is not None:
@@ -405,7 +405,7 @@ def _tuning_warnings(run: Run) -> Iterator[str]:
     for variant in run.variants:
         if "threshold" in variant.pipeline.settings:
             yield f"{variant.name}: its threshold is the one with the fewest errors on {where}"
-        elif variant.pipeline.heard():
+        elif variant.pipeline.heard_stages():
             method = variant.name.removesuffix(TUNED)
             yield (
                 f"{variant.name}: learnt on {where}, on top of what {method} says: its rates are "

@@ -1,4 +1,4 @@
-"""Which topics are picked, and when the user is asked."""
+"""Which topics are picked, when the user is asked, and which truth is which camera's of a rig."""
 
 from collections.abc import Mapping
 from dataclasses import replace

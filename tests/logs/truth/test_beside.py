@@ -61,9 +61,9 @@ def select(drive: Path, path: Path, *road: int | str, resize: bool = False, **pl
         return selection, [frame.number for frame in frames if frame.labelled], frames
 
 
-def refusal(*given: Any, **place: Any) -> LogError:
+def refusal(*arguments: Any, **place: Any) -> LogError:
     with pytest.raises(LogError) as caught:
-        select(*given, **place)
+        select(*arguments, **place)
     assert "\n" not in str(caught.value)
     return caught.value
 
@@ -156,8 +156,8 @@ def test_another_size_is_refused_or_scaled(drive, tmp_path):
 
 def test_a_damaged_file_among_many_loses_its_frame(drive, tmp_path):
     path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
-    whole = (path / "3.png").read_bytes()
-    (path / "3.png").write_bytes(whole[:50])
+    content = (path / "3.png").read_bytes()
+    (path / "3.png").write_bytes(content[:50])
     run, summary = replay(drive, path)
     assert run.returncode == 3
     assert f"lost: frame 3: {path / '3.png'}: " in run.stderr
@@ -187,8 +187,8 @@ def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
 @pytest.mark.parametrize("name", ["coco/labelformat.json", "cvat/annotations.xml"])
 @pytest.mark.parametrize("share", [0.3, 0.9])
 def test_a_file_that_ends_early_is_refused_alone_or_beside_another(tmp_path, name, share):
-    whole = (LABELS / name).read_text()
-    path = written(tmp_path / "truth", f"b.{name[-4:]}", whole[: int(share * len(whole))])
+    content = (LABELS / name).read_text()
+    path = written(tmp_path / "truth", f"b.{name[-4:]}", content[: int(share * len(content))])
     for place in (path, path.parent):
         with pytest.raises(LogError, match=r"it is no (JSON|XML), or ends early \(line \d+, col"):
             labels_in(place, SIZE)
@@ -206,7 +206,7 @@ def test_a_note_or_a_hidden_file_beside_label_images_is_no_label(drive, tmp_path
 
 
 def test_labels_lie_below_a_list_of_names(drive, tmp_path):
-    """As Label Studio exports them."""
+    """Label Studio exports labels in this way."""
     path = tmp_path / "export"
     shutil.copytree(LABELS / "yolo" / "labels", path / "labels")
     images(path / "images", "frame_0000.png")

@@ -1,4 +1,4 @@
-"""What the values of a label image mean."""
+"""The meaning of the values of a label image."""
 
 import io
 import subprocess
@@ -53,8 +53,8 @@ def test_values_that_mean_road_in_some_pictures_and_ignored_in_others_are_asked_
     """Two annotators' labels in one folder: 255 would be ignored in half of them."""
     with pytest.raises(LogError, match=r"/mask holds the values 0 1 255; 255 is road in masks of"):
         understand(LabelSettings(), pictures, "/mask")
-    given = understand(LabelSettings(road=(1, 255)), pictures, "/mask")
-    assert given.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
+    meaning = understand(LabelSettings(road=(1, 255)), pictures, "/mask")
+    assert meaning.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
 
 
 @pytest.mark.parametrize(
