@@ -315,7 +315,7 @@ def test_a_model_is_refused_with_another_network(folder, tmp_path):
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        ("other", "there is no such method; choose mine"),
+        ("other", "there is no method other; choose mine"),
         ("unfiltered", "is trained itself (trees)"),
     ],
 )
