@@ -207,20 +207,20 @@ def test_a_model_and_training_frames_do_not_go_together(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("--road-label 3 --road-label 70000", "--road-label: item 2 must be at most 65535"),
         (f"--road-label {'9' * 5000}", "--road-label: item 1 must be a whole number"),
         ("--every 0", "--every: must be at least 1 (given: 0)"),
     ],
 )
-def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
+def test_a_value_that_cannot_be_is_named_by_its_flag(words, message, capsys):
     assert main(["replay", "d.mcap", *words.split()]) == 2
-    assert f"roadeval: error: {said}" in capsys.readouterr().err
+    assert f"roadeval: error: {message}" in capsys.readouterr().err
 
 
 def test_every_option_s_words_are_a_setting_s_value(job):
-    """The help's flags and the settings' names belong together, each once."""
+    """Every option of the help sets another setting."""
     assert main(["replay", "d.mcap", "--model", "city.model"]) == 0
     assert job["config"].training.model == "city.model"
     flags = [flag for option in OPTIONS for flag in option.flags]

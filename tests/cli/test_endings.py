@@ -180,10 +180,10 @@ def run(talk, redirected="", **environment):
         "sys.exit(app.main())"
     )
     shell = f'"$0" "$@" {redirected}'
-    known = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    variables = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     return subprocess.run(
         ["/bin/sh", "-c", shell, sys.executable, "-c", program],
-        env=known | {"PYTHONPATH": os.pathsep.join(sys.path)} | environment,
+        env=variables | {"PYTHONPATH": os.pathsep.join(sys.path)} | environment,
         capture_output=True,
         timeout=60,
         check=False,

@@ -310,7 +310,7 @@ def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_
             "frames": {"every": 2, "end": "20"},
         }
     )
-    first, second = (each.config(run) for each in entries(TOML))
+    first, second = (entry.config(run) for entry in entries(TOML))
     assert (first.topics.image, first.topics.masks) == ("/left", {"net": "/net"})
     assert first.topics.truth == "/truth"
     assert (first.labels.road, first.labels.ignore) == ((3, 7), ())
@@ -337,7 +337,10 @@ def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_
         ("[[drives]]\npath = 'a'\nframes = { evry = 3 }", r"frames\.evry: there is no such"),
         ("[[drives]]\npath = 'a'\nframes = { every = 0 }", r"frames\.every: must be at least 1"),
         ("[[drives]]\npath = 'a'\nlabels = 3", r"labels: must be a table"),
-        ("[[drives]]\npath = 'a'\nlabels = {ignore = [3]}", r"ignore: needs drives\.labels\.road"),
+        (
+            "[[drives]]\npath = 'a'\nlabels = {ignore = [3]}",
+            r"labels\.ignore: needs drives\.labels\.road",
+        ),
         ("[[drives]]\npath = 'a'\ntraining = {}", "training: there is no such setting"),
         ('[[drives]]\npath = "a\\u0000"', "holds a zero byte"),
     ],

@@ -115,7 +115,7 @@ def test_names_of_no_image_are_refused_with_three_of_each(drive, tmp_path):
 
 
 @pytest.mark.parametrize("path", shared("failures"))
-def test_shared_labels_in_wrong_forms_meet_their_frames_or_are_refusal(path):
+def test_shared_labels_in_wrong_forms_meet_their_frames_or_are_refused(path):
     log, labels = path / "labels" / "bare.mcap", path / "labels"
     lacking = select(log, labels / "lab1m")[1]
     assert lacking == [number for number in range(30) if number != 15]
