@@ -242,19 +242,19 @@ class TableOfContents(Block):
 
 
 @dataclass(frozen=True)
-class Document(Block):
-    """A document."""
+class Report(Block):
+    """A report of sections, or a single figure without ``footer``."""
 
-    kicker: str
-    """The line above the title."""
     title: str
     subtitle: str
     """The line below the title."""
-    footer: str
-    """Printed at the foot of every page."""
     blocks: Sequence[Block]
+    kicker: str = ""
+    """The line above the title."""
+    footer: str = ""
+    """The line at the foot of every page."""
     keywords: Sequence[str] = ()
-    """Of the file."""
+    """Keywords of the file."""
 
     def files(self) -> Mapping[str, bytes]:
         """Return every image file's bytes by its name."""

@@ -154,6 +154,8 @@ class Chart:
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     """Ends of the axes; by default as the numbers are."""
+    spaced_marks: bool = False
+    """Whether lines of many points have marks here and there, rather than none."""
     sums: int = 0
     """How many of the last names sum up the others; a rule sets them apart."""
 

@@ -22,9 +22,9 @@ from roadeval.report.blocks import (
     Block,
     BulletList,
     Cell,
-    Document,
     Figure,
     Heading,
+    Report,
     Table,
     TableOfContents,
     Text,
@@ -63,7 +63,7 @@ def document(
     judgements: Sequence[Judgement],
     over_drive: Sequence[Chart],
     inspect: Inspect | None = None,
-) -> Document:
+) -> Report:
     """Return a comparison as a document.
 
     ``judgements`` are of the limits that were set, ``over_drive`` has the rates of the masks over
@@ -71,7 +71,7 @@ def document(
     label; None: no commands.
     """
     labels = [each.label for each in comparison.results]
-    return Document(
+    return Report(
         kicker="roadeval comparison",
         title=listing(labels),
         subtitle="; ".join(map(_about, comparison.results)),

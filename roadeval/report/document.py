@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Final
 
 from roadeval.data.words import number
-from roadeval.report.blocks import Block, Document
+from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
 from roadeval.report.sections import drive, drives, frames, ground, provenance, rig, summary
 from roadeval.report.sections.frames import FrameBrowser
@@ -27,7 +27,7 @@ RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
 """The sections of several cameras of a drive."""
 
 
-def document(findings: Findings | FleetFolder) -> Document:
+def document(findings: Findings | FleetFolder) -> Report:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFolder):
         parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
@@ -42,7 +42,7 @@ def document(findings: Findings | FleetFolder) -> Document:
 
 def page_document(
     findings: Findings | FleetFolder, browsed: FrameBrowser | None, worst_frames: int = 0
-) -> Document:
+) -> Report:
     """Return the report as a page: with a browser of frames, or a table of all drives.
 
     That of many drives has at most so many of the worst frames.
@@ -57,9 +57,9 @@ def page_document(
     return _of(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
 
 
-def _of(findings: Findings | FleetFolder, *sections: Section) -> Document:
+def _of(findings: Findings | FleetFolder, *sections: Section) -> Report:
     of_fleet = isinstance(findings, FleetFolder)
-    return Document(
+    return Report(
         kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,
         subtitle=", ".join(_subtitle(findings)),

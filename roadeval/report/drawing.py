@@ -16,7 +16,7 @@ from typing import Any, Final
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
-"""Up to this many points of a line each has a mark."""
+"""Most marks along a line: a line with more points has none, or spaced ones."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -166,7 +166,9 @@ def drawn(chart: Chart, frames: Span | None = None) -> Drawing:
         zero=y.percent(0) if y.low < 0 < y.high else None,
         level=y.down(level.value) if level else None,
         band=band,
-        shapes=() if is_rows else [_shape(each, x, y) for each in chart.series],
+        shapes=()
+        if is_rows
+        else [_shape(each, x, y, spaced_marks=chart.spaced_marks) for each in chart.series],
         rows=[*_rows(chart, y)] if is_rows else (),
     )
 
@@ -199,7 +201,7 @@ def _values_span(chart: Chart) -> Span:
     return Span(low - room if low < 0 or not chart.from_zero else low, high + room)
 
 
-def _shape(series: Series, x: Span, y: Span) -> Shape:
+def _shape(series: Series, x: Span, y: Span, *, spaced_marks: bool) -> Shape:
     marks = [(x.percent(at), y.down(value)) for at, value in series.points()]
     seen = [(at, top) for at, top in marks if -0.5 <= at <= 100.5 and -0.5 <= top <= 100.5]
     runs: list[list[Point]] = [[]]
@@ -208,7 +210,8 @@ def _shape(series: Series, x: Span, y: Span) -> Shape:
             runs[-1].append((x.percent(at), y.down(value)))
         elif runs[-1]:
             runs.append([])
-    shown = seen if len(marks) <= MARKED else ()
+    step = -(-len(marks) // MARKED)
+    shown = seen[:: step or 1] if step <= 1 or spaced_marks else ()
     return Shape(series.name, series.look, [run for run in runs if run], marks=shown)
 
 

@@ -1,69 +1,39 @@
-"""The paper's figures 2, 3a and 3b as files, drawn by Matplotlib. No screen is needed.
+"""The paper's figures 2, 3a and 3b as files: blocks of a report, each on a page of its own size.
 
-Equal figures give equal files, byte for byte. Importing this takes a third of a second, so import
-it only to draw.
+Equal figures give equal files, byte for byte.
 """
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from io import BytesIO
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final, Literal
 
-import matplotlib as mpl
-from matplotlib.figure import Figure
-from matplotlib.image import FigureImage
-from matplotlib.ticker import MaxNLocator, StrMethodFormatter
-from matplotlib.transforms import Bbox, TransformedBbox
-
-from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, Rgb, as_plain
+from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, as_plain
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import finals, values_of
-from roadeval.report.chart import FAINT, thinned
+from roadeval.report.blocks import Figure, Report
+from roadeval.report.chart import Chart, thinned
 from roadeval.report.charts.standard import over_windows
-from roadeval.report.images import ExampleFrame, finest_jpeg, pictures_of
-from roadeval.report.pdf.typeset import figure_as
-from roadeval.runtime.text import elided, visible
-from roadeval.runtime.threads import ordered
+from roadeval.report.images import ExampleFrame, example_grid
+from roadeval.report.pdf.typeset import typeset
+from roadeval.runtime.text import elided
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DPI: Final = 200
-WIDTH: Final = 8
-"""Inches across a figure."""
-LETTERS: Final = 9
-SMALL: Final = 8
-"""Points of labels and legends, and of the ticks' labels."""
-INK: Final = "#222222"
-RC: Final[dict[str, Any]] = {
-    "font.family": "DejaVu Sans",
-    "font.size": LETTERS,
-    "axes.labelsize": LETTERS,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": "#333333",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "grid.color": "#E3E3E3",
-    "grid.linewidth": 0.8,
-    "axes.axisbelow": True,
-    "xtick.color": "#333333",
-    "ytick.color": "#333333",
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "legend.frameon": False,
-    "legend.fontsize": LETTERS,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "roadeval",
-    "text.parse_math": False,  # a dollar in a name is no formula
-    "savefig.facecolor": "white",
+PIXELS_PER_INCH: Final = 230
+"""Resolution of the PNG files: some 1600 pixels across."""
+CROWDED: Final = 150
+"""More windows than this are drawn as means of neighbours."""
+_LABELS: Final = {
+    FILTERED: "filtered: with the shadow filter",
+    UNFILTERED: "unfiltered: without it",
+    BASELINE: "blind: never looks at the image",
 }
-"""Matplotlib's settings for every figure; in an SVG, and so in a PDF, text stays text."""
+_LONGEST: Final = 80
+"""Letters of a variant's name that fit in a line."""
 
 
 def write_figures(
@@ -77,215 +47,64 @@ def write_figures(
 
     The folder is made if it is not there. ``windows`` are as in ``windows.csv``, of any number of
     variants, without a row where there is no truth; ``examples`` are a few frames, for figure 2;
-    ``camera`` is which one of a rig, for titles and the files' names. An
+    ``camera`` is the name of a camera of a rig, for titles and the files' names. An
     OSError if the folder cannot be written to; a `ReportError` if the system's folder for temporary
     files cannot be.
     """
     folder.mkdir(parents=True, exist_ok=True)
     drive = f"{drive}, {camera}" if camera else drive
     ending = f"-{as_plain(camera)}" if camera else ""
-
-    def drawn() -> Iterator[tuple[str, bytes]]:
-        with mpl.rc_context(RC):  # type: ignore[arg-type]
-            if examples:
-                yield f"fig2_masks{ending}", svg(road_masks(drive, examples))
-            if len(windows):
-                yield f"fig3a_error_rate{ending}", svg(error_rate(drive, windows))
-                yield f"fig3b_fp_fn_rate{ending}", svg(fp_fn_rate(drive, windows))
-
-    # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
-    # and beside the drawing of the next figure; Matplotlib's own ways draw a figure once for each,
-    # and take ten times as long.
-    return [path for files in ordered(partial(_write, folder), drawn(), 1) for path in files]
+    figures = {"fig2_masks": road_masks(drive, examples)} if examples else {}
+    if len(windows):
+        figures["fig3a_error_rate"] = error_rate(drive, windows)
+        figures["fig3b_fp_fn_rate"] = fp_fn_rate(drive, windows)
+    kinds: tuple[Literal["png", "pdf"], ...] = ("png", "pdf")
+    files = {(name, kind): folder / f"{name}{ending}.{kind}" for name in figures for kind in kinds}
+    for (name, kind), path in files.items():
+        path.write_bytes(typeset(figures[name], kind, PIXELS_PER_INCH))
+    return [*files.values()]
 
 
-def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
-    name, drawing = figure
-    files = {
-        folder / f"{name}.png": figure_as("png", drawing, DPI),
-        folder / f"{name}.pdf": figure_as("pdf", drawing),
-    }
-    for path, content in files.items():
-        path.write_bytes(content)
-    return list(files)
-
-
-def svg(figure: Figure) -> bytes:
-    """Return a figure as SVG."""
-    content = BytesIO()
-    figure.savefig(content, format="svg", dpi=DPI, metadata={"Date": None})
-    return content.getvalue()
-
-
-MARKED: Final = 25
-"""Up to this many points each has its marker; beyond, about as many do."""
-CROWDED: Final = 150
-"""More windows than this are drawn as means of neighbours."""
-_LABELS: Final = {
-    FILTERED: "filtered: with the shadow filter",
-    UNFILTERED: "unfiltered: without it",
-    BASELINE: "blind: never looks at the image",
-}
-_DASHES: Final = {
-    "solid": "-",
-    "dashed": (0, (5, 2)),
-    "dotted": (0, (1, 1.4)),
-    "dash-dotted": (0, (7, 2, 1.5, 2)),
-}
-_MARKS: Final = {"circle": "o", "square": "s", "triangle": "^", "diamond": "D", "cross": "x"}
-_WIDEST: Final = 80
-"""Letters that have room in a line of a figure, with a legend's lines beside them."""
-
-
-def error_rate(drive: str, windows: pd.DataFrame) -> Figure:
-    """Draw figure 3a of the paper: the error rate over the drive, in rows of ten frames."""
-    return _over_drive(f"Error rate on {drive}", windows, {TESTED: "Error rate (ERR)"})
-
-
-def fp_fn_rate(drive: str, windows: pd.DataFrame) -> Figure:
-    """Draw figure 3b of the paper: both kinds of error over the drive, in rows of ten frames."""
-    rates = {
-        "FPR": "False positives (FPR)\nnon-road called road",
-        "FNR": "False negatives (FNR)\nroad not found",
-    }
-    return _over_drive(f"False positive and false negative rate on {drive}", windows, rates)
-
-
-def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> Figure:
-    """Draw rates of each variant's final mask, each with its label, one below the other."""
-    charts = over_windows(windows, [*rates])
-    figure = Figure(figsize=(WIDTH, 1.9 + 2 * len(charts)), layout="constrained")
-    figure.suptitle(visible(title), x=0.012, ha="left", size=11, weight="bold", color=INK)
-    axes = figure.subplots(len(charts), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, chart, label in zip(axes, charts, rates.values(), strict=True):
-        ax.set_ylabel(label)
-        for series in reversed(chart.series):
-            few, look = thinned(series, CROWDED), series.look
-            ax.plot(
-                few.x,
-                few.y,
-                color=look.colour,
-                linestyle=_DASHES[look.dash],
-                linewidth=1.8,
-                marker=_MARKS[look.mark],
-                markerfacecolor="white" if look.hollow else look.colour,
-                markersize=5,
-                markevery=-(-len(few.x) // MARKED),
-                clip_on=False,
-                label=series.name,
-            )
-        highest = max([y for series in chart.series for _, y in series.points()], default=None)
-        if highest is None:
-            ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
-        ax.set_ylim(0, max(1.08 * (highest or 0), 0.5))
-        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
-    axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
-    axes[-1].set_xlabel("frame")
-    handles, names = (found[::-1] for found in axes[0].get_legend_handles_labels())
-    names = [elided(_LABELS.get(name, name), _WIDEST) for name in names]
-    columns = 100 // (max(map(len, names)) + 10)
-    axes[0].legend(
-        handles,
-        names,
-        title=_subtitle(windows),
-        title_fontproperties={"size": 8.5},
-        alignment="left",
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        borderaxespad=0.2,
-        borderpad=0,
-        ncols=min(max(columns, 1), 3),
-        handlelength=3.4,
-    ).get_title().set_color(FAINT)
-    figure.align_ylabels(axes)
-    return figure
-
-
-def _subtitle(windows: pd.DataFrame) -> str:
-    stages = ", ".join(values_of(finals(windows), "stage"))
-    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // CROWDED)
-    each = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
-    return f"Final mask ({stages}); each point is the mean of {each}; lower is better"
-
-
-LEFT: Final = 0.28
-TOP: Final = 0.78
-"""Inches left of and above the pictures, for the frames' numbers and the titles."""
-GAP: Final = 0.05
-"""Inches between pictures, and to what names them."""
-
-
-def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
-    """Draw figure 2 of the paper: the image, each variant's mask over it, and the truth over it."""
-    rows = [*pictures_of([example.small() for example in examples])]
-    height, width = rows[0]["camera image"].shape[:2]
-    across = (WIDTH - LEFT) / len(rows[0])
-    down = (across - GAP) * height / width + GAP
-    total = TOP + down * len(rows) + GAP
-    figure = Figure(figsize=(WIDTH, total))
-
-    def write(x: float, y: float, text: str, **look: Any) -> None:
-        figure.text(x / WIDTH, 1 - y / total, text, **look)
-
-    title = visible(f"Road masks on {drive}")
-    write(0.1, 0.1, title, size=11, weight="bold", color=INK, va="top")
-    write(0.1, 0.32, _legend(examples), size=8.5, color=FAINT, va="top")
-    for number, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
-        top, bottom = TOP + number * down, TOP + (number + 1) * down - GAP
-        name = f"frame {example.frame}" if down > 0.7 else str(example.frame)
-        beside = {"rotation": 90, "ha": "right", "va": "center", "size": SMALL, "color": FAINT}
-        write(LEFT - GAP, (top + bottom) / 2, name, **beside)
-        for column, (title, picture) in enumerate(pictures.items()):
-            left, right = LEFT + column * across, LEFT + (column + 1) * across - GAP
-            sides = left / WIDTH, 1 - bottom / total, right / WIDTH, 1 - top / total
-            Picture(figure, picture, Bbox.from_extents(*sides))
-            if number == 0:
-                name = elided(title, max(int(11 * across), 3))
-                above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
-                write((left + right) / 2, TOP - GAP, name, **above)
-    return figure
-
-
-def _legend(examples: Sequence[ExampleFrame]) -> str:
+def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Report:
+    """Return figure 2 of the paper: the image, and over it each variant's mask, and the truth."""
     ignored = any(e.truth is not None and (e.truth == IGNORE).any() for e in examples)
-    names = {name for e in examples for name in e.masks}
-    missing = any(names - e.masks.keys() for e in examples)
-    return (
+    names = {name for example in examples for name in example.masks}
+    missing = any(names - example.masks.keys() for example in examples)
+    legend = (
         "Green: road"
         + "; grey: ignored, counted nowhere" * ignored
         + "; faded: there is no mask of this frame" * missing
     )
+    grid = example_grid([example.small() for example in examples], finest=True)
+    return Report(f"Road masks on {drive}", legend, [grid])
 
 
-class Picture(FigureImage):
-    """An ``(H, W, 3)`` uint8 RGB image that fills a box, given in shares of its figure.
+def error_rate(drive: str, windows: pd.DataFrame) -> Report:
+    """Return figure 3a of the paper: the error rate over the drive, in rows of ten frames."""
+    return _over_drive(f"Error rate on {drive}", windows, [TESTED])
 
-    Matplotlib's own way takes some ten times as long: it brings a picture to size by filters that
-    show no difference here, and packs it into an SVG as PNG. Typst takes a JPEG into a PDF as it
-    is, and would unpack a PNG and pack it again.
-    """
 
-    def __init__(self, figure: Figure, image: Rgb, box: Bbox) -> None:
-        super().__init__(figure)
-        self._image = image
-        self.box = TransformedBbox(box, figure.transFigure)
-        self.set_data(image)
-        figure.add_artist(self)
+def fp_fn_rate(drive: str, windows: pd.DataFrame) -> Report:
+    """Return figure 3b of the paper: both kinds of error over the drive, in rows of ten frames."""
+    title = f"False positive and false negative rate on {drive}"
+    return _over_drive(title, windows, ["FPR", "FNR"])
 
-    def can_composite(self) -> bool:
-        """Return False: it stays a picture of its own, and is not made one with those beside it."""
-        return False
 
-    def draw(self, renderer: Any) -> None:
-        """Draw it into an SVG, as JPEG."""
-        content = base64.b64encode(finest_jpeg(self._image)).decode()
-        renderer.writer.element(
-            "image",
-            x=f"{self.box.x0:.6g}",
-            y=f"{renderer.height - self.box.y1:.6g}",
-            width=f"{self.box.width:.6g}",
-            height=f"{self.box.height:.6g}",
-            preserveAspectRatio="none",
-            attrib={"xlink:href": f"data:image/jpeg;base64,{content}"},
-        )
+def _over_drive(title: str, windows: pd.DataFrame, rates: Sequence[str]) -> Report:
+    """Return a chart a rate of each variant's final mask, one below the other."""
+    stages = ", ".join(values_of(finals(windows), "stage"))
+    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // CROWDED)
+    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    subtitle = f"Final mask ({stages}); each point is the mean of {point}; lower is better"
+    charts = [_for_paper(chart) for chart in over_windows(windows, rates)]
+    return Report(title, subtitle, [Figure(charts, "")])
+
+
+def _for_paper(chart: Chart) -> Chart:
+    """Return a chart with few points, whose legend says what the usual variants are."""
+    named = [
+        replace(series, name=elided(_LABELS.get(series.name, series.name), _LONGEST))
+        for series in chart.series
+    ]
+    few = [thinned(series, CROWDED) for series in named]
+    return replace(chart, series=few, spaced_marks=True)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from roadeval.data import TRUTH, LayerKind, LayerSpec, Mask, Rgb, Truth, colours, mask_spec
 from roadeval.data.arrays import Floats
 from roadeval.images.decoding import png_of
-from roadeval.report.blocks import ImageFile
+from roadeval.report.blocks import ImageFile, ImageGrid
 
 ROAD: Final = mask_spec("road", "road")
 EXAMPLE_WIDTH: Final = 400
@@ -84,27 +84,46 @@ def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
         yield found
 
 
+def example_grid(
+    examples: Sequence[ExampleFrame], caption: str = "", *, finest: bool = False
+) -> ImageGrid:
+    """Return a row a frame: the image, each variant's mask over it, and the truth over it.
+
+    Pictures are at most `WIDTH` pixels across, but for the ``finest``: those keep their size, and
+    in them a line of one pixel keeps its colour.
+    """
+    rows = [*pictures_of(examples)]
+    pictures = [
+        (
+            title if place else f"frame {example.frame}",
+            _finest_jpeg(picture) if finest else jpeg(LayerImage(title, picture)),
+        )
+        for example, row in zip(examples, rows, strict=True)
+        for place, (title, picture) in enumerate(row.items())
+    ]
+    return ImageGrid(pictures, len(rows[0]), caption=caption)
+
+
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
     import cv2
 
-    return ImageFile(_packed(shrink(painted(layer), width), cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+    return _encode_jpeg(shrink(painted(layer), width), cv2.IMWRITE_JPEG_QUALITY, QUALITY)
 
 
-def finest_jpeg(image: Rgb) -> bytes:
-    """Return an image as a JPEG file in which a line of one pixel keeps its colour."""
+def _finest_jpeg(image: Rgb) -> ImageFile:
     import cv2
 
     colours = cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444
-    return _packed(image, cv2.IMWRITE_JPEG_QUALITY, FINEST, *colours)
+    return _encode_jpeg(image, cv2.IMWRITE_JPEG_QUALITY, FINEST, *colours)
 
 
-def _packed(image: Rgb, *options: int) -> bytes:
+def _encode_jpeg(image: Rgb, *options: int) -> ImageFile:
     import cv2
 
     done, content = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
     assert done
-    return bytes(content)
+    return ImageFile(bytes(content))
 
 
 def painted(layer: LayerImage) -> Rgb:

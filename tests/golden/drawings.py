@@ -1,22 +1,15 @@
-"""What is drawn, as text: every line, bar, mark and picture with its numbers."""
+"""What is drawn, as text: every line, mark and picture with its numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from io import BytesIO
+from typing import Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_hex
-from matplotlib.patches import Rectangle
+from PIL import Image
 
 from roadeval.report import blocks
 from roadeval.report.chart import Chart
-from roadeval.report.figures import Picture
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def charted(figure: blocks.Figure) -> str:
@@ -46,92 +39,14 @@ def _numbers(values: Any) -> str:
     return " ".join(f"{each:.4g}" for each in values)
 
 
-def described(figure: Figure) -> str:
-    """A figure's words and data, axes by axes."""
-    width, height = figure.get_size_inches()
-    lines = [f"figure of {width:.3g} x {height:.3g} inches", *_words(figure), *_pictures(figure)]
-    for number, axes in enumerate(figure.axes, 1):
-        lines += [f"  axes {number}", *(f"    {line}" for line in _axes(axes))]
+def described(report: blocks.Report) -> str:
+    """The words and pictures of a figure of the paper; its charts are told by `charted`."""
+    lines = [f"figure file: {report.title}", f"  {report.subtitle}"]
+    for grid in (block for block in report.blocks if isinstance(block, blocks.ImageGrid)):
+        for title, image in grid.pictures:
+            pixels = np.asarray(Image.open(BytesIO(image.content)))
+            lines.append(f"  picture {title!r} of {pixels.shape}, mean {pixels.mean():.4g}")
     return "\n".join(lines)
-
-
-def _words(figure: Figure) -> Iterator[str]:
-    for text in figure.texts:
-        yield f"  text {text.get_text()!r}"
-    for legend in (found for axes in figure.axes if (found := axes.get_legend())):
-        yield f"  legend {legend.get_title().get_text()!r}"
-        # By its lines: Matplotlib draws copies of what it was given.
-        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
-            yield f"  legend {text.get_text()!r}: {_look(handle)}"
-
-
-def _pictures(figure: Figure) -> Iterator[str]:
-    """The pictures that lie on the figure itself, with their places in shares of it."""
-    for picture in figure.artists:
-        if isinstance(picture, Picture):
-            box = picture.box.transformed(figure.transFigure.inverted())
-            place = " ".join(f"{each:.3g}" for each in box.extents)
-            pixels = np.asarray(picture.get_array())
-            yield f"  picture of {pixels.shape} at {place}, mean {pixels.mean():.5g}"
-
-
-def _axes(axes: Axes) -> Iterator[str]:
-    for what in ("title", "xlabel", "ylabel"):
-        get = getattr(axes, f"get_{what}")
-        if text := get(loc="left") or get() if what == "title" else get():
-            yield f"{what} {text!r}"
-    yield from _sides(axes)
-    for line in axes.lines:
-        yield f"line {_points(line.get_xdata(), line.get_ydata())}: {_look(line)}"
-    for patch in axes.patches:
-        if isinstance(patch, Rectangle):
-            place = (patch.get_x(), patch.get_y(), patch.get_width(), patch.get_height())
-            yield f"box {' '.join(f'{each:.4g}' for each in place)}: {_look(patch)}"
-    for area in axes.collections:
-        if isinstance(area, PolyCollection):
-            (path,) = area.get_paths()
-            yield f"area {_points(*path.vertices.T)}: {to_hex(area.get_facecolor()[0])}"
-    yield from _images(axes)
-    for text in axes.texts:
-        box = text.get_bbox_patch()
-        edge = "" if box is None else f" in a box, {_look(box)}, edge {box.get_edgecolor()[3]:.2g}"
-        place = " ".join(f"{each:.4g}" for each in text.get_position())
-        yield f"text {text.get_text()!r} at {place}, size {text.get_size():.3g}{edge}"
-
-
-def _sides(axes: Axes) -> Iterator[str]:
-    """The range, the words and the grid of each side."""
-    for side in "xy":
-        low, high = getattr(axes, f"get_{side}lim")()
-        ticks = getattr(axes, f"get_{side}ticklabels")()
-        names = " | ".join(tick.get_text() for tick in ticks)
-        yield f"{side} from {low:.4g} to {high:.4g}: {names}".rstrip(": |")
-        grid = [line for line in getattr(axes, f"get_{side}gridlines")() if line.get_visible()]
-        if grid and axes.axison:
-            yield f"{side} grid: {_look(grid[0])}"
-
-
-def _images(axes: Axes) -> Iterator[str]:
-    for image in axes.images:
-        pixels = np.ma.filled(np.ma.asarray(image.get_array(), float), np.nan)
-        known = pixels[~np.isnan(pixels)]
-        low, high = image.get_clim()
-        ends = " ".join(to_hex(image.cmap(share)) for share in (0.0, 0.5, 1.0))
-        scale = f", {low:.4g} to {high:.4g} as {ends}" if pixels.ndim == 2 else ""
-        yield f"image of {pixels.shape}, mean {known.mean():.5g}, {len(known)} known{scale}"
-
-
-def _look(artist: Any) -> str:
-    """An artist's colours, dash and mark."""
-    parts = []
-    for name in ("color", "facecolor", "linestyle", "linewidth", "marker", "markerfacecolor"):
-        value = getattr(artist, f"get_{name}", lambda: None)()
-        if value is None or value in ("None", ""):
-            continue
-        if "color" in name:
-            value = to_hex(value, keep_alpha=to_hex(value, keep_alpha=True)[-2:] != "ff")
-        parts.append(f"{name} {value}")
-    return ", ".join(parts)
 
 
 def _points(x: Any, y: Any) -> str:

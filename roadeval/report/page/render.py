@@ -22,10 +22,10 @@ from roadeval.data.words import MINUS
 from roadeval.report.blocks import (
     Block,
     Cell,
-    Document,
     Heading,
     ImageFile,
     KeepTogether,
+    Report,
     Table,
     TableOfContents,
     plain,
@@ -43,7 +43,7 @@ _SCRIPTS: Final = (
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
-def page(document: Document) -> bytes:
+def page(document: Report) -> bytes:
     """Return a document as a page in UTF-8; equal documents give equal bytes."""
     parts = [*document.parts()]
     span = span_of_frames(part for part in parts if isinstance(part, Chart))
@@ -225,7 +225,7 @@ def _name(text: str, taken: set[str]) -> str:
     return name
 
 
-def write_page(path: Path, document: Document) -> Path:
+def write_page(path: Path, document: Report) -> Path:
     """Write a document as a page; a `ReportError` if it cannot be written."""
     with writing(path, ReportError, "; choose another place"):
         put(path, page(document))

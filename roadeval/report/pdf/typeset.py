@@ -10,13 +10,10 @@ become markup, and nothing is fetched from anywhere.
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -27,35 +24,41 @@ from roadeval.runtime.files import put, writing
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
-    from roadeval.report.blocks import Document
+    from roadeval.report.blocks import Report
 
 _TEMPLATE: Final = "document.typ"
-_FIGURE: Final = b"""
-#set document(author: "roadeval", date: none)
-#set page(width: auto, height: auto, margin: 0pt)
-#image("figure.svg")
-"""
 
 
 class ReportError(RoadevalError):
     """The document cannot be written."""
 
 
-def pdf(document: Document) -> bytes:
-    """Return a document as PDF; equal documents give equal bytes.
+def typeset(
+    document: Report, kind: Literal["pdf", "png"] = "pdf", pixels_per_inch: int | None = None
+) -> bytes:
+    """Return a report as a PDF, or a figure as a PDF or PNG; equal ones give equal bytes.
 
-    Fonts are Typst's own and, for the figures, DejaVu Sans; never the machine's, so that a document
-    looks the same everywhere. A letter that none of them has is an empty box.
+    Fonts are Typst's own, never the machine's, so that a document looks the same everywhere. A
+    letter that none of them has is an empty box. A `ReportError` if the system's folder for
+    temporary files cannot be written to.
     """
+    import typst
+
     inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
-    data = _visible(document.as_json() | {"colours": inks})
+    data = json.dumps(_visible(document.as_json() | {"colours": inks})).encode()
     template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
-    return _compiled(template, {"document.json": json.dumps(data).encode(), **document.files()})
-
-
-def figure_as(kind: Literal["pdf", "png"], svg: bytes, dots_per_inch: int | None = None) -> bytes:
-    """Return a figure, given as SVG, as a PDF of one page of its size, or as a PNG."""
-    return _compiled(_FIGURE, {"figure.svg": svg}, kind, dots_per_inch)
+    with _explained(), TemporaryDirectory(prefix="roadeval-") as folder:
+        sources = {_TEMPLATE: template, "document.json": data, **document.files()}
+        for name, content in sources.items():
+            Path(folder, name).write_bytes(content)
+        compiled: bytes = typst.compile(
+            Path(folder, _TEMPLATE),
+            root=Path(folder),
+            font_paths=typst.Fonts(include_system_fonts=False),
+            format=kind,
+            ppi=pixels_per_inch,
+        )
+    return compiled
 
 
 def write_file(path: Path, content: bytes) -> Path:
@@ -68,31 +71,6 @@ def write_file(path: Path, content: bytes) -> Path:
     return path
 
 
-def _compiled(
-    template: bytes,
-    sources: Mapping[str, bytes],
-    kind: Literal["pdf", "png"] = "pdf",
-    dots_per_inch: int | None = None,
-) -> bytes:
-    """Return what Typst makes of a template and the files that it reads, as a PDF or PNG.
-
-    A `ReportError` if these files cannot be written into the system's folder for temporary ones.
-    """
-    import typst
-
-    with _explained(), TemporaryDirectory(prefix="roadeval-") as folder:
-        for name, content in {_TEMPLATE: template, **sources}.items():
-            Path(folder, name).write_bytes(content)
-        compiled: bytes = typst.compile(
-            Path(folder, _TEMPLATE),
-            root=Path(folder),
-            font_paths=_fonts()[0],
-            format=kind,
-            ppi=dots_per_inch,
-        )
-    return compiled
-
-
 @contextmanager
 def _explained() -> Iterator[None]:
     try:
@@ -103,29 +81,6 @@ def _explained() -> Iterator[None]:
             f"together there, and it cannot be written ({error.strerror}); make room, or name "
             "another folder with TMPDIR"
         ) from error
-
-
-@cache
-def _fonts() -> tuple[Any, TemporaryDirectory[str]]:
-    """Return Typst's own fonts and Matplotlib's DejaVu Sans, and a folder of that one alone.
-
-    Typst reads the folder as long as the process lives. Matplotlib's own folder also has a font
-    with a sign for every letter there is: a text of a figure is set in one font, and if it had but
-    one letter that DejaVu Sans lacks, as in a drive's name, all of it would be such signs.
-    """
-    import typst
-
-    # Found without the import, which takes longer than a whole report.
-    found = find_spec("matplotlib")
-    assert found is not None
-    assert found.origin is not None
-    folder = TemporaryDirectory(prefix="roadeval-")
-    for font in Path(found.origin).parent.glob("mpl-data/fonts/ttf/DejaVuSans*.ttf"):
-        try:
-            Path(folder.name, font.name).symlink_to(font)
-        except OSError:  # a system on which not everyone may link
-            shutil.copy(font, folder.name)
-    return typst.Fonts(include_system_fonts=False, font_paths=[folder.name]), folder
 
 
 def _visible(value: Any) -> Any:

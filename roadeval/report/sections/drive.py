@@ -20,7 +20,7 @@ from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageG
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import figures_over_drive
 from roadeval.report.findings import Findings
-from roadeval.report.images import ExampleFrame, LayerImage, heat_map, jpeg, pictures_of
+from roadeval.report.images import example_grid, heat_map
 from roadeval.report.tables import (
     OTHERS,
     differences_table,
@@ -37,7 +37,7 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     told = [*_claims(findings)]
     if findings.examples:
         caption = "The paper's figure 2: input and output images, and the truth."
-        told.append(_examples(findings.examples, caption))
+        told.append(example_grid(findings.examples, caption))
     told += [
         Figure(charts, figure.caption)
         for figure in figures_over_drive()
@@ -46,17 +46,6 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     if told:
         yield Heading("Over the drive")
         yield Details("The paper's claims, and its figures 2, 3a and 3b", told)
-
-
-def _examples(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
-    """Return a row a frame: the image, each variant's mask over it, and the truth over it."""
-    rows = [*pictures_of(examples)]
-    pictures = [
-        (title if place else f"frame {example.frame}", jpeg(LayerImage(title, picture)))
-        for example, row in zip(examples, rows, strict=True)
-        for place, (title, picture) in enumerate(row.items())
-    ]
-    return ImageGrid(pictures, len(rows[0]), caption=caption)
 
 
 def _claims(findings: Findings) -> Iterator[Block]:
@@ -354,4 +343,4 @@ def masks(findings: Findings) -> Iterator[Block]:
         "whether the filter helps, not which stage is at fault. What follows is what was computed."
     )
     if findings.examples:
-        yield _examples(findings.examples)
+        yield example_grid(findings.examples)
