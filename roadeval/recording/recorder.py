@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import ctypes
 import errno
 import hashlib
 import heapq
@@ -15,8 +14,10 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import wait
 from contextlib import suppress
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
+from threading import Event
 from typing import Any, Final, NamedTuple, Self
 
 import rerun as rr
@@ -499,7 +500,7 @@ class Recorder:
                 break
         if not answer.done() or answer.exception():
             atexit.unregister(rr.rerun_shutdown)
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
+            in_thread(partial(_keep, self._stream))
             self._failed, self._stream = True, None
             raise self._incomplete()
 
@@ -542,6 +543,11 @@ class Recorder:
         error = RecordingError(f"{self.path}: cannot be written any further: {refusal.strerror}")
         error.__cause__ = refusal
         return error
+
+
+def _keep(_stream: object) -> None:
+    """Keep a stream as long as the process lives: whoever frees it waits for its writer."""
+    Event().wait()
 
 
 def _failure(number: int) -> OSError:

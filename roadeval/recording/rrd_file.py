@@ -4,9 +4,14 @@ A Rerun file is a sequence of messages, each with a header; the index is the las
 
     RRF2  [header|message] [header|message] ...  [header|index] [where the index lies]
 
-A message holds rows of one entity, and is read by its place alone. Rerun's own library goes through
-the whole entity for any row of it, takes a third of a second to import, and ends the process where
-it meets what it never expects.
+A message holds rows of one entity, and is read by its place alone.
+
+This module is a fence: nothing else knows the bytes of the format. Rerun's public reader,
+`rerun.chunk.RrdReader`, gives the same rows of a sound file (``tests/recording/test_rrd_file``).
+But it ended the process on two of 320 files of which a few random bytes were changed, and stopped
+at the damage in nearly all others; here every sound frame is read, and the rest is one line
+(``tests/recording/test_damage``). To read a table takes half the CPU time here, 0.27 s for 0.55 s,
+because Rerun is not imported.
 """
 
 from __future__ import annotations
