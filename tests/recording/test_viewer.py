@@ -13,7 +13,7 @@ def fake(tmp_path, monkeypatch):
     script.write_text('#!/bin/sh\necho "$@ CI=$CI"\nexit 3\n')
     script.chmod(0o700)
     monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
-    monkeypatch.setattr(viewer, "_program", lambda: str(script))
+    monkeypatch.setattr("rerun_cli.__file__", str(tmp_path / "__init__.py"))
 
 
 def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine_alone(
@@ -27,13 +27,13 @@ def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine
 def test_a_viewer_that_is_late_is_asked_again():
     answers = iter([TimeoutError("Deadline expired"), TimeoutError("Deadline expired"), "drawn"])
 
-    def ask():
+    def request():
         answer = next(answers)
         if isinstance(answer, Exception):
             raise answer
         return answer
 
-    assert viewer.asked(ask) == "drawn"
+    assert viewer.ask(request) == "drawn"
 
 
 @pytest.mark.parametrize(
@@ -45,10 +45,10 @@ def test_a_viewer_that_is_late_is_asked_again():
     ],
 )
 def test_a_viewer_that_never_answers_or_has_ended_is_told_in_one_line(failure, said, monkeypatch):
-    monkeypatch.setattr(viewer, "_LOADING_S", 0.0)
+    monkeypatch.setattr(viewer, "LOADING_S", 0.0)
 
-    def ask():
+    def request():
         raise failure
 
     with pytest.raises(RecordingError, match=f"^{said}$"):
-        viewer.asked(ask)
+        viewer.ask(request)
