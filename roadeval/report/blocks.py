@@ -147,7 +147,7 @@ class Table(Block):
     """On a page: what stands before a field that looks for words in a table of many rows."""
 
 
-def markdown(blocks: Iterable[Block]) -> str:
+def blocks_as_markdown(blocks: Iterable[Block]) -> str:
     """Return headings, texts, lists and tables as Markdown; other blocks are left out."""
     lines: list[str] = []
     for block in blocks:

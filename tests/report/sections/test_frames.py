@@ -5,9 +5,10 @@ import numpy as np
 
 from roadeval.data import ERRORS
 from roadeval.report.blocks import Command, KeepTogether, Text, TwoColumns
+from roadeval.report.captions import caption
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections.frames import NO_COMMAND, strip, worst_frames
+from roadeval.report.sections.frames import strip, worst_frames
 from tests.report.making import rates, some_findings, the
 
 
@@ -31,7 +32,7 @@ def said(blocks):
 def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is_told():
     (blocks,) = shown(some_findings(worst=[a_frame(7)], inspect=None))
     assert not [block for block in blocks if isinstance(block, Command)]
-    assert NO_COMMAND in [block.text for block in blocks if isinstance(block, Text)]
+    assert caption("no command") in [block.text for block in blocks if isinstance(block, Text)]
 
 
 def test_outcomes_are_at_most_640_pixels_across_and_layers_300():
