@@ -14,7 +14,7 @@ from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, as_plain
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import finals, values_of
 from roadeval.report.blocks import Figure, Report
-from roadeval.report.chart import Chart, thinned
+from roadeval.report.chart import Chart, thin
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.images import ExampleFrame, example_grid
 from roadeval.report.pdf.typeset import typeset
@@ -106,5 +106,5 @@ def _for_paper(chart: Chart) -> Chart:
         replace(series, name=elided(_LABELS.get(series.name, series.name), _LONGEST))
         for series in chart.series
     ]
-    few = [thinned(series, CROWDED) for series in named]
+    few = [thin(series, CROWDED) for series in named]
     return replace(chart, series=few, spaced_marks=True)

@@ -44,4 +44,4 @@ def test_of_many_drives_the_worst_and_the_best_have_a_row():
     half = DRAWN // 2
     assert len(chart.names) == DRAWN + 1
     assert chart.names[half - 1 : half + 1] == [f"drive_{half + 4}", f"drive_{half - 1}"]
-    assert "Of all drives the 20 worst and the 20 best." in figure.caption
+    assert "The 20 worst and the 20 best of all drives." in figure.caption

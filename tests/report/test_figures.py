@@ -13,7 +13,7 @@ from PIL import Image
 from pypdf import PdfReader
 
 from roadeval.report.blocks import Figure, ImageGrid, Report
-from roadeval.report.drawing import MARKED, drawn
+from roadeval.report.drawing import MARKED, place_chart
 from roadeval.report.figures import CROWDED, error_rate, fp_fn_rate, road_masks, write_figures
 from roadeval.report.images import ExampleFrame
 from roadeval.report.pdf.typeset import typeset
@@ -87,7 +87,7 @@ def test_a_long_drive_is_drawn_as_means_of_rows_with_some_marks() -> None:
     (chart,) = block.charts
     line = chart.series[0]
     assert len(line.y) == CROWDED
-    marks = drawn(chart).shapes[0].marks
+    marks = place_chart(chart).shapes[0].marks
     assert MARKED / 2 < len(marks) <= MARKED
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
     assert line.y[0] == pytest.approx(first.mean())

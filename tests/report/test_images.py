@@ -1,4 +1,4 @@
-"""Layers as pictures: painted by their description alone."""
+"""Layers as pictures: their description alone gives their colours."""
 
 import cv2
 import numpy as np
@@ -6,14 +6,14 @@ import pytest
 
 from roadeval.data import ERRORS, LayerKind, LayerSpec
 from roadeval.data.colours import MOST_ERRORS, NEVER_LABELLED, VERMILLION
-from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, painted
+from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, paint
 
 GREY = np.full((2, 4, 3), 100, np.uint8)
 
 
 def test_a_class_has_its_colour_over_the_darkened_image_and_a_clear_one_none():
     labels = np.array([[0, 1, 2, 3], [4, 0, 0, 0]], np.uint8)
-    colours = painted(LayerImage("", GREY, ERRORS, labels))
+    colours = paint(LayerImage("", GREY, ERRORS, labels))
     assert colours[0, 0].tolist() == [100 * DARKEN] * 3
     red, green, blue, alpha = ERRORS.classes[2].rgba
     over = [np.rint(100 * DARKEN * (1 - alpha / 255) + c * alpha / 255) for c in (red, green, blue)]
@@ -22,7 +22,7 @@ def test_a_class_has_its_colour_over_the_darkened_image_and_a_clear_one_none():
 
 def test_a_map_of_numbers_spans_its_range_and_is_clipped_to_it():
     spec = LayerSpec("ndi", LayerKind.SCALAR, "NDI", value_range=(-1.0, 1.0))
-    colours = painted(LayerImage("", GREY, spec, np.array([[-9.0, -1.0, 1.0, 9.0]], np.float32)))
+    colours = paint(LayerImage("", GREY, spec, np.array([[-9.0, -1.0, 1.0, 9.0]], np.float32)))
     low, _, high, _ = colours[0].tolist()
     assert colours[0].tolist() == [low, low, high, high]
     assert sum(high) > sum(low)

@@ -1,10 +1,10 @@
-"""Blocks typeset as a PDF by Typst.
+"""Reports and figures typeset by Typst.
 
-Chosen over ReportLab (its own layout is left to the caller), WeasyPrint (needs Pango and other
-system libraries) and LaTeX (no package of Python's index brings it): one wheel, Apache-2.0, that
-compiles offline in a few tens of milliseconds, breaks pages and tables well, and brings its
-fonts. The document travels as JSON and its pictures as files beside it, so no text of a log can
-become markup, and nothing is fetched from anywhere.
+Typst is one wheel, Apache-2.0, that compiles offline in a few tens of milliseconds, breaks pages
+and tables well, and brings its fonts. ReportLab leaves the layout to the caller, WeasyPrint needs
+Pango and other system libraries, and no package of Python's index brings LaTeX. The document
+travels as JSON with its pictures as files beside it, so no text of a log can become markup, and
+nothing is fetched from anywhere.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def typeset(
     inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
     data = json.dumps(_visible(document.as_json() | {"colours": inks})).encode()
     template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
-    with _explained(), TemporaryDirectory(prefix="roadeval-") as folder:
+    with _explain_full_disk(), TemporaryDirectory(prefix="roadeval-") as folder:
         sources = {_TEMPLATE: template, "document.json": data, **document.files()}
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
@@ -72,7 +72,7 @@ def write_file(path: Path, content: bytes) -> Path:
 
 
 @contextmanager
-def _explained() -> Iterator[None]:
+def _explain_full_disk() -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -84,7 +84,7 @@ def _explained() -> Iterator[None]:
 
 
 def _visible(value: Any) -> Any:
-    """Return a value with every text in it as `roadeval.runtime.text.visible` returns it."""
+    """Return a value with `roadeval.runtime.text.visible` applied to every text in it."""
     match value:
         case str():
             return visible(value)

@@ -50,7 +50,7 @@ def section(findings: Findings) -> Iterator[Block]:
 def of_drives(findings: FleetFolder) -> Iterator[Block]:
     """Yield the version that has replayed many drives, and the files with its settings."""
     yield Heading("What was run")
-    yield Text(caption("fleet's run", version=findings.facts.version, folder=findings.path))
+    yield Text(caption("run of a fleet", version=findings.facts.version, folder=findings.path))
 
 
 def _methods(facts: Facts) -> Iterator[Block]:
