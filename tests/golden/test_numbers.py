@@ -348,7 +348,7 @@ def shares(masks, before: tuple[str, str], after: tuple[str, str]) -> tuple[floa
 def test_the_report_says_which_pixels_the_filter_mended_and_which_it_spoiled(told, lines, masks):
     right, wrong = shares(masks, ("unfiltered", "post"), ("filtered", "post"))
     text = " ".join(lines["paper"])
-    assert f"evaluated frames, {percent(right)} % are newly right with the filter" in text
+    assert f"The filter makes {percent(right)} % of the labelled pixels" in text
     assert f"and {percent(wrong)} % newly wrong" in text
 
 
