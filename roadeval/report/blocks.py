@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import place_chart, range_of_frames
-from roadeval.runtime.text import as_markdown
+from roadeval.runtime.text import as_markdown, visible
 
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
@@ -41,7 +41,10 @@ class Block:
         return type(self).__name__.lower()
 
     def as_json(self) -> dict[str, Any]:
-        """Return the block's kind and its fields as JSON has them; an image file is its name."""
+        """Return the block's kind and its fields for JSON; an image file is its name.
+
+        `roadeval.runtime.text.visible` is applied to every text.
+        """
         return {"kind": self.kind, **_fields(self)}
 
     def parts(self) -> Iterator[Any]:
@@ -60,6 +63,8 @@ def _fields(value: Any) -> dict[str, Any]:
 
 def _as_json(value: Any) -> Any:
     match value:
+        case str():
+            return visible(value)
         case ImageFile():
             return value.name
         case Block():
@@ -187,10 +192,11 @@ class Figure(Block):
         """Return the placed charts and their legend."""
         frames, entries = range_of_frames(self.charts), legend(self.charts)
         titles = "; ".join(f"{chart.title}, {chart.unit}" for chart in self.charts)
+        names = ", ".join(entry.name for entry in entries)
         return {
             "kind": self.kind,
-            "caption": self.caption,
-            "alt": f"{titles}: {', '.join(entry.name for entry in entries)}".rstrip(": "),
+            "caption": visible(self.caption),
+            "alt": visible(f"{titles}: {names}".rstrip(": ")),
             "legend": _as_json(entries),
             "charts": _as_json([place_chart(chart, frames) for chart in self.charts]),
         }

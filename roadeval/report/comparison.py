@@ -66,7 +66,7 @@ def document(
     return Report(
         kicker="roadeval comparison",
         title=listing(labels),
-        subtitle="; ".join(map(_about, comparison.results)),
+        subtitle="; ".join(map(_subtitle, comparison.results)),
         footer=f"comparison of {listing(labels)}",
         blocks=[
             Heading("What changed"),
@@ -90,7 +90,8 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     return f"# {title}\n\n{blocks_as_markdown(blocks)}"
 
 
-def _about(result: ComparedResult) -> str:
+def _subtitle(result: ComparedResult) -> str:
+    """Return the frames or drives of a result in words."""
     if result.drive is not None:
         return f"{result.label}: {result.frames} frames of {result.drive}"
     return f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
@@ -245,13 +246,11 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
                 "drive": lambda row: row.drive,
                 "frames": lambda row: number(row.frames),
                 **_change(lambda row: interval(row.difference.low, row.difference.high)),
-                "q": lambda row: _q_value(row.q),
+                "q": lambda row: (
+                    DASH if row.q is None else "<0.001" if row.q < 0.001 else f"{row.q:.3f}"
+                ),
             }
             yield _table(rows[:NAMED], columns)
-
-
-def _q_value(q: float | None) -> str:
-    return DASH if q is None else "<0.001" if q < 0.001 else f"{q:.3f}"
 
 
 def _change(ends: Callable[[Any], str]) -> Columns:

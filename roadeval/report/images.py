@@ -99,7 +99,7 @@ def example_grid(
     pictures = [
         (
             title if place else f"frame {example.frame}",
-            _finest_jpeg(picture) if finest else jpeg(LayerImage(title, picture)),
+            _encode_jpeg(picture if finest else shrink(picture, WIDTH), finest=finest),
         )
         for example, row in zip(examples, rows, strict=True)
         for place, (title, picture) in enumerate(row.items())
@@ -109,21 +109,15 @@ def example_grid(
 
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
+    return _encode_jpeg(shrink(paint(layer), width))
+
+
+def _encode_jpeg(image: Rgb, *, finest: bool = False) -> ImageFile:
     import cv2
 
-    return _encode_jpeg(shrink(paint(layer), width), cv2.IMWRITE_JPEG_QUALITY, QUALITY)
-
-
-def _finest_jpeg(image: Rgb) -> ImageFile:
-    import cv2
-
-    colours = cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444
-    return _encode_jpeg(image, cv2.IMWRITE_JPEG_QUALITY, FINEST, *colours)
-
-
-def _encode_jpeg(image: Rgb, *options: int) -> ImageFile:
-    import cv2
-
+    options = [cv2.IMWRITE_JPEG_QUALITY, FINEST if finest else QUALITY]
+    if finest:
+        options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
     done, content = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
     assert done
     return ImageFile(bytes(content))

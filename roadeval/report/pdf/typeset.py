@@ -11,17 +11,14 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from roadeval.data import colours
 from roadeval.errors import RoadevalError
 from roadeval.runtime.files import put, writing
-from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from roadeval.report.blocks import Report
@@ -45,19 +42,26 @@ def typeset(
     import typst
 
     inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
-    data = json.dumps(_visible(document.as_json() | {"colours": inks})).encode()
+    data = json.dumps(document.as_json() | {"colours": inks}).encode()
     template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
-    with _explain_full_disk(), TemporaryDirectory(prefix="roadeval-") as folder:
-        sources = {_TEMPLATE: template, "document.json": data, **document.files()}
-        for name, content in sources.items():
-            Path(folder, name).write_bytes(content)
-        compiled: bytes = typst.compile(
-            Path(folder, _TEMPLATE),
-            root=Path(folder),
-            font_paths=typst.Fonts(include_system_fonts=False),
-            format=kind,
-            ppi=pixels_per_inch,
-        )
+    sources = {_TEMPLATE: template, "document.json": data, **document.files()}
+    try:
+        with TemporaryDirectory(prefix="roadeval-") as folder:
+            for name, content in sources.items():
+                Path(folder, name).write_bytes(content)
+            compiled: bytes = typst.compile(
+                Path(folder, _TEMPLATE),
+                root=Path(folder),
+                font_paths=typst.Fonts(include_system_fonts=False),
+                format=kind,
+                ppi=pixels_per_inch,
+            )
+    except OSError as error:
+        raise ReportError(
+            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are put "
+            f"together there, and it cannot be written ({error.strerror}); make room, or name "
+            "another folder with TMPDIR"
+        ) from error
     return compiled
 
 
@@ -69,28 +73,3 @@ def write_file(path: Path, content: bytes) -> Path:
     with writing(path, ReportError, "; choose another place"):
         put(path, content)
     return path
-
-
-@contextmanager
-def _explain_full_disk() -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise ReportError(
-            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are put "
-            f"together there, and it cannot be written ({error.strerror}); make room, or name "
-            "another folder with TMPDIR"
-        ) from error
-
-
-def _visible(value: Any) -> Any:
-    """Return a value with `roadeval.runtime.text.visible` applied to every text in it."""
-    match value:
-        case str():
-            return visible(value)
-        case dict():
-            return {key: _visible(item) for key, item in value.items()}
-        case list():
-            return [_visible(item) for item in value]
-        case _:
-            return value
