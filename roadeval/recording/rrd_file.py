@@ -77,7 +77,7 @@ ALWAYS: Final = FrameSpan()
 """The span of data that was logged once, for every frame."""
 
 
-class Message(NamedTuple):
+class StoredMessage(NamedTuple):
     """The place of a message in the file, without its header, in bytes, and its frames."""
 
     path: str
@@ -98,7 +98,7 @@ class RrdFile:
         self.path = path
         self.below = ""
         """The prefix of the paths of all entities."""
-        self.messages = defaultdict[str, list[Message]](list)
+        self.messages = defaultdict[str, list[StoredMessage]](list)
         """The messages of each entity, by its path."""
         self._images: dict[str, tuple[FrameSpan, dict[int, pa.ListScalar]]] = {}
         """The images of the message that was read last, by frame, of each entity."""
@@ -113,7 +113,7 @@ class RrdFile:
         for _, _, message in sorted(spans, key=itemgetter(0, 1)):
             self.messages[message.path].append(message)
 
-    def _framed(self, path: str) -> dict[Message, FrameSpan]:
+    def _framed(self, path: str) -> dict[StoredMessage, FrameSpan]:
         """Return an entity's messages with frames, and these frames."""
         messages = self.messages.get(self.below + path, ())
         return {m: m.span for m in messages if m.span and m.span != ALWAYS}
@@ -151,7 +151,7 @@ class RrdFile:
         blob = images.get(frame)
         return None if blob is None else bytes(np.from_dlpack(blob.values))
 
-    def _read(self, component: str, messages: Iterable[Message]) -> Iterator[pa.RecordBatch]:
+    def _read(self, component: str, messages: Iterable[StoredMessage]) -> Iterator[pa.RecordBatch]:
         """Yield the rows of messages that have a value of a component."""
         for message in messages:
             with name_damage(self.path, message.path):
@@ -238,7 +238,7 @@ def _with_value(batch: pa.RecordBatch, component: str) -> pa.RecordBatch:
     return batch.filter(pc.greater(lengths, 0))
 
 
-def _find_messages(path: Path) -> tuple[list[Message], bool]:
+def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
     """Return the messages of a recording, and whether its index lists them.
 
     Without an index, as after a killed run, every complete message is read.
@@ -252,7 +252,10 @@ def _find_messages(path: Path) -> tuple[list[Message], bool]:
                 )
             indexed_stores = _read_index(file)
             stores = _scan(file) if indexed_stores is None else indexed_stores
-            recordings, made_by = defaultdict[bytes, list[Message]](list), "an unknown program"
+            recordings, made_by = (
+                defaultdict[bytes, list[StoredMessage]](list),
+                "an unknown program",
+            )
             for store, messages in stores:
                 fields = dict(protobuf_fields(store))
                 application = bytes(dict(protobuf_fields(fields[3]))[1]).decode()
@@ -280,7 +283,7 @@ def _find_messages(path: Path) -> tuple[list[Message], bool]:
     return recordings[(runs or [*recordings])[0]], indexed_stores is not None
 
 
-Stores = Iterable[tuple[memoryview, list[Message]]]
+Stores = Iterable[tuple[memoryview, list[StoredMessage]]]
 """Descriptions of recordings and blueprints, each with its messages."""
 
 
@@ -297,7 +300,7 @@ def _read_index(file: IO[bytes]) -> Stores | None:
     return [(part[_STORE], _listed_messages(part[_INDEX])) for part in parts]
 
 
-def _listed_messages(index: memoryview) -> list[Message]:
+def _listed_messages(index: memoryview) -> list[StoredMessage]:
     """Return the messages of a store that its part of the index lists."""
     fields = dict(protobuf_fields(index))
     content, compression, size = (
@@ -308,7 +311,7 @@ def _listed_messages(index: memoryview) -> list[Message]:
     names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
     columns = (batch.column(name).to_pylist() for name in names)
     return [
-        Message(path, offset, size, ALWAYS if static else _span(frames))
+        StoredMessage(path, offset, size, ALWAYS if static else _span(frames))
         for path, offset, size, static, *frames in zip(*columns, strict=True)
     ]
 
@@ -319,7 +322,7 @@ def _span(frames: Sequence[int | None]) -> FrameSpan | None:
     return FrameSpan(min(numbers), max(numbers)) if numbers else None
 
 
-def _scan(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Message]]]:
+def _scan(file: IO[bytes]) -> Iterator[tuple[memoryview, list[StoredMessage]]]:
     """Yield the complete messages of a file without an index, each with its store."""
     end, offset = file.seek(0, 2), _BEGIN + _HEADER.size
     while offset <= end:
@@ -336,7 +339,7 @@ def _scan(file: IO[bytes]) -> Iterator[tuple[memoryview, list[Message]]]:
             frames = batch.column(FRAME).to_pylist() if FRAME in batch.schema.names else ()
             span = _span(frames) if timed else ALWAYS
             store = dict(protobuf_fields(memoryview(message)))[_STORE]
-            yield store, [Message(path, offset, size, span)]
+            yield store, [StoredMessage(path, offset, size, span)]
         offset += size + _HEADER.size
 
 

@@ -356,7 +356,7 @@ _CURVES: Final = """\
 image.
 """
 _NO_TRUTH: Final = """\
-The log has no truth for the road: there is nothing to score, only what was computed.
+The log has no truth for the road, so there are no errors and no rates.
 """
 _HANDLING: Final = """\
 **Space** plays. The tabs above hold every layer, every number and the results.
@@ -529,7 +529,7 @@ def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
     others = " and ".join(names[_ROWS:])
     rows = _ROW_GUIDE.format(
         rows=" and ".join(names[:_ROWS]),
-        others=f"Those of {others} have tabs of their own." if others else "",
+        others=f"Further tabs show the phases of {others}." if others else "",
     )
     parts = [_ERRORS, rows, _CURVES] if layout.has_truth else [_NO_TRUTH, rows]
     yield _guide(layout.drive, str(summary.get("verdict", "")), *parts, _HANDLING)
