@@ -3,7 +3,6 @@
 #
 # Run this file from the checkout (`python examples/api.py`), or cell by cell in an editor that
 # knows `# %%`. It replays 20 frames of the demo drive; all that it writes lands in `reports/api/`.
-# Its own pictures are drawn by Matplotlib: `pip install matplotlib`.
 
 # %%
 from pathlib import Path

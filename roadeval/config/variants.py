@@ -194,7 +194,7 @@ def _chain(names: Any) -> tuple[str, ...]:
 def check_variant_name(name: str, taken: Collection[str]) -> None:
     """Raise a `ConfigError` for a variant's name that results cannot hold, or that is taken.
 
-    A spreadsheet takes a cell that begins with ``-`` for a formula, and charting libraries leave
+    A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves
     names that begin with ``_`` out of a legend.
     """
     if not is_plain(name) or name[0] in "-_" or len(name) > LONGEST:

@@ -62,5 +62,5 @@ def on_paper(colour: Colour) -> Colour:
 
 
 def hex_of(colour: Colour) -> str:
-    """Return the colour as Typst and HTML write it: ``#RRGGBB``."""
+    """Return the colour as Matplotlib, Typst and HTML write it: ``#RRGGBB``."""
     return "#{:02X}{:02X}{:02X}".format(*colour)

@@ -249,15 +249,15 @@ class TableOfContents(Block):
 
 @dataclass(frozen=True)
 class Report(Block):
-    """A report of sections, or a single figure without ``footer``."""
+    """A report: a title and blocks."""
 
     title: str
     subtitle: str
     """The line below the title."""
     blocks: Sequence[Block]
-    kicker: str = ""
+    kicker: str
     """The line above the title."""
-    footer: str = ""
+    footer: str
     """The line at the foot of every page."""
     keywords: Sequence[str] = ()
     """Keywords of the file."""

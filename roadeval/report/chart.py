@@ -152,8 +152,6 @@ class Chart:
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     """Ends of the axes; by default the ends of the numbers."""
-    spaced_marks: bool = False
-    """Whether lines of many points have marks here and there, rather than none."""
     sums: int = 0
     """Number of the last names that sum up the others; a rule separates them."""
 

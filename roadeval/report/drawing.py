@@ -1,11 +1,11 @@
 """The places of a chart's parts, in percent from the left and the top, for a page and for paper.
 
-This is the only engine for charts: page, PDF and the paper's figures draw the same places. So a
-page needs no script to show a chart, keeps its letters' size on any screen and follows a dark
-theme, and paper is drawn in a hundredth of a second. Matplotlib takes 0.3 to 0.7 s to import and
-0.1 s for each chart, and an SVG of it has letters that shrink with the screen. Altair with
-vl-convert takes 106 MB installed, half a second for the first chart and a tenth for each further
-one, and adds 0.9 MB of script to a page, which must then be allowed to evaluate code.
+Page and PDF draw the same places; only the paper's figures are drawn by Matplotlib. So a page
+needs no script to show a chart, keeps its letters' size on any screen and follows a dark theme, and
+paper is drawn in a hundredth of a second. Matplotlib takes 0.3 to 0.7 s to import and 0.1 s for
+each chart, and an SVG of it has letters that shrink with the screen. Altair with vl-convert takes
+106 MB installed, half a second for the first chart and a tenth for each further one, and adds
+0.9 MB of script to a page, which must then be allowed to evaluate code.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Final
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
-"""Most marks along a line: a line with more points has none, or spaced ones."""
+"""Most marks along a line: a line with more points has none."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -170,9 +170,7 @@ def place_chart(chart: Chart, frames: AxisRange | None = None) -> PlacedChart:
         zero=y.percent(0) if y.low < 0 < y.high else None,
         level=y.down(level.value) if level else None,
         band=band,
-        shapes=()
-        if is_rows
-        else [_shape(series, x, y, spaced_marks=chart.spaced_marks) for series in chart.series],
+        shapes=() if is_rows else [_shape(series, x, y) for series in chart.series],
         rows=[*_rows(chart, y)] if is_rows else (),
     )
 
@@ -205,7 +203,7 @@ def _range_of_values(chart: Chart) -> AxisRange:
     return AxisRange(low - room if low < 0 or not chart.from_zero else low, high + room)
 
 
-def _shape(series: Series, x: AxisRange, y: AxisRange, *, spaced_marks: bool) -> Shape:
+def _shape(series: Series, x: AxisRange, y: AxisRange) -> Shape:
     marks = [(x.percent(at), y.down(value)) for at, value in series.points()]
     inside = [(at, top) for at, top in marks if -0.5 <= at <= 100.5 and -0.5 <= top <= 100.5]
     runs: list[list[Point]] = [[]]
@@ -214,8 +212,7 @@ def _shape(series: Series, x: AxisRange, y: AxisRange, *, spaced_marks: bool) ->
             runs[-1].append((x.percent(at), y.down(value)))
         elif runs[-1]:
             runs.append([])
-    step = -(-len(marks) // MARKED)
-    shown = inside[:: step or 1] if step <= 1 or spaced_marks else ()
+    shown = inside if len(marks) <= MARKED else ()
     return Shape(series.name, series.look, [run for run in runs if run], marks=shown)
 
 

@@ -87,20 +87,11 @@ def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
         yield pictures
 
 
-def example_grid(
-    examples: Sequence[ExampleFrame], caption: str = "", *, finest: bool = False
-) -> ImageGrid:
-    """Return a row for each frame: the image, and over it each variant's mask, and the truth.
-
-    Pictures are at most `WIDTH` pixels across. The ``finest`` pictures keep their size, and a line
-    of one pixel keeps its colour.
-    """
+def example_grid(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
+    """Return a row for each frame: the image, and over it each variant's mask, and the truth."""
     rows = [*pictures_of(examples)]
     pictures = [
-        (
-            title if place else f"frame {example.frame}",
-            _encode_jpeg(picture if finest else shrink(picture, WIDTH), finest=finest),
-        )
+        (title if place else f"frame {example.frame}", jpeg(LayerImage(title, picture)))
         for example, row in zip(examples, rows, strict=True)
         for place, (title, picture) in enumerate(row.items())
     ]
@@ -109,10 +100,11 @@ def example_grid(
 
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
-    return _encode_jpeg(shrink(paint(layer), width))
+    return ImageFile(encode_jpeg(shrink(paint(layer), width)))
 
 
-def _encode_jpeg(image: Rgb, *, finest: bool = False) -> ImageFile:
+def encode_jpeg(image: Rgb, *, finest: bool = False) -> bytes:
+    """Return an image as a JPEG file; in the ``finest``, a line of one pixel keeps its colour."""
     import cv2
 
     options = [cv2.IMWRITE_JPEG_QUALITY, FINEST if finest else QUALITY]
@@ -120,7 +112,7 @@ def _encode_jpeg(image: Rgb, *, finest: bool = False) -> ImageFile:
         options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
     done, content = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
     assert done
-    return ImageFile(bytes(content))
+    return bytes(content)
 
 
 def paint(layer: LayerImage) -> Rgb:

@@ -9,7 +9,7 @@ from roadeval.cli.app import app, main
 from roadeval.version import VERSION
 
 COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
-HEAVY = ["cv2", "mcap", "numpy", "pandas", "pyarrow", "rerun", "sklearn", "typst"]
+HEAVY = ["cv2", "matplotlib", "mcap", "numpy", "pandas", "pyarrow", "rerun", "sklearn"]
 
 
 def test_the_list_of_commands_tells_each_in_a_line(capsys, monkeypatch):

@@ -24,7 +24,7 @@ def worse(tmp_path_factory) -> Replayed:
 
 @pytest.mark.parametrize("words", [("compare", "R", "R"), ("inspect", "--list", "R")])
 def test_a_recording_is_compared_and_listed_without_heavy_libraries(words, demo):
-    heavy = {"cv2", "rerun", "sklearn"}
+    heavy = {"cv2", "matplotlib", "rerun", "sklearn"}
     code = (
         "import sys; from roadeval.cli.app import main; assert main(sys.argv[1:]) == 0; "
         f"sys.exit(str({heavy} & {{*sys.modules}} or ''))"

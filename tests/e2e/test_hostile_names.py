@@ -1,6 +1,6 @@
 """Names from a log, a file or a command line reach no output as they are.
 
-They hold what terminals, Typst, Markdown, spreadsheets and TOML act upon, and are long,
+They hold what terminals, Typst, Markdown, Matplotlib, spreadsheets and TOML act upon, and are long,
 empty, or not UTF-8.
 """
 

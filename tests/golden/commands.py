@@ -14,6 +14,7 @@ from typing import Any, Final
 from unittest import mock
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from roadeval.report import blocks
 from tests.e2e.commands import here
@@ -94,31 +95,25 @@ def run(name: str) -> dict[str, Any]:
     look = {"FORCE_COLOR": "1", "TERM": "xterm"} if name in AT_TERMINAL else {}
     with mock.patch.dict(os.environ, look), _drawn() as figures:
         done = here(*COMMANDS[name].split())
-    return {
-        "code": done.returncode,
-        "out": done.stdout,
-        "err": done.stderr,
-        "figures": [*dict.fromkeys(figures)],
-    }
+    return {"code": done.returncode, "out": done.stdout, "err": done.stderr, "figures": figures}
 
 
 @contextmanager
 def _drawn() -> Iterator[list[str]]:
     """Describe every figure of the paper and every chart of a report that is drawn meanwhile."""
     figures: list[str] = []
-    set_report, set_figure = blocks.Report.as_json, blocks.Figure.as_json
+    savefig, as_json = Figure.savefig, blocks.Figure.as_json
 
-    def figure_file(report: blocks.Report) -> dict[str, Any]:
-        if not report.footer:
-            figures.append(drawings.described(report))
-        return set_report(report)
+    def save(figure: Figure, *arguments: Any, **options: Any) -> None:
+        savefig(figure, *arguments, **options)
+        figures.append(drawings.described(figure))
 
-    def on_paper(figure: blocks.Figure) -> dict[str, Any]:
+    def convert(figure: blocks.Figure) -> dict[str, Any]:
         figures.append(drawings.charted(figure))
-        return set_figure(figure)
+        return as_json(figure)
 
     with (
-        mock.patch.object(blocks.Report, "as_json", figure_file),
-        mock.patch.object(blocks.Figure, "as_json", on_paper),
+        mock.patch.object(Figure, "savefig", save),
+        mock.patch.object(blocks.Figure, "as_json", convert),
     ):
         yield figures

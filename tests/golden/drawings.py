@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image
+from matplotlib.colors import to_hex
 
 from roadeval.report import blocks
 from roadeval.report.chart import Chart
+from roadeval.report.figures import FigurePicture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def charted(figure: blocks.Figure) -> str:
@@ -39,14 +44,69 @@ def _numbers(values: Any) -> str:
     return " ".join(f"{each:.4g}" for each in values)
 
 
-def described(report: blocks.Report) -> str:
-    """The words and pictures of a figure of the paper; its charts are told by `charted`."""
-    lines = [f"figure file: {report.title}", f"  {report.subtitle}"]
-    for grid in (block for block in report.blocks if isinstance(block, blocks.ImageGrid)):
-        for title, image in grid.pictures:
-            pixels = np.asarray(Image.open(BytesIO(image.content)))
-            lines.append(f"  picture {title!r} of {pixels.shape}, mean {pixels.mean():.4g}")
+def described(figure: Figure) -> str:
+    """A figure's words and data, axes by axes."""
+    width, height = figure.get_size_inches()
+    lines = [f"figure of {width:.3g} x {height:.3g} inches", *_words(figure), *_pictures(figure)]
+    for number, axes in enumerate(figure.axes, 1):
+        lines += [f"  axes {number}", *(f"    {line}" for line in _axes(axes))]
     return "\n".join(lines)
+
+
+def _words(figure: Figure) -> Iterator[str]:
+    for text in figure.texts:
+        yield f"  text {text.get_text()!r}"
+    for legend in filter(None, (axes.get_legend() for axes in figure.axes)):
+        yield f"  legend {legend.get_title().get_text()!r}"
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
+            yield f"  legend {text.get_text()!r}: {_look(handle)}"
+
+
+def _pictures(figure: Figure) -> Iterator[str]:
+    """The pictures of figure 2, with their places in shares of the figure."""
+    for picture in figure.artists:
+        if isinstance(picture, FigurePicture):
+            box = picture.box.transformed(figure.transFigure.inverted())
+            place = " ".join(f"{share:.3g}" for share in box.extents)
+            pixels = np.asarray(picture.get_array())
+            yield f"  picture of {pixels.shape} at {place}, mean {pixels.mean():.5g}"
+
+
+def _axes(axes: Axes) -> Iterator[str]:
+    for label in ("xlabel", "ylabel"):
+        if text := getattr(axes, f"get_{label}")():
+            yield f"{label} {text!r}"
+    yield from _sides(axes)
+    for line in axes.lines:
+        yield f"line {_points(line.get_xdata(), line.get_ydata())}: {_look(line)}"
+    for text in axes.texts:
+        x, y = text.get_position()
+        yield f"text {text.get_text()!r} at {x:.4g} {y:.4g}, size {text.get_size():.3g}"
+
+
+def _sides(axes: Axes) -> Iterator[str]:
+    """The range, the words and the grid of each side."""
+    for side in "xy":
+        low, high = getattr(axes, f"get_{side}lim")()
+        ticks = getattr(axes, f"get_{side}ticklabels")()
+        names = " | ".join(tick.get_text() for tick in ticks)
+        yield f"{side} from {low:.4g} to {high:.4g}: {names}".rstrip(": |")
+        grid = [line for line in getattr(axes, f"get_{side}gridlines")() if line.get_visible()]
+        if grid and axes.axison:
+            yield f"{side} grid: {_look(grid[0])}"
+
+
+def _look(artist: Any) -> str:
+    """The colours, dash and mark of a line."""
+    parts = []
+    for name in ("color", "linestyle", "linewidth", "marker", "markerfacecolor"):
+        value = getattr(artist, f"get_{name}", lambda: None)()
+        if value is None or value in ("None", ""):
+            continue
+        if "color" in name:
+            value = to_hex(value, keep_alpha=to_hex(value, keep_alpha=True)[-2:] != "ff")
+        parts.append(f"{name} {value}")
+    return ", ".join(parts)
 
 
 def _points(x: Any, y: Any) -> str:

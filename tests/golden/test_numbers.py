@@ -414,7 +414,7 @@ def test_the_page_s_milliseconds_are_the_summary_s_seconds(run, told):
 
 def test_figure_2_shows_the_frames_that_the_report_shows(told, lines):
     figure = next(each for each in told.texts["replay"]["figures"] if "Road masks" in each)
-    drawn = re.findall(r"picture 'frame (\d+)'", figure)
+    drawn = re.findall(r"text 'frame (\d+)'", figure)
     assert len(drawn) == 4
     assert [int(each) for each in drawn] == told.summary()["examples"]
     text = "\n".join(lines["paper"])

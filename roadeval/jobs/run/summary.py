@@ -288,7 +288,7 @@ def _by_camera(found: Mapping[str, Sequence[str]]) -> Iterator[str]:
 
 def versions() -> dict[str, str]:
     """Return the versions of roadeval, Python, what computes, and what writes files."""
-    writing = {name: version(name) for name in ("rerun-sdk", "pandas", "typst")}
+    writing = {name: version(name) for name in ("rerun-sdk", "pandas", "matplotlib")}
     return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
 

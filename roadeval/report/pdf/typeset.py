@@ -10,8 +10,11 @@ nothing is fetched from anywhere.
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
+from collections.abc import Mapping
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Final, Literal
@@ -23,36 +26,69 @@ from roadeval.runtime.files import put, writing
 if TYPE_CHECKING:
     from roadeval.report.blocks import Report
 
-_TEMPLATE: Final = "document.typ"
+_MAIN: Final = "main.typ"
+_FIGURE: Final = b"""
+#set document(author: "roadeval", date: none)
+#set page(width: auto, height: auto, margin: 0pt)
+#image("figure.svg")
+"""
 
 
 class ReportError(RoadevalError):
     """The document cannot be written."""
 
 
-def typeset(
-    document: Report, kind: Literal["pdf", "png"] = "pdf", pixels_per_inch: int | None = None
-) -> bytes:
-    """Return a report as a PDF, or a figure as a PDF or PNG; equal ones give equal bytes.
+def typeset(document: Report) -> bytes:
+    """Return a report as a PDF; equal reports give equal bytes.
 
-    Fonts are Typst's own, never the machine's, so that a document looks the same everywhere. A
-    letter that none of them has is an empty box. A `ReportError` if the system's folder for
-    temporary files cannot be written to.
+    A `ReportError` if the system's folder for temporary files cannot be written to.
+    """
+    inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
+    data = json.dumps(document.as_json() | {"colours": inks}).encode()
+    template = files("roadeval.report.pdf").joinpath("document.typ").read_bytes()
+    return _compile({_MAIN: template, "document.json": data, **document.files()})
+
+
+def typeset_figure(
+    svg: bytes, kind: Literal["pdf", "png"], pixels_per_inch: int | None = None
+) -> bytes:
+    """Return a figure as a PDF of one page of its size, or as a PNG.
+
+    A `ReportError` if the system's folder for temporary files cannot be written to.
+    """
+    return _compile({_MAIN: _FIGURE, "figure.svg": svg}, kind, pixels_per_inch)
+
+
+def _compile(
+    sources: Mapping[str, bytes],
+    kind: Literal["pdf", "png"] = "pdf",
+    pixels_per_inch: int | None = None,
+) -> bytes:
+    """Compile files, of which one is the main file, to a PDF or PNG.
+
+    Fonts are Typst's own and, for figures and charts, Matplotlib's DejaVu Sans; never the
+    machine's, so that a document looks the same everywhere. A letter that none of them has is an
+    empty box. Matplotlib's folder of fonts is not used as it is: it also has a font with a
+    placeholder for every letter, and Typst would set a whole text of a figure in that font if
+    DejaVu Sans lacks one letter of the text.
     """
     import typst
 
-    inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
-    data = json.dumps(document.as_json() | {"colours": inks}).encode()
-    template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
-    sources = {_TEMPLATE: template, "document.json": data, **document.files()}
+    # Found without the import, which takes longer than a whole report.
+    matplotlib = find_spec("matplotlib")
+    assert matplotlib is not None
+    assert matplotlib.origin is not None
+    fonts = Path(matplotlib.origin).parent / "mpl-data/fonts/ttf"
     try:
         with TemporaryDirectory(prefix="roadeval-") as folder:
             for name, content in sources.items():
                 Path(folder, name).write_bytes(content)
+            for font in fonts.glob("DejaVuSans*.ttf"):
+                shutil.copy(font, folder)
             compiled: bytes = typst.compile(
-                Path(folder, _TEMPLATE),
+                Path(folder, _MAIN),
                 root=Path(folder),
-                font_paths=typst.Fonts(include_system_fonts=False),
+                font_paths=typst.Fonts(include_system_fonts=False, font_paths=[folder]),
                 format=kind,
                 ppi=pixels_per_inch,
             )
